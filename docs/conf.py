@@ -17,5 +17,5 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings say type, shape and unit
 napoleon_google_docstring = False
 napoleon_use_ivar = True
-# Links to files of the repository outside this folder, and to the notebook, lead somewhere there; a test holds them.
+# Links to files of the repository outside this folder, and to the notebook, are valid there; a test checks them.
 suppress_warnings = ["myst.xref_missing"]

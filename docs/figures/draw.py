@@ -18,9 +18,8 @@ from springmass.report.figures.canvas import (
     ORANGE,
     PURPLE,
     VERMILLION,
-    WIDTH,
-    blank,
-    legend_row,
+    legend_above,
+    panels,
     style,
 )
 
@@ -80,8 +79,7 @@ def stability_figure() -> Figure:
         ("rk4", ORANGE),
     )
     with style():
-        figure = blank(WIDTH, 3.8)
-        panel = figure.add_axes((0.68 / WIDTH, 0.13, (WIDTH - 0.8) / WIDTH, 0.76))
+        figure, (panel,) = panels([3.8])
         panel.set_xscale("log")
         panel.set_yscale("log")
         for name, colour in looks:
@@ -98,7 +96,7 @@ def stability_figure() -> Figure:
         panel.set_xlabel("damping ratio gamma / omega")
         panel.set_ylabel("largest stable step / radians")
         panel.set_xlim(ratios[0], ratios[-1])
-        legend_row(panel, 5, columnspacing=1.2)
+        legend_above(panel, 5)
         return figure
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -13,9 +12,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 
 from springmass import sample_data
+from tests.browser import headless
 
 HERE = Path(__file__).resolve().parent
 RECORDED_MS = 25_000
@@ -73,24 +73,19 @@ def take_report(page: Page, folder: Path) -> None:
     """Take the head of the report of a bundled run."""
     data = sample_data()
     run, scene = data / "damped_simulated_position.txt", data / "damped.scene.toml"
-    command = springmass("-q", "analyse", run, "--scene", scene, "--out", folder)
+    command = springmass("-q", "analyse", run, "--scene", scene, "-o", folder)
     subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
-    page.set_viewport_size({"width": 1000, "height": 1400})
+    page.set_viewport_size({"width": 1280, "height": 1330})
     page.goto((folder / "damped_simulated_position.results" / "report.html").as_uri())
     page.screenshot(path=HERE / "report.png")
 
 
 def main() -> None:
     """Take both."""
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        sys.exit("docs/figures/screenshots.py: chromium is not on the PATH; Debian: apt-get install chromium")
-    with sync_playwright() as playwright, TemporaryDirectory() as folder:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+    with headless() as browser, TemporaryDirectory() as folder:
         page = browser.new_page()
         take_report(page, Path(folder))
         take_page(page, Path(folder))
-        browser.close()
 
 
 if __name__ == "__main__":

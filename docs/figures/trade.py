@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from springmass.commands.trade import LABELS
 from springmass.report.figures import render
 from springmass.trade.drawing import trade_figure
 from springmass.trade.measure import Trade, measure
-from springmass.trade.methods import UNITS, methods
-from springmass.trade.summary import ratio
+from springmass.trade.methods import UNITS, references, tiers
+from springmass.trade.tables import ratio
 from springmass.trade.truth import Truth
 
 HERE = Path(__file__).resolve().parent
@@ -23,18 +22,16 @@ CASES = {
 
 def main(folder: Path = HERE, seeds: int = 100) -> str:
     """Measure every case, draw the first into a folder and return the table."""
-    found, absent = methods()
-    trades = {name: measure(truth, found, seeds, timer=time.perf_counter) for name, truth in CASES.items()}
+    methods = [*tiers(linear=True), *references()]
+    trades = {name: measure(truth, methods, seeds, timer=time.perf_counter) for name, truth in CASES.items()}
     first = next(iter(trades.values()))
-    figure = trade_figure({quantity: first.points(quantity) for quantity in first.bound}, labels=LABELS)
-    (folder / "trade.svg").write_bytes(render(figure, "svg"))
-    lmfit_s = next(row.seconds for row in first.rows if row.method.name.startswith("lmfit"))
-    lines = [f"| method | time / lmfit | {' | '.join(trades)} |", "| --- " * (2 + len(trades)) + "|"]
+    (folder / "trade.svg").write_bytes(render(trade_figure(first), "svg"))
+    fit_s = next(row.seconds for row in first.rows if row.method.name == "scipy")
+    lines = [f"| method | time / fit | {' | '.join(trades)} |", "| --- " * (2 + len(trades)) + "|"]
     for i, row in enumerate(first.rows):
         label = f"`{row.method.name}`" if row.method.kind == "tier" else row.method.label
-        cells = [label, f"{row.seconds / lmfit_s:.2f}", *(_errors(trade, i) for trade in trades.values())]
+        cells = [label, f"{row.seconds / fit_s:.2f}", *(_errors(trade, i) for trade in trades.values())]
         lines.append(f"| {' | '.join(cells)} |")
-    lines += [f"{each.name} was not measured: {each.needs} is not installed" for each in absent]
     return "\n".join(lines)
 
 

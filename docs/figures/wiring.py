@@ -47,8 +47,8 @@ def drawing() -> str:
     vcc, gnd, trig, echo, dq = 100, 220, 140, 180, 370
     parts = [
         box(BOARD, "Arduino Uno or Nano", "ATmega328P, 16 MHz, 5 V"),
-        box(MODULE, "HC-SR04", "looks at the bob"),
-        box(THERMOMETER, "DS18B20, if wanted", "flat side towards you: GND, DQ, VDD"),
+        box(MODULE, "HC-SR04", "faces the bob"),
+        box(THERMOMETER, "DS18B20, optional", "flat side towards you: GND, DQ, VDD"),
         wire(RED, (right, vcc), (left, vcc)),
         wire(BLUE, (right, trig), (left, trig)),
         wire(GREEN, (right, echo), (left, echo)),

@@ -1,0 +1,159 @@
+"""Write the tables of options in command-line.md, findings.md and glossary.md from the declarations in the program.
+
+``python docs/reference/generate.py`` brings the pages up to date; ``tests/docs/test_docs.py`` checks that they are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from cyclopts import Group
+from cyclopts.argument import Argument
+
+from pipeline.findings.registry import FINDINGS, Symptom
+from springmass.command_line import COMMANDS, app
+from springmass.glossary import TERMS
+from springmass.options import THE_PAGE
+from springmass.runs.options import HOW_READ
+
+PAGE = Path(__file__).with_name("command-line.md")
+FINDINGS_PAGE = Path(__file__).with_name("findings.md")
+GLOSSARY_PAGE = Path(__file__).with_name("glossary.md")
+RANK = {"error": 0, "warning": 1, "info": 2}
+SHOWN = {"error": "error", "warning": "warning", "info": "note"}
+TABLE = re.compile(r"<!-- options of (?P<what>[\w ]+) -->\n.*?<!-- end -->\n", re.DOTALL)
+LIST = re.compile(r"<!-- commands -->\n.*?<!-- end -->\n", re.DOTALL)
+EVERY_RECORDING = "every command that reads a recording"
+ELSEWHERE = {
+    HOW_READ: "as [above](#options-of-every-command-that-reads-a-recording)",
+    THE_PAGE: "as for `springmass page`",
+}
+"""Groups of options with a separate table, and what the other tables say about them."""
+
+HEAD = """\
+# Findings
+
+This page is for everyone who sees a warning and wants to know what it means and what to do.
+
+A finding is one sentence about a run. It has a code, which never changes its meaning, and a severity:
+
+- **error**: a number of the result must not be used. Under `--strict` the exit code is 5, as for the
+  warning `sensor_lost`.
+- **warning**: a number may be less good than usual. The uncertainties already include what is known of it.
+- **note** (`info` in JSON): worth knowing; nothing needs doing.
+
+In JSON each finding also has `advice`, `details` (statistics, alternatives, method) and `values` (its numbers by name,
+in SI units).
+"""
+
+GONE = """\
+## Codes that are gone
+
+Version 0.2.0 replaced these codes. They named causes that no recording showed, or that the user could do nothing about.
+
+- `correlated_residuals`: `model_misfit`, `values.rms_m` and `values.noise_m`.
+- `halves_differ`: `model_misfit`, `values.halves`.
+- `amplitude_modulated`: `model_misfit`.
+- `rows_lost`, `rows_doubled`: `model_misfit`, or `phase_jump` if many rows in succession are missing.
+- `interleaved_records`, `mains_hum`: `model_misfit`, or `no_oscillation`.
+- `contact`: `touched`, or `model_misfit`.
+- `wave_slips`: `false_echoes`.
+- `locked_echoes`: `clipped`.
+"""
+
+
+GLOSSARY_HEAD = """\
+# Glossary
+
+This page is for everyone who meets an unknown word in a report, a message or these pages.
+"""
+
+
+def arguments_of(command: str) -> list[Argument]:
+    """Return the arguments and options of a command that are its own, as declared."""
+    declared = app[command].assemble_argument_collection(default_parameter=app.default_parameter)
+    return [each for each in declared if each.parse and each.show]
+
+
+def group_of(argument: Argument) -> Group:
+    """Return the heading under which the help shows an option."""
+    return next(iter(argument.parameter.group or ()))
+
+
+def names_of(argument: Argument) -> list[str]:
+    """Return an option with each of its names, or an argument, with what it takes."""
+    if argument.index is not None or not argument.name.startswith("-"):
+        return [argument.name]
+    value = "" if argument.hint is bool else f" {argument.parameter.metavar}"
+    return [f"{name}{value}" for name in sorted(argument.names, key=len)]
+
+
+def table_of(what: str) -> str:
+    """Return the table of a command, or of all options that say how a recording is read."""
+    rows = list(_reading_rows() if what == EVERY_RECORDING else _rows(what))
+    heads = "argument or option" if any("`-" not in row for row in rows) else "option"
+    return "\n".join([f"| {heads} | meaning |", "| --- | --- |", *rows, ""])
+
+
+def _reading_rows() -> Iterator[str]:
+    yield from (_row(each) for each in arguments_of("analyse") if group_of(each) == HOW_READ)
+
+
+def _rows(command: str) -> Iterator[str]:
+    arguments = arguments_of(command)
+    for each in arguments:
+        if group_of(each) not in ELSEWHERE or (command == "page" and group_of(each) == THE_PAGE):
+            yield _row(each)
+    for group, meaning in ELSEWHERE.items():
+        names = [f"`{each.name}`" for each in arguments if group_of(each) == group]
+        if names and (command, group) != ("page", THE_PAGE):
+            yield f"| {', '.join(names)} | {meaning} |"
+
+
+def _row(argument: Argument) -> str:
+    names = ", ".join(f"`{name}`" for name in names_of(argument))
+    choices = argument.get_choices()
+    listed = f"; one of {', '.join(f'`{each}`' for each in choices)}" if choices else ""
+    return f"| {names} | {argument.parameter.help}{listed} |"
+
+
+def commands() -> str:
+    """Return the table of commands."""
+    rows = [f"| [`{name}`](#springmass-{name}) | {app[name].help} |" for name in COMMANDS]
+    return "\n".join(["| command | what it does |", "| --- | --- |", *rows, ""])
+
+
+def updated(page: str) -> str:
+    """Return the page with its tables as they are declared."""
+    page = LIST.sub(lambda _: f"<!-- commands -->\n{commands()}<!-- end -->\n", page)
+    return TABLE.sub(
+        lambda found: f"<!-- options of {found['what']} -->\n{table_of(found['what'])}<!-- end -->\n", page
+    )
+
+
+def findings_page() -> str:
+    """Return the page of findings, grouped by symptom and the gravest first."""
+    parts = [HEAD]
+    for symptom in Symptom:
+        kinds = {code: kind for code, kind in FINDINGS.items() if kind.symptom is symptom}
+        parts.append(f"## {symptom.value}\n\n| code | severity | meaning | what to do |\n| --- | --- | --- | --- |")
+        for code, kind in sorted(kinds.items(), key=lambda item: (min(RANK[s] for s in item[1].severities), item[0])):
+            severity = " or ".join(SHOWN[one] for one in sorted(kind.severities, key=RANK.__getitem__))
+            parts.append(f"| `{code}` | {severity} | {kind.meaning} | {kind.advice or '-'} |")
+        parts[-1] += "\n"
+    return "\n".join([*parts, GONE])
+
+
+def glossary_page() -> str:
+    """Return the page of terms."""
+    rows = [f"| {each.name} | {each.symbol or ''} | {each.meaning} |" for each in TERMS]
+    return "\n".join([GLOSSARY_HEAD, "| term | symbol | meaning |", "| --- | --- | --- |", *rows, ""])
+
+
+if __name__ == "__main__":
+    PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    FINDINGS_PAGE.write_text(findings_page(), encoding="utf-8")
+    GLOSSARY_PAGE.write_text(glossary_page(), encoding="utf-8")
+    print(f"{len(COMMANDS)} commands, {len(FINDINGS)} finding codes, {len(TERMS)} terms")
