@@ -60,9 +60,9 @@ jobs = plan([sys.argv[1]], accuracy="standard").jobs
 peaks = []
 for part in (jobs[: len(jobs) // 2], jobs[len(jobs) // 2 :]):
     analyse_many(part)
-    # getrusage would tell the memory of the process that started this one, where that is the larger.
-    told = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
-    peaks.append(int(told.split()[1]) / 1024)
+    # getrusage would give the memory of the parent process where that is larger.
+    line = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
+    peaks.append(int(line.split()[1]) / 1024)
 print(json.dumps(peaks))
 """
 CHILDREN = (resource.RUSAGE_CHILDREN,)
@@ -117,9 +117,9 @@ def recordings(folder: Path, runs: int) -> None:
 
 
 def _real() -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    for name, said in REAL:
+    for name, options in REAL:
         if (RECORDINGS / name).is_file():
-            track = load(RECORDINGS / name, **said).track
+            track = load(RECORDINGS / name, **options).track
             there = np.isfinite(track.t) & np.isfinite(track.y)
             yield track.t[there], track.y[there]
 
@@ -239,12 +239,12 @@ def idle_of_two(files: Sequence[Path], out: Path) -> float:
     alone, mine = 0.0, 0.0
     while process.poll() is None:
         now = time.monotonic()
-        workers = {pid: told for pid in _below(process.pid) if (told := _busy(pid))}
+        workers = {pid: usage for pid in _below(process.pid) if (usage := _busy(pid))}
         for pid, (used, queued) in workers.items():
             seen[pid] = (seen[pid][0] if pid in seen else now, now, used + queued)
-        if told := _busy(process.pid):
-            alone += 0.0 if workers else told[0] - mine
-            mine = told[0]
+        if usage := _busy(process.pid):
+            alone += 0.0 if workers else usage[0] - mine
+            mine = usage[0]
         time.sleep(EVERY_S)
     _whole(process)
     return alone + sum(max(last - first - busy, 0.0) for first, last, busy in seen.values())
@@ -347,10 +347,10 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--searched", type=int, default=10_000)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with tempfile.TemporaryDirectory() as name:
-        for what, value in asdict(measure(asked.runs, Path(name))).items():
+        for what, value in asdict(measure(options.runs, Path(name))).items():
             print(f"{what:12} {value:.4g}")
-        seconds, count = search_s(asked.searched)
-        print(f"search of {asked.searched} rows: {seconds:.2f} s of processor, {count} match")
+        seconds, count = search_s(options.searched)
+        print(f"search of {options.searched} rows: {seconds:.2f} s of processor, {count} match")

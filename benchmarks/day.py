@@ -135,8 +135,8 @@ class Cost:
 def recovered(log: Path) -> Cost:
     """Recover a log in a separate process, and remove it as a recording's end does."""
     command = [sys.executable, __file__, "--recover", str(log)]
-    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    return Cost(**json.loads(said))
+    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return Cost(**json.loads(output))
 
 
 def recover_here(log: Path) -> Cost:

@@ -59,7 +59,7 @@ class Ratio:
     theirs: Callable[[], float]
     rounds: int = 5
     calls: int = 1
-    """Of each side in a process; where they are several, one takes a share of the seconds, which is told in ms."""
+    """Calls of each side per process; with several, the time of one is printed in ms."""
 
     def take(self, rounds: int | None = None) -> tuple[float, float]:
         """Return the least of each side, taken in turn."""

@@ -2,7 +2,7 @@
 
 Prints a line for each figure. The recording is a simulated bench at 100 Hz behind a pseudo-terminal; viewers are
 sockets that read all they are sent, in this process, or a browser (``--browser``), whose screen is drawn.
-``--history H`` plays so many hours in a browser and tells the time from frame to frame.
+``--history H`` plays H hours in a browser and prints the time between frames.
 ``--floor`` tells what the server alone costs, without springmass, that sends one viewer as many bytes as often.
 ``--suspend S`` lets one viewer read nothing for so long; ``--slip`` compares the sampler with and without the page.
 """
@@ -247,7 +247,7 @@ def screen(seconds: float) -> dict[str, float]:
 
 
 def history(hours: float, frames: int = 240) -> dict[str, float]:
-    """Return the time from frame to frame while so many hours are played, all in view and a minute of them, s."""
+    """Return the time between frames while ``hours`` are played, s: with all of them in view, and with one minute."""
     from tests.browser import headless
 
     with tempfile.TemporaryDirectory() as folder, headless() as browser:
@@ -291,7 +291,7 @@ def slip(seconds: float, *, page: bool) -> float:
     return float(np.quantile(late - late.min(), 0.99))
 
 
-def _told(found: dict[str, float]) -> str:
+def _listed(found: dict[str, float]) -> str:
     return (
         f"{100 * found['serving']:.1f} % of a core to serve, {100 * found['cpu']:.1f} % with the analysis; "
         f"p50 {1e3 * found['p50_s']:.0f} ms, p95 {1e3 * found['p95_s']:.0f} ms"
@@ -310,18 +310,20 @@ def main() -> None:
     parser.add_argument("--history", type=float, default=0.0, metavar="HOURS")
     options = parser.parse_args()
     if options.browser:
-        print(f"page in a browser, sample to screen: {_told(screen(options.seconds))}")
+        print(f"page in a browser, sample to screen: {_listed(screen(options.seconds))}")
     elif options.floor:
-        print(f"a bare server that sends as much as often: {100 * floor(options.seconds):.1f} % of a core")
+        print(
+            f"a bare server that sends the same amount at the same rate: {100 * floor(options.seconds):.1f} % of a core"
+        )
     elif options.history:
-        told = ", ".join(f"{name[:-2]} {1e3 * each:.0f} ms" for name, each in history(options.history).items())
-        print(f"from frame to frame while {options.history:g} h at 100 Hz are played: {told}")
+        intervals = ", ".join(f"{name[:-2]} {1e3 * each:.0f} ms" for name, each in history(options.history).items())
+        print(f"between frames while {options.history:g} h at 100 Hz are played: {intervals}")
     elif options.slip:
         without, beside = (slip(options.seconds, page=page) for page in (False, True))
         print(f"sampler's slip, p99: {1e3 * without:.1f} ms without the page, {1e3 * beside:.1f} ms with two viewers")
     else:
         found = measure(options.seconds, options.viewers, options.suspend)
-        print(f"page, {options.viewers} viewers, sample to socket: {_told(found)}")
+        print(f"page, {options.viewers} viewers, sample to socket: {_listed(found)}")
         if options.suspend:
             grown, current = found["memory_mb"], 1e3 * found["current_s"]
             print(f"a viewer suspended {options.suspend:g} s: {grown:+.1f} MB, current after {current:.0f} ms")

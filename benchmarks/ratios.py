@@ -37,7 +37,7 @@ REAL = {
         {"channel": "position", "unit": "m"},
     ),
 }
-"""Real recordings, measured where they are at hand, and what must be said of them beyond their name."""
+"""Real recordings, measured if they are at hand, with the reading options that each needs."""
 LIMITS = {"fast": 1.0, "standard": 3.0, "best": 6.0}
 BUSY_LIMIT, BUSY_LOOPS = 3.0, 2
 TABLE = {".txt": "sep='\\t', header=1, usecols=[0, 1]", ".csv": "sep=';', usecols=[0, 1]"}
@@ -108,25 +108,27 @@ def cases() -> Iterator[Case]:
     python = sys.executable
     program = str(Path(python).parent / "springmass")
     bundled = sample_data() / "damped_simulated_position.txt"
-    real = {name: (RECORDINGS / path, said) for name, (path, said) in REAL.items() if (RECORDINGS / path).is_file()}
+    real = {
+        name: (RECORDINGS / path, options) for name, (path, options) in REAL.items() if (RECORDINGS / path).is_file()
+    }
     yield pair("springmass --help", "bare python", 3.0, process(program, "--help"), process(python, "-c", "pass"), 30)
-    for name, (path, said) in {"the bundled recording": (bundled, {}), **real}.items():
+    for name, (path, options) in {"the bundled recording": (bundled, {}), **real}.items():
         script = SCRIPT.format(path=str(path), how=TABLE[path.suffix])
-        flags = [part for option, value in said.items() for part in (f"--{option}", value)]
+        flags = [part for option, value in options.items() for part in (f"--{option}", value)]
         ours, theirs = process(program, "analyse", "--json", str(path), *flags), process(python, "-c", script)
         yield pair(f"cold springmass analyse --json, {name}", "a script of pandas and lmfit", 1.0, ours, theirs, 10)
     scene = read_scene(sample_data() / "damped.scene.toml")
     tracks = {"clean": clean_record(), "5 % false echoes": load(bundled).track}
-    measured = {name: load(path, **said).track for name, (path, said) in real.items()}
+    measured = {name: load(path, **options).track for name, (path, options) in real.items()}
     for name, track in {**tracks, **measured}.items():
         known = scene if name in tracks else Scene()
         yield from (tier(accuracy, limit, name, track, known) for accuracy, limit in LIMITS.items())
-    for name, (path, said) in (real or {"the bundled recording": (bundled, {})}).items():
+    for name, (path, options) in (real or {"the bundled recording": (bundled, {})}).items():
         yield Case(
             f"analyse(), {name}, any number of threads, beside {BUSY_LOOPS} busy loops",
             "the same on the quiet machine",
             BUSY_LIMIT,
-            partial(beside_busy_loops, path, said),
+            partial(beside_busy_loops, path, options),
             10,
         )
 
@@ -170,26 +172,26 @@ def damped_sine(t: np.ndarray, y: np.ndarray) -> Callable[[], object]:
     return lambda: fitter.fit(y, t=t, **guess)
 
 
-def beside_busy_loops(path: Path, said: Mapping[str, str], rounds: int) -> tuple[float, float]:
+def beside_busy_loops(path: Path, options: Mapping[str, str], rounds: int) -> tuple[float, float]:
     """Return the least seconds of an analysis in a separate process, next to busy loops and quiet."""
-    quiet = in_a_process(path, said, rounds)
+    quiet = in_a_process(path, options, rounds)
     loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY_LOOPS)]
     try:
-        return in_a_process(path, said, rounds), quiet
+        return in_a_process(path, options, rounds), quiet
     finally:
         for loop in loops:
             loop.kill()
             loop.wait()
 
 
-def in_a_process(path: Path, said: Mapping[str, str], rounds: int) -> float:
+def in_a_process(path: Path, options: Mapping[str, str], rounds: int) -> float:
     """Return the least seconds of an analysis, s, with whatever number of threads its libraries choose."""
-    command = [sys.executable, "-c", CHILD, str(path), str(rounds), json.dumps(said)]
+    command = [sys.executable, "-c", CHILD, str(path), str(rounds), json.dumps(options)]
     return float(subprocess.run(command, check=True, capture_output=True, env=plain()).stdout)
 
 
 def plain() -> dict[str, str]:
-    """Return the environment of a user: nothing said of threads, and modules compiled once and not at every start."""
+    """Return a user's environment: no number of threads is set, and modules are compiled once, not at every start."""
     kept = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     kept.pop("PYTHONDONTWRITEBYTECODE", None)
     return kept

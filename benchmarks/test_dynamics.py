@@ -12,7 +12,7 @@ def test_one_trajectory_of_mixed_drag(benchmark):
 
 
 def test_the_compared_errors_are_equal():
-    """Strang and step halving err by at most 1e-6, and LSODA is not asked for more than halving has."""
+    """Strang and step halving err by at most 1e-6, and LSODA is at least as exact as halving needs."""
     errors = dynamics.errors()
     assert errors["strang"] <= 1e-6
     assert errors["auto for 1e-6"] <= errors["LSODA"] <= 1e-6

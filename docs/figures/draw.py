@@ -70,7 +70,7 @@ def stability_figure() -> Figure:
         If a run contradicts its line.
     """
     ratios = np.geomspace(0.01, 100.0, 161)
-    asked = np.geomspace(0.02, 60.0, 8)
+    checked = np.geomspace(0.02, 60.0, 8)
     looks = (
         ("forward-euler", VERMILLION),
         ("symplectic-euler", BLUE),
@@ -85,7 +85,7 @@ def stability_figure() -> Figure:
         for name, colour in looks:
             method = get_integrator(name)
             panel.plot(ratios, [largest_step(method, ratio) for ratio in ratios], color=colour, label=name)
-            for ratio in asked.tolist():
+            for ratio in checked.tolist():
                 limit = largest_step(method, ratio)
                 for share, bounded, marker in ((0.97, True, "o"), (1.03, False, "x")):
                     if runs_bounded(method, share * limit, ratio) != bounded:
