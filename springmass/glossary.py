@@ -19,11 +19,14 @@ class Term:
         One or two sentences of plain text.
     symbol : str or None
         The symbol in tables and figures; None where there is none.
+    of_program : bool
+        Whether it is about files and programs, not about results. A report omits these.
     """
 
     name: str
     meaning: str
     symbol: str | None = None
+    of_program: bool = False
 
 
 TERMS: tuple[Term, ...] = (
@@ -38,14 +41,16 @@ TERMS: tuple[Term, ...] = (
     Term("bias", "The mean error of a method over many runs. More runs do not reduce it."),
     Term("BIC", "Bayesian information criterion: it ranks laws by their fit and by their number of parameters."),
     Term("bob", "The body that hangs on the spring."),
-    Term("channel", "One column of a recording that can be analysed, such as a distance or a velocity."),
+    Term(
+        "channel", "One column of a recording that can be analysed, such as a distance or a velocity.", of_program=True
+    ),
     Term(
         "chi-square",
-        "The sum of the squared residuals, each divided by its expected standard deviation; about 1 for each residual.",
+        "The sum of (residual divided by its standard deviation)²; a good fit has about 1 for each residual.",
         "χ²",
     ),
     Term("clipping", "Distances that are cut off at a level because the sensor cannot see further."),
-    Term("course", "Many runs that are analysed together and give one table."),
+    Term("course", "Many runs that are analysed together and give one table.", of_program=True),
     Term("coverage", "How often an interval contains the true value: 95 % for a good 95 % interval."),
     Term(
         "coverage factor",
@@ -88,7 +93,9 @@ TERMS: tuple[Term, ...] = (
         "and the added mass; k = mω².",
         "m",
     ),
-    Term("NeXus", "A convention for the names in HDF5 files, which hold large tables of measurements."),
+    Term(
+        "NeXus", "A convention for the names in HDF5 files, which hold large tables of measurements.", of_program=True
+    ),
     Term("noise", "Random scatter of single distances, given as one standard deviation.", "σ"),
     Term("nominal", "Stated by a maker or a program, but not measured."),
     Term("period", "The duration of one oscillation.", "T"),
@@ -114,25 +121,33 @@ TERMS: tuple[Term, ...] = (
     Term("Reynolds number", "Inertia of the air compared with its viscosity: ρ v D/η, with the rms velocity v.", "Re"),
     Term("rms", "Root mean square: the root of the mean of the squares, as in v_rms, the rms velocity."),
     Term("run", "One measurement, as it is analysed."),
-    Term("run file", "The file NAME.h5 with everything about a recorded run; it is never changed afterwards."),
+    Term(
+        "run file",
+        "The file NAME.h5 with everything about a recorded run; it is never changed afterwards.",
+        of_program=True,
+    ),
     Term("sample", "One reading with its time."),
     Term("scatter", "Random differences between values that should be equal."),
     Term("scene", "What is known of the bench: masses, disc, air and sensor."),
     Term("second mode", "A second oscillation of the bob, for example sideways like a pendulum."),
-    Term("serial port", "The connection of a sensor, usually by USB: COM3 on Windows, /dev/ttyUSB0 on Linux."),
+    Term(
+        "serial port",
+        "The connection of a sensor, usually by USB: COM3 on Windows, /dev/ttyUSB0 on Linux.",
+        of_program=True,
+    ),
     Term("sha256", "A checksum of 64 digits; files with the same checksum have the same contents."),
-    Term("siunitx", "A package of LaTeX that typesets numbers with units."),
+    Term("siunitx", "A package of LaTeX that typesets numbers with units.", of_program=True),
     Term("spectrum", "How much of each frequency a recording contains; an oscillation is a peak."),
     Term("spring constant", "The force of the spring divided by its extension.", "k"),
     Term(
         "standard uncertainty",
-        "The standard deviation of the values that the true one may have; "
-        "value ± u contains it in about 68 % of cases.",
+        "The standard deviation of the values that the quantity may reasonably have; "
+        "value ± u contains the true value in about 68 % of cases.",
         "u",
     ),
-    Term("TOML", "A text format for settings, with lines such as mass_kg = 0.2176."),
-    Term("track", "In Python, the times and distances of a run before the analysis."),
-    Term("trap", "Something in a file that is easily misread; springmass formats FILE lists it."),
+    Term("TOML", "A text format for settings, with lines such as mass_kg = 0.2176.", of_program=True),
+    Term("track", "In Python, the times and distances of a run before the analysis.", of_program=True),
+    Term("trap", "Something in a file that is easily misread; springmass formats FILE lists it.", of_program=True),
     Term("type A uncertainty", "The part that comes from scatter. It shrinks with a longer recording."),
     Term("type B uncertainty", "Everything else, such as the balance, the clock and the speed of sound."),
     Term(
@@ -141,8 +156,12 @@ TERMS: tuple[Term, ...] = (
         "its BIC is more than 6 above the lowest, or it adds to the selected law a term that changes nothing.",
     ),
     Term("variance", "The square of the standard uncertainty; the variances of independent causes add up."),
-    Term("virtual environment", "A folder with Python packages for one project, here .venv; venv makes it."),
+    Term(
+        "virtual environment",
+        "A folder with Python packages for one project, here .venv; venv makes it.",
+        of_program=True,
+    ),
     Term("window", "The samples of one period or a few that give one amplitude and one phase."),
-    Term("wire log", "The file NAME.wire with every byte of the sensor, written during a recording."),
+    Term("wire log", "The file NAME.wire with every byte of the sensor, written during a recording.", of_program=True),
 )
 """All terms, in the order of the alphabet."""

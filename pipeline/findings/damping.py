@@ -133,7 +133,7 @@ def _rejections(damping: Damping, rejected: int) -> Finding:
     return Finding(
         "law_rejected",
         "info",
-        f"{count} of {tried} damping laws tried {'is' if count == 1 else 'are'} rejected.",
+        f"{count} of {tried} damping laws tried {'does' if count == 1 else 'do'} not fit this recording.",
         " ".join(reasons),
         {"rejected": count, "tried": tried},
     )

@@ -9,21 +9,21 @@ __all__ = ["EXAMPLES"]
 EXAMPLES: Mapping[str, str] = {
     # Motion.
     "no_oscillation": "No oscillation: the distance stays within 0.3 mm: nothing moves in the beam.",
-    "two_modes": "Two oscillations of similar strength run together, so there is no single period.",
+    "two_modes": "Two oscillations of similar strength overlap, so there is no single period.",
     "overdamped": "The motion is overdamped: it does not oscillate.",
     "strongly_damped": "Strong damping: the equation of motion itself was fitted.",
     "short_record": "Only 4.2 periods were analysed, too few to measure the damping.",
-    "touched": "The motion was disturbed at 41.9 s; the longest part was used (to 40.78 s).",
-    "restarted": "The bob was stopped and released again; the longest part was used (from 62.10 s).",
-    "phase_jump": "The phase jumps at 30.0 s; the longest part was used (from 30.1 s).",
-    "handled": "The bob does not move freely for 3.4 s; that was left out (from 117.20 s).",
+    "touched": "The motion was disturbed at 41.9 s; only the part until 40.78 s was analysed.",
+    "restarted": "The bob was released again at 60.2 s; only the part from 62.10 s on was analysed.",
+    "phase_jump": "The phase jumps at 30.0 s; only the part from 30.10 s on was analysed.",
+    "handled": "The bob does not move freely for 3.4 s; only the part from 117.20 s on was analysed.",
     "at_rest": "The bob hangs still from 0.00 to 2.31 s; that was left out.",
-    "sideways_mode": "The bob also swings by 0.95 mm at 0.8027 Hz; the fit accounts for it.",
+    "sideways_mode": "A second oscillation of 0.95 mm at 0.8027 Hz, perhaps sideways, shows; the fit includes it.",
     "amplitude_dependent_frequency": (
         "At 53 mm the frequency is 0.16 % lower than in very small swings; the period is an average."
     ),
     "rest_drift": "The rest position drifts by 0.52 mm.",
-    "not_sinusoidal": "Every period differs from a sinusoid by up to 1.1 mm (2.1 % of the amplitude).",
+    "not_sinusoidal": "In every period the motion differs from a sinusoid by up to 1.1 mm (2.1 % of the amplitude).",
     "model_misfit": "Residuals (0.2 mm) exceed the sample noise (0.11 mm), so the uncertainties were increased.",
     "not_converged": "The fit of the whole waveform did not converge; the values of standard accuracy are given.",
     "implausible_motion": "The motion needs 12 times the acceleration of gravity: probably a wrong unit.",
@@ -31,15 +31,15 @@ EXAMPLES: Mapping[str, str] = {
     # Damping.
     "stated_law_rejected": "The recording contradicts the stated damping law linear: linear+quadratic fits better.",
     "no_law_fits": "No damping law fits: the best has a reduced chi-square of 5.98, not about 1.",
-    "law_rejected": "7 of 9 damping laws tried are rejected.",
+    "law_rejected": "7 of 9 damping laws tried do not fit this recording.",
     "laws_not_separable": "7 damping laws fit this run equally well; a longer run may distinguish them.",
     "mixed_drag": "The damping needs linear and quadratic drag together: one kind alone does not fit.",
     # Distances.
     "clipped": "542 of 2000 samples are cut off at 324.2 mm; they were left out.",
     "false_echoes": "701 of 12000 samples (5.8%) are false echoes; they were left out.",
     "missing_samples": "144 of 1000 samples have no distance.",
-    "lost_target": "12 distances lie more than 1 m from the others; they were left out.",
-    "no_target": "The sensor heard no target for 2.5 s in all, at a stretch for up to 1.4 s.",
+    "lost_target": "12 distances of 2.4 to 2.6 m are far from all others: the target was lost; kept and flagged.",
+    "no_target": "The sensor heard no echo for 2.5 s in total, at most 1.4 s at a time.",
     "quantised": "The distances come in steps of 1 mm, which is more than their noise.",
     "held_samples": "Each distance is repeated 5 times: the sensor measures only every 0.05 s.",
     "smoothed_sensor": "Neighbouring distances are correlated (0.55): the sensor smooths its readings.",
@@ -47,46 +47,58 @@ EXAMPLES: Mapping[str, str] = {
         "The file states an error of 2.39 mm, but the samples scatter by 0.057 mm, which was used."
     ),
     "implausible_distance": "Distances from -0.248 to 0.245 m are outside the range of a rangefinder.",
-    "offset_unknown": "Position is summed up from velocity: its offset is unknown and the first sample stands at 0 m.",
-    "offset_unknown_after_gap": "Position is summed up from velocity; after each of 2 gaps it may be offset.",
-    "pair_mismatch": "31 velocities are not the differences of the positions",
-    "velocity_missing": "2 times stand in the position file only: no velocity there",
+    "offset_unknown": (
+        "The position was integrated from the velocity: its offset is unknown, and the first sample is at 0 m."
+    ),
+    "offset_unknown_after_gap": (
+        "The velocity has 2 gaps, the first before t = 3.2 s: the integrated position may jump there."
+    ),
+    "pair_mismatch": "31 of 40 velocities contradict the positions; the two files may be of different runs.",
+    "velocity_missing": "2 times are only in the position file, so they have no velocity.",
     # Times.
     "nominal_clock": "The times are row numbers at the nominal rate, which a crystal keeps to 50 ppm.",
-    "duplicate_time": "14 samples repeat an earlier time; they were left out.",
-    "non_monotonic_time": "3 samples run backward in time; they were left out.",
+    "duplicate_time": "14 samples have the same time as an earlier one; they were left out.",
+    "non_monotonic_time": "3 samples have times that run backward; they were left out.",
     "undersampled": "There are only 3.1 samples per period: another frequency gives the same samples.",
-    "clock_refused": "The clocks of sensor and computer disagree.",
-    "late_readings": "40 readings came up to 0.25 s late; their own times are used.",
+    "clock_refused": "The clocks of sensor and computer disagree, so the times were not corrected.",
+    "late_readings": "40 readings reached the computer late, by at most 0.25 s; the sensor's own times are used.",
     "jittered_time": "The times are measured: their steps vary from 98.87 to 101.2 ms (9.99944 Hz on average).",
     "times_in_bursts": "The times come in bursts of 5 samples every 50 ms; the samples were spread evenly, at 100 Hz.",
-    "clock_times": "Times are clock times and count from the first, 10:04:59.812.",
+    "clock_times": "The file gives times of day; here time 0 is 10:04:59.812.",
     "rate_assumed": "The rate of 100 Hz was given by the user.",
-    "time_assumed": '"column 1" was taken for the times: it alone runs forward',
-    "stale_header": "The header says 0 s + i * 0.01 s, the column of times says otherwise and is believed.",
+    "time_assumed": '"column 1" was read as the times, because no other column rises like it.',
+    "stale_header": "The header states the times 0 s + i * 0.01 s, but the column of times differs and is used.",
     # Scene.
     "spring_mass_missing": "The mass of the spring is not stated, so the spring constant is less certain.",
-    "uncertainty_missing": "[bob] mass_kg: no uncertainty stated, so it was taken as exact.",
+    "uncertainty_missing": "No uncertainty was stated for [bob] mass_kg, so it was taken as exact.",
     "scene_implausible": "Implausible: [bob] mass_kg = 200.",
     # Recording.
-    "truncated_row": "The last row stops midway; it is kept as a missing sample.",
-    "malformed_rows": "3 rows could not be read, the first in line 120; 3 kept as missing samples",
+    "truncated_row": "The last row is incomplete; its sample counts as missing.",
+    "malformed_rows": "3 rows could not be read, the first in line 120; 3 kept as missing samples.",
     "zero_filled_tail": "The last 144 distances are exactly 0, which no rangefinder reads; kept as missing samples.",
     "unit_assumed": "The times have no unit: read as seconds.",
-    "decimal_comma": "Commas are read as decimal marks.",
-    "empty_channel": 'channel "column 3" holds no numbers',
-    "preamble": '4 lines of text above the table were not read; the first is "MIN=0"',
-    "unverified": "run.h5 did not verify and was read all the same.",
-    "unknown_code": "The run file holds a note that this version does not know.",
-    "cut_short": "The recording did not end by itself; what the log holds is here.",
+    "decimal_comma": 'The comma in "0,2345" was read as a decimal comma, not as a thousands separator.',
+    "empty_channel": 'The channel "column 3" has no numbers.',
+    "preamble": '4 lines of text above the table were skipped; the first is "MIN=0".',
+    "unverified": (
+        "run.h5 was changed or damaged after it was written, but was read as you asked: the column 'distance'."
+    ),
+    "unknown_code": "The run file contains a note that this version does not know.",
+    "cut_short": "The recording was cut short; everything in its log is here.",
     "damaged_log": "The wire log is damaged: 512 bytes at 20480 could not be read.",
-    "readings_dropped": "12 reads of the port (288 bytes) came while the recorder's queue was full.",
-    "sensor_lost": "The sensor was gone at the end: no reading came in the last 8 s of the 60 s recorded.",
-    "sensor_away": "The sensor's port was lost once and came back, after 3.1 s at the most.",
-    "counter_changed": "The sensor's counter did not go on when its port came back; the host's clock times the gap.",
-    "sensor_unconfirmed": "The sensor that came back cannot be distinguished from another of its kind.",
-    "sensor_replaced": "Another sensor came back on the port; the recording goes on in channel 2.",
-    "other_device": "In place of the sensor that was lost another device came; it was not recorded.",
+    "readings_dropped": (
+        "12 reads of the port (288 bytes) were dropped because the disk was too slow and the queue was full."
+    ),
+    "sensor_lost": "The sensor sent no reading in the last 8 s of the 60 s recorded.",
+    "sensor_away": (
+        "The sensor's port was lost once and came back, after at most 3.1 s; 3.1 s in total were not recorded."
+    ),
+    "counter_changed": (
+        "The connection broke and the sensor's counter started again; the computer's clock times the gap."
+    ),
+    "sensor_unconfirmed": "After the connection broke, another sensor of the same model may have been plugged in.",
+    "sensor_replaced": "Another sensor was plugged in; the recording continues in channel 2.",
+    "other_device": "Another device was connected in place of the lost sensor; it was not recorded.",
     # Comparison.
     "runs_exchanged": "The spring constants agree only if two runs are exchanged.",
     "springs_differ": "The spring constants of the runs disagree by 9 standard uncertainties.",

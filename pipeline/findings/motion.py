@@ -125,8 +125,8 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Find
                 "warning",
                 f"At {amount(start, unit, '.0f')} the frequency is {100.0 * abs(shift):.2g} % "
                 f"{'higher' if shift > 0 else 'lower'} than in very small swings; the period is an average.",
-                f"It changes with {words_on_exponent(phase.exponent)}. The stated period is the average over the run; "
-                "its uncertainty does not cover the period at other amplitudes.",
+                f"The frequency changes with {words_on_exponent(phase.exponent)}. The stated period is the average "
+                "over the run; its uncertainty does not cover the period at other amplitudes.",
                 {"relative_shift": shift, "amplitude_m": start, "exponent": phase.exponent},
             )
     # What the rest position of computed data does within its digits affects no number.
@@ -177,11 +177,11 @@ def _mode_findings(fitted: Fitted, unit: str) -> Iterator[Finding]:
     if len(own) > 1:
         rest = ", ".join(f"{amount(m.amplitude.value, unit)} at {m.frequency.value:.4g} Hz" for m in own[1:])
         details.append(f"Further modes: {rest}.")
-    fate = "the fit accounts for it" if disturbances.modelled else "too small to affect the amplitude"
+    fate = "the fit includes it" if disturbances.modelled else "too small to affect the amplitude"
     yield Finding(
         "sideways_mode",
         "warning" if disturbances.modelled and share > SIDEWAYS else "info",
-        f"The bob also swings by {amount(size_m, unit)} at {f:.4g} Hz; {fate}.",
+        f"A second oscillation of {amount(size_m, unit)} at {f:.4g} Hz, perhaps sideways, shows; {fate}.",
         " ".join(details),
         {"frequency_hz": f, "amplitude_m": size_m, "beat_s": 1.0 / abs(f - main), "modes": float(len(own))},
     )
@@ -208,8 +208,8 @@ def harmonics_finding(found: Harmonics, unit: str) -> Finding | None:
     return Finding(
         "not_sinusoidal",
         "warning",
-        f"Every period differs from a sinusoid by up to {amount(found.peak_m, unit)} ({found.share:.1%} of the "
-        "amplitude).",
+        f"In every period the motion differs from a sinusoid by up to {amount(found.peak_m, unit)} "
+        f"({found.share:.1%} of the amplitude).",
         f"Likely cause, {cause}. The uncertainties of amplitude, rest position and damping were increased by as much.",
         {"peak_m": found.peak_m, "share": found.share},
     )

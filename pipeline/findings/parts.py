@@ -37,7 +37,7 @@ def part_findings(segments: Segments | None) -> Iterator[Finding]:
         yield Finding(
             kind.value,
             "warning",
-            f"{_WHAT[kind]} at {breaks[0].time_s:.1f} s{more}; the longest part was used{part}.",
+            f"{_WHAT[kind]} at {breaks[0].time_s:.1f} s{more}; only {part} was analysed.",
             f"{_listed([_change(one) for one in breaks])}." + (f" The other parts are {others}." if others else ""),
             {"time_s": breaks[0].time_s, "amplitude_ratio": 1.0 + breaks[0].amplitude, "phase_rad": breaks[0].phase},
         )
@@ -46,7 +46,7 @@ def part_findings(segments: Segments | None) -> Iterator[Finding]:
         yield Finding(
             "handled",
             "warning",
-            f"The bob does not move freely for {_seconds(handled):.1f} s; that was left out{part}.",
+            f"The bob does not move freely for {_seconds(handled):.1f} s; only {part} was analysed.",
             f"Left out: {_spans(handled)}. Amplitude, phase and damping rate are those at the start of the analysed "
             "part.",
             {"seconds": _seconds(handled)},
@@ -80,10 +80,10 @@ def _seconds(spans: Sequence[Span]) -> float:
 
 def _part(segments: Segments) -> str:
     if segments.first_s > 0.0 and segments.last_s < math.inf:
-        return f" ({segments.first_s:.2f} to {segments.last_s:.2f} s)"
+        return f"the part from {segments.first_s:.2f} to {segments.last_s:.2f} s"
     if segments.first_s > 0.0:
-        return f" (from {segments.first_s:.2f} s)"
-    return f" (to {segments.last_s:.2f} s)" if segments.last_s < math.inf else ""
+        return f"the part from {segments.first_s:.2f} s on"
+    return f"the part until {segments.last_s:.2f} s" if segments.last_s < math.inf else "the rest"
 
 
 def _spans(spans: Sequence[Span]) -> str:

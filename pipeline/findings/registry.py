@@ -70,9 +70,9 @@ FINDINGS: Mapping[str, FindingKind] = {
     "two_modes": FindingKind(
         _ERROR,
         Symptom.MOTION,
-        "Two oscillations of similar strength run together, so there is no single period.",
+        "Two oscillations of similar strength overlap, so there is no single period.",
         "The bob swings like a pendulum while it bounces, or two coupled bobs move.",
-        "Release the bob so that only one of the two motions starts.",
+        "Release the bob straight down, without a push or a twist.",
         "position",
     ),
     "overdamped": FindingKind(
@@ -144,7 +144,7 @@ FINDINGS: Mapping[str, FindingKind] = {
         Symptom.MOTION,
         "The bob also swings at a second frequency; the fit accounts for it.",
         "The bob swings sideways like a pendulum, or twists.",
-        "Release the bob vertically, without a sideways push.",
+        "Release the bob from straight below its rest position, without a push.",
         "spectrum",
     ),
     "amplitude_dependent_frequency": FindingKind(
@@ -167,8 +167,8 @@ FINDINGS: Mapping[str, FindingKind] = {
         _WARNING,
         Symptom.MOTION,
         "Every period differs from a sinusoid in the same way; the uncertainties were increased.",
-        "A bent distance scale, a spring that goes slack, a stop, or an echo near a turning point.",
-        "Look at the residuals; check the scale, the spring and the beam.",
+        "A wrong distance calibration, a slack spring, touching coils, or an echo near a turning point.",
+        "Check the distance calibration, the spring's coils, and the aim of the sensor.",
         "spectrum",
     ),
     "model_misfit": FindingKind(
@@ -324,7 +324,7 @@ FINDINGS: Mapping[str, FindingKind] = {
         Symptom.DISTANCES,
         "The distance was integrated from the velocity across gaps, so it may jump there.",
         "The velocity column has gaps.",
-        "Use the position file.",
+        "If the program also exported the position, analyse that file.",
     ),
     "pair_mismatch": FindingKind(
         _WARNING,
@@ -349,9 +349,9 @@ FINDINGS: Mapping[str, FindingKind] = {
     "duplicate_time": FindingKind(
         _WARNING,
         Symptom.TIMES,
-        "Some samples repeat an earlier time; they were left out.",
+        "Some samples have the same time as an earlier one; they were left out.",
         "The export rounds its times, or rows were written twice.",
-        "Check the export; use a sensor that sends its own time.",
+        "Export the times with more digits, or use a sensor that sends its own.",
         "position",
     ),
     "non_monotonic_time": FindingKind(
@@ -359,7 +359,7 @@ FINDINGS: Mapping[str, FindingKind] = {
         Symptom.TIMES,
         "Some samples run backward in time; they were left out.",
         "Two runs were joined, or rows were written out of order.",
-        "Check the export.",
+        "Export one run per file, with its rows in the order of their times.",
         "position",
     ),
     "undersampled": FindingKind(
@@ -373,9 +373,9 @@ FINDINGS: Mapping[str, FindingKind] = {
     "clock_refused": FindingKind(
         _WARNING,
         Symptom.TIMES,
-        "The clocks of sensor and computer disagree; no correction was made, and the uncertainty grew.",
-        "The stated rate is wrong, the clock is of another kind, or the link stalled.",
-        "Check the link and the sensor's rate; state its clock with --clock-ppm.",
+        "The clocks of sensor and computer disagree; the times were not corrected.",
+        "The stated rate is wrong, the sensor's clock is inaccurate, or the cable or network stalled.",
+        "Check the cable and the sensor's rate; state its clock's accuracy with --clock-ppm.",
     ),
     "late_readings": FindingKind(
         _INFO,
@@ -397,7 +397,7 @@ FINDINGS: Mapping[str, FindingKind] = {
     "clock_times": FindingKind(
         _INFO,
         Symptom.TIMES,
-        "The times are times of day; they are counted from the first one.",
+        "The file gives times of day; the first one is time 0.",
         "The file records a clock.",
     ),
     "rate_assumed": FindingKind(
@@ -434,7 +434,7 @@ FINDINGS: Mapping[str, FindingKind] = {
         Symptom.SCENE,
         "A mass or diameter was stated without an uncertainty and taken as exact.",
         "The scene states the value as a plain number.",
-        "Add an option such as --mass-u-kg, or write { value = ..., u = ... } in the scene.",
+        "Add it with --mass-u-kg, or in the scene as { value = ..., u = ... }.",
     ),
     "scene_implausible": FindingKind(
         _WARNING,
@@ -447,7 +447,7 @@ FINDINGS: Mapping[str, FindingKind] = {
     "truncated_row": FindingKind(
         _WARNING,
         Symptom.RECORDING,
-        "The last row is incomplete; it is kept as a missing sample.",
+        "The last row is incomplete; its sample counts as missing.",
         "The export stopped in the middle of a row.",
         "Export the recording again.",
     ),
@@ -528,26 +528,26 @@ FINDINGS: Mapping[str, FindingKind] = {
         Symptom.RECORDING,
         "The sensor was unplugged for a while and came back.",
         "A loose plug.",
-        "Check the plug.",
+        "Make sure that the plug is firmly in.",
     ),
     "counter_changed": FindingKind(
         _INFO,
         Symptom.RECORDING,
-        "The sensor's counter started again after it came back.",
+        "After the connection broke, the sensor's counter started again.",
         "The device lost power, or another device was plugged in.",
-        "Check the plug.",
+        "Make sure that the plug is firmly in.",
     ),
     "sensor_unconfirmed": FindingKind(
         _WARNING,
         Symptom.RECORDING,
-        "The sensor that came back may be another one of the same kind.",
+        "After the connection broke, another sensor of the same model may have been plugged in.",
         "It sends no name and no serial number.",
-        "Check that the same sensor was plugged in again; name it with springmass firmware.",
+        "Check that it is the same one; the springmass firmware can name a rangefinder.",
     ),
     "sensor_replaced": FindingKind(
         _WARNING,
         Symptom.RECORDING,
-        "A different sensor of the same kind came back; its samples are a separate run.",
+        "A different sensor of the same model was plugged in; its samples are a separate run.",
         "A different device was plugged in.",
         "Check which sensor each part is from; analyse the parts separately.",
     ),

@@ -79,10 +79,10 @@ def sample_findings(
             values={"samples": counts["missing"]},
         )
     if repeated := counts["duplicate_time"]:
-        words = f"{repeated} samples repeat an earlier time; they were left out."
+        words = f"{repeated} samples have the same time as an earlier one; they were left out."
         yield Finding("duplicate_time", "warning", words, values={"samples": repeated})
     if backward := counts["non_monotonic_time"]:
-        words = f"{backward} samples run backward in time; they were left out."
+        words = f"{backward} samples have times that run backward; they were left out."
         yield Finding("non_monotonic_time", "warning", words, values={"samples": backward})
     if track.stated_error_m is not None and track.stated_error_m > GUESSED * noise_m:
         yield Finding(
@@ -173,12 +173,18 @@ def clock_findings(track: Track, instrument: Instrument) -> Iterator[Finding]:
             "An even distribution over 50 ppm on either side, u = 29 ppm, is part of every period's uncertainty.",
         )
     if instrument.clock_refused:
-        yield Finding("clock_refused", "warning", "The clocks of sensor and computer disagree.", instrument.clock_words)
+        yield Finding(
+            "clock_refused",
+            "warning",
+            "The clocks of sensor and computer disagree, so the times were not corrected.",
+            instrument.clock_words,
+        )
     if track.held_samples:
         yield Finding(
             "late_readings",
             "info",
-            f"{track.held_samples} readings came up to {track.longest_stall_s:.3g} s late; their own times are used.",
-            "The link stalled, and the readings came together after a silence. Only the others compare the clocks.",
+            f"{track.held_samples} readings reached the computer late, by at most {track.longest_stall_s:.3g} s; "
+            "the sensor's own times are used.",
+            "The connection stalled, and these readings arrived together. The clocks were compared without them.",
             {"readings": track.held_samples, "longest_stall_s": track.longest_stall_s},
         )

@@ -58,9 +58,10 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...]) -> tuple[Finding, 
             Finding(
                 "uncertainty_missing",
                 "warning",
-                f"{', '.join(exact)}: no uncertainty stated, so {'it was' if len(exact) == 1 else 'they were'} taken "
-                "as exact.",
-                "What is derived from an exact value is less certain than its u says.",
+                f"No uncertainty was stated for {', '.join(exact)}, so {'it was' if len(exact) == 1 else 'they were'} "
+                "taken as exact.",
+                "Results derived from it are less certain than stated, because the uncertainty of the balance or ruler "
+                "is missing.",
             )
         )
     return tuple(found)

@@ -122,7 +122,7 @@ INPUTS: Mapping[str, Input] = {
     "clock_rate": Input("rate of the clock", "r"),
     "bob_mass": Input("mass of the bob", "m", "kg"),
     "spring_mass": Input("mass of the spring", "m_s", "kg"),
-    "unstated_spring_mass": Input("mass of the spring, not stated", "m_s", "kg"),
+    "unstated_spring_mass": Input("mass of the spring, which was not stated", "m_s", "kg"),
     "disc_diameter": Input("diameter of the disc", "D", "m"),
     "air_temperature": Input("air temperature", "t", "degC"),
     "air_pressure": Input("air pressure", "p", "Pa"),
@@ -139,7 +139,7 @@ INPUTS: Mapping[str, Input] = {
     "sensor_lag": Input("lag of the sensor", "tau", "s"),
     # What the recording contradicts in its own model.
     "model_misfit": Input("what differs from a sinusoid in every period"),
-    "choice_of_fit": Input("fit of windows against fit of the whole waveform"),
+    "choice_of_fit": Input("difference between the fits of windows and of the whole waveform"),
     "held_samples": Input("distances held by the sensor"),
     "sensor_smoothing": Input("smoothing by the sensor"),
     "implausible_motion": Input("motion that no bob on a spring makes"),

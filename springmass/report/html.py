@@ -125,7 +125,7 @@ def render_html(
         overlay=over,
         compared=comparison,
         provenance=list(_flattened(provenance)),
-        glossary=TERMS,
+        glossary=[term for term in TERMS if not term.of_program],
         charts=CHARTS,
         data=_data(runs),
         script=Markup(report_script()),

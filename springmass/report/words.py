@@ -81,7 +81,7 @@ def verdict(analysis: Analysis) -> tuple[str, ...]:
     moves = "bob swings" if unit == "m" else f"{noun(unit)} oscillates"
     measured = f"The {moves} with the period T\u00a0=\u00a0{kept(found['period'])}"
     if "spring_constant" in found:
-        measured += f", which makes the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
+        measured += f", which with the mass gives the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
     sentences = (f"{measured}.", damping_sentence(analysis, coefficients=True))
     cause = _largest_cause(analysis)
     return (*sentences, cause) if cause else sentences
@@ -95,7 +95,10 @@ def _largest_cause(analysis: Analysis) -> str:
         return ""
     greatest = row.contributions[0]
     symbol = "k" if row.name == "spring_constant" else "T"
-    return f"The largest part of u({symbol})², {greatest.share:.0%}, comes from the {INPUTS[greatest.name].label}."
+    label = INPUTS[greatest.name].label
+    if round(100.0 * greatest.share) == 100:
+        return f"The uncertainty of {symbol} comes almost entirely from the {label}."
+    return f"The largest part of u({symbol})², {100.0 * greatest.share:.0f}\u00a0%, comes from the {label}."
 
 
 NAMED_LAWS = 2  # of those that cannot be ruled out
@@ -289,7 +292,7 @@ def _frequency(_: Analysis, motion: Oscillation) -> str:
     model = "changes with the amplitude" if motion.phase.backbone is not None else "is constant"
     return (
         "Frequency of stretches of the run against their mean amplitude, with one standard uncertainty u. The line is "
-        f"the model of the phase, in which the frequency {model}."
+        f"the fitted model, in which the frequency {model}."
     )
 
 

@@ -114,7 +114,7 @@ def _counter_traps(decoding: Mapping[str, Any]) -> Iterator[Trap]:
     if joins := decoding["joins"]:
         yield Trap(
             "counter_changed",
-            "The sensor's counter started anew when its port came back; the gap is timed by the host's clock.",
+            "The connection broke and the sensor's counter started again; the computer's clock times the gap.",
             joins,
         )
 

@@ -89,14 +89,14 @@ class Losses:
         if self.unconfirmed:
             yield Trap(
                 "sensor_unconfirmed",
-                "The sensor that came back may be another one of its kind: no name, serial number or counter "
+                "After the connection broke, another sensor of the same model may have been plugged in: nothing "
                 "identifies it.",
                 self.unconfirmed,
             )
         if self.continued_in is not None:
             yield Trap(
                 "sensor_replaced",
-                "Another sensor, or one whose counter jumped, came back on the port; the recording continues in "
+                "Another sensor, or one whose counter jumped, was plugged in; the recording continues in "
                 f"channel {self.continued_in}.",
             )
         if self.continues is not None:
@@ -115,7 +115,7 @@ class Losses:
         if self.longest_no_target_s >= NO_TARGET_S:
             yield Trap(
                 "no_target",
-                f"The sensor heard no target for {self.no_target_s:.3g} s in total, at most "
+                f"The sensor heard no echo for {self.no_target_s:.3g} s in total, at most "
                 f"{self.longest_no_target_s:.3g} s at a time.",
             )
         if self.dropped_reads:

@@ -59,7 +59,7 @@ def _contents(path: str, data: bytes) -> Contents:
         text, first = _without_clock(text, table, clocks[0])
         headings[clocks[0]] = replace(headings[clocks[0]], unit="s")
         times = clocks[:1]
-        traps.append(Trap("clock_times", f"times are clock times and count from the first, {first}"))
+        traps.append(Trap("clock_times", f"the file gives times of day; here time 0 is {first}"))
     if not times and formula is None and (guess := times_by_steps(headings, columns)) is not None:
         times = [guess]
         message = f'"{_name(headings[guess], guess)}" was read as the times, because no other column rises like it'
@@ -123,7 +123,7 @@ def _preamble(table: TableLayout) -> tuple[Trap, ...]:
         return ()
     count = len(table.preamble)
     lines = "1 line of text above the table was" if count == 1 else f"{count} lines of text above the table were"
-    message = f'{lines} not read; the first is "{table.preamble[0][:40]}"'
+    message = f'{lines} skipped; the first is "{table.preamble[0][:40]}"'
     return (Trap("preamble", message, count),)
 
 

@@ -125,7 +125,7 @@ def row_traps(rows: Rows, timed: NDArray[np.bool_], zeros: int) -> Iterator[Trap
     unread = rows.unread
     last = unread.size - 1
     if rows.cut:
-        outcome = "kept as a missing sample" if timed[last] else "left out, because its time is unknown"
+        outcome = "its sample counts as missing" if timed[last] else "it was left out, because its time is unknown"
         yield Trap("truncated_row", f"the last row is incomplete; {outcome}", 1, rows.line(last))
     unread_rows = np.flatnonzero(unread[:-1] if rows.cut else unread)
     if unread_rows.size:
@@ -141,7 +141,7 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
     if not flags.any():
         return
     kinds = (
-        ("duplicate_time", Flag.DUPLICATE_TIME, "samples repeat a time"),
+        ("duplicate_time", Flag.DUPLICATE_TIME, "samples have the same time as an earlier one"),
         (
             "non_monotonic_time",
             Flag.NON_MONOTONIC_TIME,

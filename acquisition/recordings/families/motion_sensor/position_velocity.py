@@ -159,13 +159,13 @@ def _velocity_alone(column: Column) -> Recording:
     flags[regular[path.bridged]] |= Flag.GAP_BEFORE.value
     flags[np.isnan(distance)] |= Flag.MISSING.value
     quantum_m = find_quantum(samples.value, tick) / rate_hz if tick else samples.resolution / rate_hz
-    summed = "position is summed from velocity: its offset is unknown and the first sample is at 0 m"
+    summed = "the position was integrated from the velocity: its offset is unknown, and the first sample is at 0 m"
     traps = [Trap("offset_unknown", summed, samples.t.size)]
     if holes := int(np.count_nonzero(path.bridged)):
         first = float(samples.t[regular[path.bridged]][0])
         message = (
-            f"the velocity has {holes} gap{'s' if holes > 1 else ''}, the first before t = {first:g} s: the offset "
-            "after each is estimated with interpolated velocity"
+            f"the velocity has {holes} gap{'s' if holes > 1 else ''}, the first before t = {first:g} s: the integrated "
+            "position may jump there"
         )
         traps.append(Trap("offset_unknown_after_gap", message, holes))
     return _recording(column, Block(0, samples.t, distance, flags, None, samples.value), quantum_m, traps)
@@ -206,10 +206,12 @@ def _velocity_traps(velocity: Column) -> Iterable[Trap]:
 def _join_traps(p: ChannelSamples, v: ChannelSamples, from_p: I8, from_v: I8) -> Iterable[Trap]:
     alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
     if alone_v:
-        message = f"{alone_v} times are only in the velocity file: no distance there"
+        message = f"{alone_v} times are only in the velocity file, so they have no distance"
         yield Trap("missing_samples", message, alone_v)
     if alone_p:
-        yield Trap("velocity_missing", f"{alone_p} times are only in the position file: no velocity there", alone_p)
+        yield Trap(
+            "velocity_missing", f"{alone_p} times are only in the position file, so they have no velocity", alone_p
+        )
     # The velocity of a sample must be its difference from the previous position.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
     x, rate_hz = p.value, p.timing.rate_hz
@@ -218,5 +220,5 @@ def _join_traps(p: ChannelSamples, v: ChannelSamples, from_p: I8, from_v: I8) ->
     allowed = p.resolution * rate_hz + v.resolution
     wrong = int(np.count_nonzero(apart > 1.01 * allowed))
     if wrong > 0.5 * apart.size:
-        message = f"{wrong} of {apart.size} velocities differ from the positions' differences: is it the same run?"
+        message = f"{wrong} of {apart.size} velocities contradict the positions; the two files may be of different runs"
         yield Trap("pair_mismatch", message, wrong)
