@@ -542,7 +542,7 @@ FINDINGS: Mapping[str, FindingKind] = {
         Symptom.RECORDING,
         "After the connection broke, another sensor of the same model may have been plugged in.",
         "It sends no name and no serial number.",
-        "Check that it is the same one; the springmass firmware can name a rangefinder.",
+        "Check that it is the same one; springmass firmware can name it.",
     ),
     "sensor_replaced": FindingKind(
         _WARNING,
