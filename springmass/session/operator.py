@@ -71,6 +71,7 @@ class Operator:
     _points: list[StillPoint] = field(default_factory=list)
     _known_m: list[float] = field(default_factory=list)
     _base: Calibration | None = None
+    _postponed: Mapping[str, Any] | None = None
 
     def begin(self) -> None:
         """Let the page see the bench before there is a run: by a log that is only looked at."""
@@ -104,9 +105,12 @@ class Operator:
                 self.begin()
                 self._tell("ready")
                 since_ns = self.session.now_ns()
-            if self.page.requests.empty():
+            if self._postponed is not None:
+                request, self._postponed = self._postponed, None
+            elif not self.page.requests.empty():
+                request = self.page.requests.get()
+            else:
                 continue
-            request = self.page.requests.get()
             kind = request.get("type")
             if kind == "record":
                 return None
@@ -123,9 +127,12 @@ class Operator:
 
         def changed() -> bool:
             while not self.page.requests.empty():
-                kind = self.page.requests.get().get("type")
+                request = self.page.requests.get()
+                kind = request.get("type")
                 if kind == "close":
                     raise Closed
+                if kind in ("arm", "record"):
+                    self._postponed = request  # carried out by `prepare`, after the armed recording has ended
                 if kind in ("disarm", "arm", "record"):
                     return True
             return False

@@ -148,6 +148,18 @@ def test_a_trigger_is_disarmed_and_the_run_begun_by_hand(bench: tuple[Any, Page]
 
 
 @pytest.mark.trials
+def test_record_while_armed_begins_the_run(bench: tuple[Any, Page]) -> None:
+    """Record, pressed once, ends the wait for the trigger and begins the recording."""
+    program, page = bench
+    press(page, "t")
+    answer(page, "500", "2")
+    page.wait_for_function(PHASE.format(phase="armed"))
+    press(page, "r")
+    page.wait_for_function(PHASE.format(phase="recording"))
+    program.end()
+
+
+@pytest.mark.trials
 def test_a_ruler_moves_the_zero_of_the_distances(bench: tuple[Any, Page]) -> None:
     """The bob that hangs at 250 mm is said to hang at 260: the run's distances say so too."""
     program, page = bench
