@@ -12,6 +12,17 @@ function take_colours() {
 const powers = (_, splits) => splits.map((v) => (v !== null && Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-9 ? v : null));
 const plain = (_, splits) => splits.map((v) => (v === null ? "" : v > 9e-4 && v < 1e4 ? String(v) : v.toExponential(0).replace("-", "−")));
 
+// The key of a series in the legend looks like the series: a line with its dashes, a dot or a ring.
+function key_of(plot, i) {
+  const series = plot.series[i], ink = series.stroke(plot, i);
+  if (series.key === "dot") return `radial-gradient(circle, ${ink} 0 3px, transparent 3.5px)`;
+  if (series.key === "ring") return `radial-gradient(circle, transparent 0 2px, ${ink} 2.5px 3.5px, transparent 4px)`;
+  let at = 0;
+  const stops = (series.dash || [1]).map((length, k) => `${k % 2 ? "transparent" : ink} ${at}px ${(at += length)}px`);
+  return `repeating-linear-gradient(90deg, ${stops.join(", ")}) center / 100% 2px no-repeat`;
+}
+const LEGEND = { live: false, markers: { width: 0, fill: key_of } };
+
 class Chart {
   constructor(id, series, labels, more, log) {
     this.box = document.getElementById(id);
@@ -47,9 +58,9 @@ class Chart {
     const { ink, line } = COLOURS, log = this.log && { filter: powers };
     const axis = (label, filter) => ({ label, stroke: ink, labelSize: 18, size: 46, font: "12px system-ui", labelFont: "12px system-ui", grid: { stroke: line + "44", width: 1, ...filter }, ticks: { stroke: line, width: 1, ...filter } });
     const options = {
-      legend: { live: false },
+      legend: LEGEND,
       ...this.size(), series: [{ label: this.labels[0] }, ...series], scales: { x: { time: false } },
-      axes: [{ ...axis(this.labels[0]), size: 34 }, { ...axis(this.labels[1], log), size: 56, ...(log && { ...log, values: plain }) }], ...this.more,
+      axes: [{ ...axis(this.labels[0]), size: 34 }, { ...axis(this.labels[1], log), size: 56, space: 20, ...(log && { ...log, values: plain }) }], ...this.more,
     };
     this.plot = new uPlot(options, data && same ? data : [[], ...series.map(() => [])], this.box);
     const legend = this.plot.root.querySelector(".u-legend");
@@ -60,7 +71,7 @@ class Chart {
 }
 
 const colour = (name) => () => COLOURS[name];
-function points(label, size) { return { label, stroke: colour("data"), points: { show: true, size: size || 5, stroke: colour("data"), fill: colour("data") }, paths: () => null }; }
+function points(label, size) { return { label, key: "dot", stroke: colour("data"), points: { show: true, size: size || 5, stroke: colour("data"), fill: colour("data") }, paths: () => null }; }
 function line(label, name, dash, width) { return { label, stroke: colour(name), dash, width: width || 2, points: { show: false } }; }
 
 // Samples that lie far enough apart are dots, so that the fit beneath is seen; denser ones are a line.

@@ -43,7 +43,7 @@ function positionChart(figure, run) {
   let explorer = null;
   const options = (key) => {
     const common = Explorer.options(() => explorer, key);
-    common.legend = { live: false };
+    common.legend = LEGEND;
     common.hooks.setCursor = [(plot) => {
       const i = plot.cursor.idx;
       if (i === null || i === undefined) return;
@@ -54,7 +54,7 @@ function positionChart(figure, run) {
   };
   const label = `${data.quantity}${several(data.unit)}`;
   const dots = { ...points("samples used"), points: { show: true, size: 3 }, stroke: colour("other-4"), fill: colour("other-4") };
-  const crosses = { ...points("left out"), points: { show: true, size: 6, fill: "transparent" }, stroke: colour("fit") };
+  const crosses = { ...points("left out"), key: "ring", points: { show: true, size: 6, fill: "transparent" }, stroke: colour("fit") };
   const law = line("fit", "ink", undefined, 1.2);
   const key = figure.id;
   const y = used.filter((v) => v !== null).concat(fit ? fit.filter((v) => v !== null) : []);
@@ -82,13 +82,13 @@ function amplitudeChart(figure, run) {
     ...others.map((law, i) => ({ ...line(others.length > 1 ? `${others.length} other laws` : `${law.name} (${law.status})`, "rest", [1, 3], 1) })),
     ...named.map((law, i) => line(`${law.name === "linear" ? "exponential, linear drag" : law.name} (${law.status})`, colours[i], i ? DASHES[i - 1] : undefined, i ? 1.6 : 1.8)),
     { ...points("amplitude of one window"), points: { show: true, size: 4 } },
-    { ...points("left out of the fits"), points: { show: true, size: 7, fill: "transparent" }, stroke: colour("other-3"), show: out.size > 0 },
+    { ...points("left out of the fits"), key: "ring", points: { show: true, size: 7, fill: "transparent" }, stroke: colour("other-3"), show: out.size > 0 },
   ];
   const kept = a.y.map((y, i) => (out.has(i) ? null : y)), left = a.y.map((y, i) => (out.has(i) ? y : null));
   let explorer = null;
   const more = () => {
     const common = Explorer.options(() => explorer, figure.id);
-    common.legend = { live: false };
+    common.legend = LEGEND;
     common.hooks.setCursor = [(plot) => {
       const i = plot.cursor.idx;
       if (i !== null && i !== undefined) value.textContent = `t = ${number(a.t[i], 5)} s: amplitude ${number(a.y[i], 5)} ± ${number(a.u[i], 2)} ${unit}${out.has(i) ? "; left out of the fits" : ""}`;
@@ -115,7 +115,7 @@ function frequencyChart(figure, run) {
   const { bar, value, boxes } = placeIn(figure, [300]);
   let explorer = null;
   const more = Explorer.options(() => explorer, figure.id);
-  more.legend = { live: false };
+  more.legend = LEGEND;
   const shift = (hz) => (hz === null ? null : 1e3 * (hz - f.mean));
   more.hooks.draw = [errorBars(2, f.u.map((u) => (u === null ? null : 1e3 * u)))];
   more.hooks.setCursor = [(plot) => {
@@ -137,7 +137,7 @@ function overlayChart(figure, runs) {
   });
   let explorer = null;
   const more = Explorer.options(() => explorer, figure.id);
-  more.legend = { live: false };
+  more.legend = LEGEND;
   more.hooks.setCursor = [(plot) => {
     const i = plot.cursor.idx;
     if (i !== null && i !== undefined) value.textContent = `t = ${number(plot.data[0][i], 5)} s`;
