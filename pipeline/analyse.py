@@ -329,7 +329,7 @@ def _two_modes(samples: Conditioned, two: TwoModes, scene: Scene, params: Params
     finding = Finding(
         "two_modes",
         "error",
-        "Two oscillations of similar strength run together, so there is no single period.",
+        "Two oscillations of similar strength overlap, so there is no single period.",
         f"{two.why}.",
         {name: estimate.value for name, estimate in two.estimates.items()},
     )
