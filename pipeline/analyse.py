@@ -25,7 +25,7 @@ from pipeline.checks.model import check_model
 from pipeline.checks.oscillation import check_coherence, check_sinusoid, typical_miss
 from pipeline.checks.plausibility import check_plausibility
 from pipeline.checks.residuals import residuals_of
-from pipeline.checks.sensor import find_held, find_smoothing, held_count, matters
+from pipeline.checks.sensor import find_held, find_joined, find_smoothing, held_count, matters
 from pipeline.damping.select import Damping, fit_damping
 from pipeline.errors import AnalysisError
 from pipeline.findings.damping import damping_findings
@@ -251,7 +251,10 @@ def _oscillation(
             unexplained = None
         elif not windows.noise_m > max(rounding_m, (samples.quantum_m or 0.0) / COARSE):
             unexplained = None  # rounding, or steps, which the finding quantised reports
-        elif (smoothed := find_smoothing(residuals, params.checks.sensor)) is not None:
+        elif (
+            smoothed := find_joined(samples, residuals, params.checks.sensor)
+            or find_smoothing(residuals, params.checks.sensor)
+        ) is not None:
             if smoothed.certain:
                 unexplained = None
             if matters(smoothed, residuals, damping.best.joint["A0"].u, smoothing, params.checks.sensor):

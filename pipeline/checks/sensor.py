@@ -1,4 +1,4 @@
-"""Sensor: whether it holds its distances over several samples, or smooths them."""
+"""Sensor: whether its distances are held over several samples, joined by straight lines, or smoothed."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from pipeline.checks.residuals import Residuals
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-__all__ = ["Held", "Params", "Smoothing", "find_held", "find_smoothing", "held_count", "matters"]
+__all__ = ["Held", "Params", "Smoothing", "find_held", "find_joined", "find_smoothing", "held_count", "matters"]
+
+EXACT = 1e-12  # of the range of the distances: rounding of computed ones
+BESIDE = 4.0  # frequencies: twice the half-width of a line behind a Hann window
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Params:
-    """Options of :func:`find_smoothing`.
+    """Options of :func:`find_smoothing` and :func:`find_joined`.
 
     Parameters
     ----------
@@ -40,6 +43,10 @@ class Params:
         Share of the variance that white noise from behind the filter may have, which lowers all correlations alike.
     as_stated : float
         Share by which the loss that the residuals show may differ from that of the filter that the scene states.
+    straight : float
+        Share of second differences between the bends that must be rounding errors.
+    chance : float
+        Probability that bends which come at random seem to come at a constant rate.
     """
 
     correlation: float = 0.4
@@ -48,6 +55,8 @@ class Params:
     fall: float = 1.3
     white: float = 0.6
     as_stated: float = 0.5
+    straight: float = 0.9
+    chance: float = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +156,77 @@ def find_held(conditioned: Conditioned, residuals: Residuals) -> Held | None:
     loss = half / math.sin(half) - 1.0 if half < 0.5 * math.pi else 1.0
     misfit = Misfit(name="held_samples", amplitude_m=residuals.amplitude_m * loss, phase_rad=0.5 * (count - 1) * turn)
     return Held(count, count * residuals.interval_s, misfit)
+
+
+def find_joined(conditioned: Conditioned, residuals: Residuals, params: Params | None = None) -> Smoothing | None:
+    """Return the distance of the readings of a slow sensor that were joined by straight lines; None without any.
+
+    Parameters
+    ----------
+    conditioned : Conditioned
+    residuals : Residuals
+    params : Params, optional
+
+    Notes
+    -----
+    On a straight line second differences are rounding errors, at most twice the last digit; the line bends at each
+    reading. Bends at a constant rate are a line in the spectrum of the marks of all bends. The highest of n
+    frequencies of random marks exceeds :math:`\\log_2(n/\\alpha)` times the median power with the probability
+    :math:`\\alpha`. Multiples of the frequency of the motion are not looked at, because larger accelerations bend more.
+    With N samples from reading to reading the motion loses :math:`1 - (\\sin x/x)^2` of its amplitude, where
+    :math:`x = N\\omega h/2`.
+    """
+    params = params or Params()
+    y = conditioned.track.y
+    rounding = 2.0 * max(conditioned.quantum_m or 0.0, EXACT * float(np.ptp(y[conditioned.used])))
+    bends = np.abs(np.diff(np.where(conditioned.used, y, np.nan), 2))
+    seen = np.isfinite(bends)
+    bent = bends[seen] > 1.01 * rounding
+    if not bent.any():
+        return None
+    marks = np.zeros(bends.size)
+    marks[seen] = bent - np.mean(bent)
+    power = np.abs(np.fft.rfft(marks * np.hanning(marks.size))) ** 2
+    turns = np.arange(power.size) * 2.0 * np.pi / (marks.size * residuals.radians_per_sample)
+    beside = np.abs(turns - np.round(turns)) > BESIDE * turns[1]
+    beside[-1] = False
+    if not beside.any():
+        return None
+    high = beside & (power > np.median(power[beside]) * math.log2(power.size / params.chance))
+    if not high.any():
+        return None
+    # Bends at every N-th sample have lines at multiples of the rate as high as at the rate itself; those of a mean over
+    # neighbours fall.
+    line = int(np.argmax(high * power * np.cos(0.5 * np.pi * np.arange(power.size) / power.size) ** 4))
+    count = marks.size / _between_bins(power, line)
+    turned = np.flatnonzero(seen) / count
+    from_bend = np.abs((turned - _phase_of(bent, turned) + 0.5) % 1.0 - 0.5) * count
+    between = from_bend > 1.0  # a reading between two samples bends at both
+    if not (between.any() and np.mean(~bent[between]) > params.straight):
+        return None
+    half = 0.5 * count * residuals.radians_per_sample
+    gain = (math.sin(half) / half) ** 2 if half < 0.5 * math.pi else 0.5
+    misfit = Misfit(name="sensor_smoothing", amplitude_m=residuals.amplitude_m * (1.0 / gain - 1.0), phase_rad=0.0)
+    correlation = float(_joined_memory(np.ones(1, np.int64), np.array([count]))[0, 0])
+    return Smoothing(correlation, 0.0, 0.0, count, 1.0 - gain, 0.0, True, misfit)
+
+
+def _between_bins(power: F8, line: int) -> float:
+    """Return where a line's maximum is, in bins of a spectrum behind a Hann window.
+
+    Notes
+    -----
+    With the ratio a of the amplitudes of the higher neighbour and the highest bin, the line is (2a - 1)/(a + 1) bins
+    towards that neighbour.
+    """
+    side = 1 if power[line + 1] > power[line - 1] else -1
+    ratio = math.sqrt(float(power[line + side] / power[line]))
+    return line + side * (2.0 * ratio - 1.0) / (ratio + 1.0)
+
+
+def _phase_of(marks: NDArray[np.bool_], turned: F8) -> float:
+    """Return at which part of a turn the marks are, on the average; ``turned`` counts turns."""
+    return float(np.angle(np.sum(np.exp(2j * np.pi * turned[marks])))) / (2.0 * math.pi)
 
 
 def matters(

@@ -230,11 +230,11 @@ def smoothing_finding(found: Smoothing, unit: str) -> Finding:
         return Finding(
             "smoothed_sensor",
             "warning",
-            f"Neighbouring {plural(unit)} are correlated ({found.correlation:.2f}): slow readings were interpolated.",
-            f"The correlation is that of readings {found.joined_samples:.0f} samples apart, joined by straight lines. "
-            f"That makes the amplitude too small by {found.loss:.1%}; the uncertainties include it. Record the "
-            "sensor's own readings.",
+            f"Slow readings, about {found.joined_samples:.2g} samples apart, were joined by straight lines.",
+            f"That makes the amplitude too small by {found.loss:.1%}; the uncertainties include it. Neighbouring "
+            f"{plural(unit)} are correlated ({found.correlation:.2f}).",
             {"correlation": found.correlation, "amplitude_loss": found.loss, "late_s": found.late_s},
+            "Record the sensor's own readings, without interpolation.",
         )
     else:
         kind = f"a running mean or median over {found.mean_samples:.0f} samples"

@@ -295,7 +295,7 @@ FINDINGS: Mapping[str, FindingKind] = {
         _WARNING,
         Symptom.DISTANCES,
         "Neighbouring samples are correlated, as after a smoothing filter; the uncertainties were increased.",
-        "The sensor or its program smooths the readings, which makes the amplitude too small and delays the motion.",
+        "The sensor or its program smooths the readings, or joins slow ones by lines, and the amplitude is too small.",
         "Switch the smoothing off, or state it in the scene under [sensor].",
         "position",
     ),

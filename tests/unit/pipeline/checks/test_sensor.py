@@ -101,3 +101,25 @@ def test_a_rest_position_between_two_steps_is_known_to_the_step() -> None:
     y = np.full(T.size, 0.3)
     y[::400] += 0.001
     assert analysed(y).estimates["offset"].u >= 0.001 / math.sqrt(12.0)
+
+
+@pytest.mark.parametrize("step_m", [0.0, 1e-4])
+@pytest.mark.parametrize("reading_hz", [9.0, 20.0])
+def test_joined_readings_are_named_and_covered(step_m: float, reading_hz: float) -> None:
+    """Readings of a slow sensor, joined by straight lines and printed or not, make the amplitude too small."""
+    slow = np.arange(0.0, T[-1] + 1.0, 1.0 / reading_hz)
+    y = np.interp(T, slow, REST + displaced(slow) + noise(8, slow.size, 1e-4))
+    y = np.round(y / step_m) * step_m if step_m else y
+    result = analysed(y)
+    half = 0.5 * OMEGA / reading_hz
+    assert warned(result)["smoothed_sensor"].values["amplitude_loss"] == pytest.approx(
+        1.0 - (math.sin(half) / half) ** 2, rel=0.05
+    )
+    assert abs(result.estimates["amplitude"].value - AMPLITUDE) < 4.0 * result.estimates["amplitude"].u
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_rounded_distances_are_not_taken_for_joined_readings(seed: int) -> None:
+    """Second differences of a slow motion that is rounded as coarsely as its noise are rounding errors, mostly."""
+    y = np.round((REST + displaced() + noise(seed, sigma_m=1e-4)) / 1e-4) * 1e-4
+    assert "smoothed_sensor" not in warned(analysed(y))
