@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -26,17 +26,21 @@ settings.load_profile("springmass")
 # A job in the background is started with Ctrl-C ignored, and hands that on to the programs that the tests interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# The tests of these folders analyse whole recordings, which coverage makes three times as slow. What they run is
-# measured by the tests of single modules.
-NOT_MEASURED = ("extremes", "outputs", "properties", "recordings")
+# The tests of these folders analyse whole recordings, which coverage makes six times as slow. What they run is measured
+# by the tests of single modules.
+NOT_MEASURED = [Path(__file__).with_name(name) for name in ("extremes", "outputs", "properties", "recordings")]
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave the long tests out of the measurement of coverage."""
-    folders = [Path(__file__).with_name(name) for name in NOT_MEASURED]
-    for item in items:
-        if any(item.path.is_relative_to(folder) for folder in folders):
-            item.add_marker(pytest.mark.no_cover)
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None]:
+    """Run the long tests without the measurement of coverage; pytest-cov's ``no_cover`` fails in several processes."""
+    trace = sys.gettrace()
+    if any(item.path.is_relative_to(folder) for folder in NOT_MEASURED):
+        sys.settrace(None)
+    try:
+        return (yield)
+    finally:
+        sys.settrace(trace)
 
 
 @pytest.fixture(autouse=True)
