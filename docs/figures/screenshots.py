@@ -62,7 +62,7 @@ def live(folder: Path) -> Iterator[str]:
 def take_page(page: Page, folder: Path) -> None:
     """Take the page of a recording that runs."""
     with live(folder) as address:
-        page.set_viewport_size({"width": 1280, "height": 1330})
+        page.set_viewport_size({"width": 1280, "height": 900})
         page.goto(address)
         page.wait_for_timeout(RECORDED_MS)
         page.screenshot(path=HERE / "page.png")
@@ -75,7 +75,7 @@ def take_report(page: Page, folder: Path) -> None:
     run, scene = data / "damped_simulated_position.txt", data / "damped.scene.toml"
     command = springmass("-q", "analyse", run, "--scene", scene, "-o", folder)
     subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
-    page.set_viewport_size({"width": 1280, "height": 1330})
+    page.set_viewport_size({"width": 1280, "height": 900})
     page.goto((folder / "damped_simulated_position.results" / "report.html").as_uri())
     page.screenshot(path=HERE / "report.png")
 

@@ -79,7 +79,7 @@ const joined = uPlot.paths.linear();
 const dense = (plot, first, last) => (last - first) * devicePixelRatio > 1.5 * plot.bbox.width;
 function samples_series() {
   return {
-    label: "samples", stroke: colour("data"), width: 1,
+    label: "samples", key: "dot", stroke: colour("data"), width: 1,
     paths: (plot, series, first, last) => (dense(plot, first, last) ? joined(plot, series, first, last) : null),
     points: { show: (plot, series, first, last) => !dense(plot, first, last), size: 3, stroke: colour("data"), fill: colour("data") },
   };
