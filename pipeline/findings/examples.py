@@ -65,7 +65,8 @@ EXAMPLES: Mapping[str, str] = {
     "jittered_time": "The times are measured: their steps vary from 98.87 to 101.2 ms (9.99944 Hz on average).",
     "times_in_bursts": "The times come in bursts of 5 samples every 50 ms; the samples were spread evenly, at 100 Hz.",
     "clock_times": "The file gives times of day; here time 0 is 10:04:59.812.",
-    "rate_assumed": "The rate of 100 Hz was given by the user.",
+    "rate_assumed": "The rate of 30.08 Hz is the most likely one: there are too few rows to be certain.",
+    "rate_given": "You stated the sampling rate: 100 Hz.",
     "time_assumed": '"column 1" was read as the times, because no other column rises like it.',
     "stale_header": "The header states the times 0 s + i * 0.01 s, but the column of times differs and is used.",
     # Scene.
@@ -77,6 +78,7 @@ EXAMPLES: Mapping[str, str] = {
     "malformed_rows": "3 rows could not be read, the first in line 120; 3 kept as missing samples.",
     "zero_filled_tail": "The last 144 distances are exactly 0, which no rangefinder reads; kept as missing samples.",
     "unit_assumed": "The times have no unit: read as seconds.",
+    "unit_given": 'You stated the unit of "x": mm.',
     "decimal_comma": 'The comma in "0,2345" was read as a decimal comma, not as a thousands separator.',
     "empty_channel": 'The channel "column 3" has no numbers.',
     "preamble": '4 lines of text above the table were skipped; the first is "MIN=0".',

@@ -403,10 +403,11 @@ FINDINGS: Mapping[str, FindingKind] = {
     "rate_assumed": FindingKind(
         _WARNING,
         Symptom.TIMES,
-        "The sampling rate was given by you, or estimated from few or irregular times.",
+        "The sampling rate was estimated from few or irregular times.",
         "The file does not state its rate.",
-        "Check the rate: period and spring constant scale with it.",
+        "Check the rate, or state it with --rate-hz: period and spring constant scale with it.",
     ),
+    "rate_given": FindingKind(_INFO, Symptom.TIMES, "You stated the sampling rate.", "The file does not state it."),
     "time_assumed": FindingKind(
         _WARNING,
         Symptom.TIMES,
@@ -469,9 +470,12 @@ FINDINGS: Mapping[str, FindingKind] = {
     "unit_assumed": FindingKind(
         _WARNING,
         Symptom.RECORDING,
-        "The unit was assumed, or given by you.",
-        "The file does not state its unit.",
-        "Check the unit; state it with --unit.",
+        "A unit was assumed.",
+        "The file does not state it.",
+        "Check the unit, or state it with --unit or --time-unit.",
+    ),
+    "unit_given": FindingKind(
+        _INFO, Symptom.RECORDING, "You stated the unit of the values.", "The file does not state it."
     ),
     "decimal_comma": FindingKind(
         _INFO, Symptom.RECORDING, "Commas were read as decimal marks.", "All numbers in a column look like 1,500."

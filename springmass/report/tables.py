@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -289,8 +290,9 @@ def prefixed(estimate: Estimate) -> Estimate:
     >>> prefixed(Estimate(0.05145, 2e-5, "m"))
     51.450(20) mm
     """
+    size = max(abs(estimate.value), estimate.u if math.isfinite(estimate.u) else 0.0)
     for below, factor, unit in _PREFIXES.get(estimate.unit, ()):
-        if 0.0 < abs(estimate.value) < below:
+        if 0.0 < size < below:
             value, u = (float(f"{x * factor:.15g}") for x in (estimate.value, estimate.u))
             return replace(estimate, value=value, u=u, unit=unit, variable=None)
     return estimate

@@ -102,7 +102,7 @@ def test_channels_runs_and_what_is_missing_are_told(cli: Cli, tmp_path: Path) ->
     ]
     done = cli("formats", path, "--run", "1", "--rate-hz", "50")
     assert facts_of(done.out)["rate_hz"] == "50"
-    assert "rate_assumed" in done.out
+    assert "rate_given" in done.out
 
 
 def test_a_wire_log_is_an_input(cli: Cli, data: Path, tmp_path: Path) -> None:

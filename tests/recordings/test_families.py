@@ -47,6 +47,7 @@ STATED = frozenset({"nominal_clock", "stated_error_is_not_noise"})
 SUMMED = frozenset({"nominal_clock", "offset_unknown"})
 GRID = frozenset({"nominal_clock"})
 FORCED = GRID | {"unit_assumed"}
+GIVEN = GRID | {"unit_given"}
 
 TABLE = [
     Row(f"{PANDHI}/position data.txt", "motion-sensor", 724, 100, (0.43, 7.66), (16.500, 16.647), traps=STATED),
@@ -73,9 +74,17 @@ TABLE = [
         (20.688, 21.101),
         traps=STATED,
     ),
-    Row(FILO, "capstone", 11886, 100, (1.0, 119.85), (0.4788, 0.4182), "", "position", traps=FORCED),
+    Row(FILO, "capstone", 11886, 100, (1.0, 119.85), (0.4788, 0.4182), "", "position", traps=FORCED | GIVEN),
     Row(
-        FILO, "capstone", 11886, 100, (1.0, 119.85), (0.29, np.nan), "", "velocity", traps=FORCED | {"missing_samples"}
+        FILO,
+        "capstone",
+        11886,
+        100,
+        (1.0, 119.85),
+        (0.29, np.nan),
+        "",
+        "velocity",
+        traps=FORCED | GIVEN | {"missing_samples"},
     ),
     Row(
         MATTIA,
@@ -88,7 +97,7 @@ TABLE = [
         None,
         "Run #1",
         50.0,
-        traps=GRID | {"rate_assumed"},
+        traps=GRID | {"rate_given"},
     ),
     Row(
         MATTIA,
@@ -101,7 +110,7 @@ TABLE = [
         None,
         "2",
         50.0,
-        traps=GRID | {"rate_assumed"},
+        traps=GRID | {"rate_given"},
     ),
     Row("caspar__PhysicsLab/11mm damping.txt", "datastudio", 1873, 10, (0, 187.2), (0.019, -0.018), "V", traps=FORCED),
     Row("caspar__PhysicsLab/Q1.txt", "datastudio", 618, 10, (0, 61.7), (-0.009, -0.004), "V", traps=FORCED),
@@ -117,8 +126,8 @@ TABLE = [
         clock="device",
         traps=frozenset({"jittered_time", "unit_assumed"}),
     ),
-    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (36.81932105, 9.153431271), "", "x", traps=FORCED),
-    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (-3.838981342, -36.50951911), "", "y", traps=FORCED),
+    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (36.81932105, 9.153431271), "", "x", traps=FORCED | GIVEN),
+    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (-3.838981342, -36.50951911), "", "y", traps=FORCED | GIVEN),
     Row(
         SHM,
         "lvm",
@@ -150,7 +159,7 @@ TABLE = [
         (100000.0, 100.0),
         "",
         "Untitled",
-        traps=FORCED | {"stale_header", "rate_assumed"},
+        traps=GIVEN | {"stale_header", "rate_assumed"},
     ),
     Row(
         "ladisk__lvm_read/short.lvm",
@@ -217,7 +226,7 @@ TABLE = [
         (0, 5.067986572324634),
         "",
         "Amplitude sweep",
-        traps=FORCED | {"stale_header"},
+        traps=GIVEN | {"stale_header"},
     ),
     Row(
         TDMS,
@@ -228,7 +237,7 @@ TABLE = [
         (0, 0.8446644287207723),
         "",
         "Phase sweep",
-        traps=FORCED | {"stale_header"},
+        traps=GIVEN | {"stale_header"},
     ),
 ]
 

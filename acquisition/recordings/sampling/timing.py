@@ -179,7 +179,7 @@ def clock_traps(timing: Timing) -> Iterator[Trap]:
         message = f"times are row numbers over a nominal {timing.rate_hz:g} Hz, not measured times"
         yield Trap("nominal_clock", message)
     if timing.given:
-        yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz was given by the user")
+        yield Trap("rate_given", f"you stated the sampling rate: {timing.rate_hz:g} Hz")
     elif timing.steps_s is not None:
         low, high = (1e3 * step for step in timing.steps_s)
         digits = min(max(4, 1 - math.floor(math.log10((high - low) / high))), 9) if high > low else 4

@@ -121,13 +121,13 @@ def measure(path: str, channel: Channel, unit: str | None) -> tuple[Measure, tup
         problem = f'unit must be {unit_words(channel.unit)} as stated by "{channel.label}", got "{unit}"'
         raise FormatError(path, problem, "leave the unit out")
     if not channel.unit:
-        return given, (Trap("unit_assumed", f'the unit of "{channel.name}", {unit}, was given by the user'),)
+        return given, (Trap("unit_given", f'you stated the unit of "{channel.name}": {unit}'),)
     holds = "times, frequencies and damping rates are not affected"
     if given.quantity == "number":
-        return given, (Trap("unit_assumed", f'"{channel.label}" is read as plain numbers, as the user asked; {holds}'),)
+        return given, (Trap("unit_given", f'"{channel.label}" is read as plain numbers, as you asked; {holds}'),)
     kind = f"is no {'distance' if given.quantity == 'length' else given.quantity.replace('_', ' ')}"
     holds += ", but everything in metres is in that unit" if given.quantity == "length" else ""
-    message = f'"{channel.label}" {kind}: one {channel.unit} counts as one {unit}, as the user asked; {holds}'
+    message = f'"{channel.label}" {kind}: one {channel.unit} counts as one {unit}, as you asked; {holds}'
     return given, (Trap("unit_assumed", message),)
 
 

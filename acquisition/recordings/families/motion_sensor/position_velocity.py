@@ -199,7 +199,7 @@ def _join(position: Column, velocity: Column) -> Recording:
 def _velocity_traps(velocity: Column) -> Iterable[Trap]:
     """Yield the remarks on the velocity file with its name, without those that both files share."""
     for trap in velocity.traps:
-        if trap.code not in ("nominal_clock", "rate_assumed"):
+        if trap.code not in ("nominal_clock", "rate_assumed", "rate_given"):
             yield Trap(trap.code, f"in {velocity.name}: {trap.message}", trap.count, trap.line)
 
 

@@ -162,7 +162,7 @@ def test_the_rate_and_the_channel_of_bare_numbers_are_never_guessed(tmp_path: Pa
     assert caught.value.question.missing == (Missing.RATE_HZ,)
     recording = open_recording(path, unit="cm", rate_hz=50.0)
     assert recording.samples.t.tolist() == [0.0, 0.02, 0.04]
-    assert {"rate_assumed", "unit_assumed"} <= {trap.code for trap in recording.traps}
+    assert {"rate_given", "unit_given"} <= {trap.code for trap in recording.traps}
     path.write_text("0 1 2\n1 4 9\n2 9 1\n3 7 5\n")
     with pytest.raises(NeedsAnswer) as caught:
         open_recording(path, unit="cm", rate_hz=50.0)
