@@ -229,6 +229,8 @@ def format_value(value: float, u: float, unit: str = "") -> str:
     '13.98 N/m'
     >>> format_value(1.5e-7, 2.0e-9, "m")
     '(1.500 +- 0.020)e-07 m'
+    >>> format_value(-0.02, 1.6, "m")
+    '0.0 +- 1.6 m'
     """
     tail = f" {unit}" if unit not in ("", "1") else ""
     if not math.isfinite(value) or not math.isfinite(u):
@@ -241,12 +243,12 @@ def format_value(value: float, u: float, unit: str = "") -> str:
     if not 1e-4 <= scale < 1e6:
         power = math.floor(math.log10(scale))
         digits = max(0, power - exponent + 1)
-        return f"({value / 10.0**power:.{digits}f} +- {u / 10.0**power:.{digits}f})e{power:+03d}{tail}"
+        return f"({value / 10.0**power:z.{digits}f} +- {u / 10.0**power:.{digits}f})e{power:+03d}{tail}"
     digits = max(0, 1 - exponent)
     if exponent > 1:
         step = 10.0 ** (exponent - 1)
-        return f"{round(value / step) * step:.0f} +- {round(u / step) * step:.0f}{tail}"
-    return f"{value:.{digits}f} +- {u:.{digits}f}{tail}"
+        return f"{round(value / step) * step:z.0f} +- {round(u / step) * step:.0f}{tail}"
+    return f"{value:z.{digits}f} +- {u:.{digits}f}{tail}"
 
 
 def in_brackets(text: str) -> str:
