@@ -95,6 +95,10 @@ _CONSEQUENCES = {
 }
 
 
+_COMPLETE = frozenset({"amplitude_dependent_frequency"})
+"""Codes whose message says what it means for the values."""
+
+
 def harm_of(code: str, severity: str) -> Harm:
     """Return what a finding means for the results.
 
@@ -128,7 +132,8 @@ def lab_report_line(finding: Mapping[str, Any]) -> str:
     harm = harm_of(finding["code"], finding["severity"])
     if harm is Harm.NOTE:
         return ""
-    return f"{_sentence(finding['message'])} {_CONSEQUENCES[harm]}".rstrip()
+    consequence = "" if finding["code"] in _COMPLETE else _CONSEQUENCES[harm]
+    return f"{_sentence(finding['message'])} {consequence}".rstrip()
 
 
 @dataclass(frozen=True, slots=True)

@@ -122,7 +122,7 @@ function frequencyChart(figure, run) {
     const i = plot.cursor.idx;
     if (i !== null && i !== undefined) value.textContent = `amplitude ${number(f.a[i], 4)} ${unit}: ${number(f.f[i], 7)} ± ${number(f.u[i], 2)} Hz`;
   }];
-  const chart = new Chart(boxes[0].id, [line("model", "ink", undefined, 1.6), { ...points("a stretch of the run"), points: { show: true, size: 6 } }], [`amplitude${several(unit)}`, `frequency − ${number(f.mean, 5)} Hz / mHz`], { ...more, scales: { x: { time: false } } });
+  const chart = new Chart(boxes[0].id, [line("model", "ink", undefined, 1.6), { ...points("a stretch of the run"), points: { show: true, size: 6 } }], [`amplitude${several(unit)}`, `(frequency − ${number(f.mean, 5)} Hz) / mHz`], { ...more, scales: { x: { time: false } } });
   chart.show([f.a, f.model.map(shift), f.f.map(shift)]);
   explorer = new Explorer(bar, [chart], [f.a[0], f.a[f.a.length - 1]]);
 }

@@ -108,7 +108,7 @@ def frequency_figure(analysis: Analysis) -> Figure | None:
         margin = 0.15 * float(np.ptp(seen)) + 3e3 * float(np.median(points.u_hz))
         panel.set_ylim(float(np.min(seen)) - margin, float(np.max(seen)) + margin)
         panel.set_xlabel(value_label("amplitude", analysis.track.unit))
-        panel.set_ylabel(f"frequency − {mean:.5g} Hz / mHz")
+        panel.set_ylabel(f"(frequency − {mean:.5g} Hz) / mHz")
         legend_above(panel, 2)
         return figure
 
