@@ -154,28 +154,31 @@ def _relative_rate(law: Law, theta: F8) -> float:
     return -float(law.rate(theta[:1], theta)[0] / theta[0])
 
 
-def mean_squared_rate(fit: LawFit, amplitude: F8) -> float:
+def mean_squared_rate(fit: LawFit, amplitude: F8, weights: F8 | None = None) -> float:
     """Return the mean by which drag lowers the square of the angular frequency, 1/s^2.
 
     Parameters
     ----------
     fit : LawFit
     amplitude : (n,) float64, m
-        Of the law; their squares are the weights.
+        Of the law; those that are 0 do not count.
+    weights : (n,) float64, optional
+        The squares of the amplitudes if left out, as in a straight line through the phases of windows.
 
     Notes
     -----
-    With :math:`r(A) = -\\dot A` it is taken as :math:`r r'/A`: :math:`\\gamma^2` for linear drag and nothing for dry
-    friction, whose half-cycles all last as long as without it; both exactly. For quadratic drag the exact motion has
-    1.85 :math:`(r/A)^2` in place of 2.
+    With :math:`r(A) = -\\dot A` less dry friction it is taken as :math:`r r'/A`: :math:`\\gamma^2` for linear drag.
+    Friction lowers nothing, beside linear drag too: it moves the rest position of a half-cycle and not its duration.
+    Both are exact. For quadratic drag the exact motion has 1.85 :math:`(r/A)^2` in place of 2.
     """
-    power = float(amplitude @ amplitude)
-    if not power > 0.0:
+    moving = amplitude != 0.0
+    amplitude, weights = amplitude[moving], (amplitude**2 if weights is None else weights)[moving]
+    if not amplitude.size:
         return 0.0
     theta, step = fit.joint.values, 1e-4 * amplitude
-    rate = -fit.law.rate(amplitude, theta)
+    rate = -fit.law.rate(amplitude, theta) - (fit.drag_term("mu") or 0.0)
     slope = fit.law.rate(amplitude - step, theta) - fit.law.rate(amplitude + step, theta)
-    return float(np.sum(rate * slope)) / (2e-4 * power)
+    return float(np.sum(weights / amplitude**2 * rate * slope)) / (2e-4 * float(np.sum(weights)))
 
 
 def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:

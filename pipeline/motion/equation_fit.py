@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.damping.law_fit import mean_squared_rate
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.select import Damping
 from pipeline.damping.select import Params as DampingParams
@@ -107,11 +108,14 @@ class EquationFit:
 
         Notes
         -----
-        The square of the frequency is that of the undamped :math:`\\omega_0` less what drag takes, see
-        :meth:`pipeline.damping.select.Damping.squared_rate`: what a line through turning points shows, to second order.
+        The square of the frequency is that of the undamped :math:`\\omega_0` less the mean of what drag takes over the
+        whole time, see :func:`pipeline.damping.law_fit.mean_squared_rate`: what a line through the turning points
+        shows, to second order.
         """
         t, (_, y, v, natural) = demodulated.t, self.state.values.tolist()
-        omega = math.sqrt(natural**2 - self.damping.squared_rate(t))
+        best = self.damping.best
+        squared_rate = mean_squared_rate(best, best.amplitude(t - self.damping.t0), np.ones(t.size))
+        omega = math.sqrt(natural**2 - squared_rate)
         slope = np.array([0.0, v * natural, -y * natural, y * v]) / (v**2 + (y * natural) ** 2)
         u_phase = math.sqrt(float(slope @ self.state.covariance @ slope))
         coefficients = self.damping.best.joint.estimates()
@@ -132,6 +136,7 @@ class EquationFit:
             np.array([centre, omega]),
             middle,
             self.damping,
+            squared_rate=squared_rate,
         )
 
     def windows(self, demodulated: Demodulated) -> Demodulated:

@@ -80,6 +80,9 @@ class PhaseFit:
     lag : tuple of (g,) float64, or None
         Times, s, and by how much the sinusoid of a period is late there, rad, see :func:`lag_of`; None where that is
         constant.
+    squared_rate : float or None
+        By how much drag lowers the square of the angular frequency, 1/s^2; None for the mean over the windows,
+        weighted by their squared amplitudes, as :meth:`pipeline.damping.select.Damping.squared_rate` gives it.
     """
 
     t0: float
@@ -94,6 +97,7 @@ class PhaseFit:
     damping: Damping
     exponent: float = 2.0
     lag: tuple[F8, F8] | None = None
+    squared_rate: float | None = None
 
     def total(self, t: F8) -> F8:
         """Return the model's total phase at times t (n,), rad."""

@@ -431,7 +431,8 @@ def _terms(
     rates = rate * amiss.over("damping_rate", laws.values[1])
     start = laws.start * lengths
     lam = laws.rate_at_start * rates
-    natural = omega**2 + laws.squared_rate * rate**2
+    squared_rate = laws.squared_rate if phase.squared_rate is None else phase.squared_rate
+    natural = omega**2 + squared_rate * rate**2
     # How large the displacement is where the recorded value is 1; nobody knows of a voltage or a force.
     displacement = {"m": 1.0, "m/s": natural**-0.5, "m/s^2": 1.0 / natural}.get(unit)
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B")
