@@ -1,4 +1,4 @@
-"""Steps: jumps of the rest position, told from smooth drift, and placed to the sample."""
+"""Steps: jumps of the rest position, separated from smooth drift and located to the sample."""
 
 from __future__ import annotations
 

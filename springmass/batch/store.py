@@ -57,7 +57,7 @@ class _Listing(Struct, forbid_unknown_fields=True, frozen=True):
     parts : list of str
         Names of the parts, in the order of the runs.
     outputs : mapping
-        Digests by the name of the file: of what stands there, and of what is about to take its place.
+        Digests by the name of the file: of the present one, and of the one that is about to replace it.
     """
 
     made_of: NoDigest = ""
@@ -217,7 +217,7 @@ class Store:
     def output(self, name: str) -> Iterator[Path]:
         """Give a temporary file to write, and put it in place of a table or the page when the ``with`` ends well.
 
-        What stands there is kept under another name if this program did not write it.
+        A file that this program did not write is kept under another name.
         """
         with whole_file(self.folder / name) as temporary:
             yield temporary
@@ -234,7 +234,7 @@ class Store:
         try:
             standing = sha256_of(path)
         except OSError:
-            return  # a folder in its place is named by the error of whoever replaces it
+            return  # if a folder is in its place, the write that follows names it in its error
         if standing == digest or standing in self._listing.outputs.get(name, ()):
             return
         ends = (".edited" if number == 1 else f".edited-{number}" for number in count(1))

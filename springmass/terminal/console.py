@@ -1,8 +1,8 @@
 """Lines for people on stderr, and progress rewritten in place, written by a separate thread.
 
-Nobody may read stderr: a pipe is full, its reader has gone, a terminal hangs or was closed, a disk is full. So whoever
-has something to say leaves it in a queue and goes on; this thread alone may wait for a reader. Failed writes are
-counted, and the end waits for the thread a second at most.
+A write to stderr may block or fail: a pipe is full, its reader has gone, a terminal hangs or was closed, a disk is
+full. So other threads put their lines into a queue and go on, and only this thread waits for a reader. Failed writes
+are counted, and the end waits at most a second for the thread.
 """
 
 from __future__ import annotations
