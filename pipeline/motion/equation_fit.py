@@ -34,7 +34,7 @@ from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.quantity import amount
 from pipeline.samples.condition import Conditioned
 from pipeline.samples.stopping import stop_row
-from pipeline.track import U8, Quality
+from pipeline.track import F8, U8, Quality
 from pipeline.windows.demodulate import Demodulated
 
 __all__ = ["EquationFit", "EquationMisfit", "Params", "fit_equation"]
@@ -103,6 +103,11 @@ class EquationFit:
     waveform: Waveform
     flags: U8
 
+    def squared_rate(self, t: F8) -> float:
+        """Return the mean by which drag lowers the square of the angular frequency over times t (n,), s, 1/s^2."""
+        best = self.damping.best
+        return mean_squared_rate(best, best.amplitude(t - self.damping.t0), np.ones(t.size))
+
     def phase(self, demodulated: Demodulated) -> PhaseFit:
         """Return the oscillation's frequency and phase as the stages after it take them.
 
@@ -113,8 +118,7 @@ class EquationFit:
         shows, to second order.
         """
         t, (_, y, v, natural) = demodulated.t, self.state.values.tolist()
-        best = self.damping.best
-        squared_rate = mean_squared_rate(best, best.amplitude(t - self.damping.t0), np.ones(t.size))
+        squared_rate = self.squared_rate(t)
         omega = math.sqrt(natural**2 - squared_rate)
         slope = np.array([0.0, v * natural, -y * natural, y * v]) / (v**2 + (y * natural) ** 2)
         u_phase = math.sqrt(float(slope @ self.state.covariance @ slope))
@@ -226,7 +230,7 @@ def fit_equation(
             f"the bob stops within the record, but the equation of motion with {law.words} "
             "would let it swing up: no damping ended this motion, and the averaged law stands"
         )
-    if not found.damping.squared_rate(demodulated.t) < found.state["angular_frequency"].value ** 2:
+    if not found.squared_rate(demodulated.t) < found.state["angular_frequency"].value ** 2:
         return EquationMisfit(f"{found.why}; so strong a damping leaves no oscillation whose frequency could be given")
     return found
 
