@@ -118,11 +118,15 @@ class OnTerminal:
         """Press keys."""
         os.write(self._master, keys.encode())
 
-    def until(self, words: str, limit_s: float = 60.0) -> None:
-        """Read until words stand on the screen."""
+    def until(self, words: str, lines: int | None = None, limit_s: float = 120.0) -> None:
+        """Read until words stand on the screen, in so many lines.
+
+        One read may end in the middle of a frame. Who asks for something about a whole frame must say how many
+        lines it has.
+        """
         end = time.monotonic() + limit_s
-        while words not in self.screen.text:
-            assert self._read(end - time.monotonic()), f"{words!r} never came:\n{self.screen.text}"
+        while words not in self.screen.text or (lines is not None and len(self.screen.text.splitlines()) != lines):
+            assert self._read(end - time.monotonic()), f"{words!r} in {lines} lines never came:\n{self.screen.text}"
 
     def end(self, limit_s: float = 120.0) -> int:
         """Read until the program ends; return its exit code."""
