@@ -74,7 +74,7 @@ def _stated_law(damping: Damping) -> Finding | None:
     return Finding(
         "stated_law_rejected",
         "warning",
-        f"The recording contradicts the stated damping law {stated.name}: {other.name} fits better.",
+        f"The recording contradicts the law that you stated, {stated.name}: {other.name} fits better.",
         f"{words_of(stated.law)} has a reduced chi-square of {_number(stated.reduced_chi2)}, {words_of(other.law)} has "
         f"{_number(other.reduced_chi2)}; the BIC of the stated law is higher by {_number(excess)}.",
         {"reduced_chi2": stated.reduced_chi2, "bic_excess": excess},
@@ -133,7 +133,8 @@ def _rejections(damping: Damping, rejected: int) -> Finding:
     return Finding(
         "law_rejected",
         "info",
-        f"{count} of {tried} damping laws tried {'does' if count == 1 else 'do'} not fit this recording.",
+        f"{tried - count} of the {tried} damping laws tried {'fits' if tried - count == 1 else 'fit'} this recording; "
+        f"{count} {'does' if count == 1 else 'do'} not.",
         " ".join(reasons),
         {"rejected": count, "tried": tried},
     )

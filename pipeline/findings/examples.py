@@ -11,14 +11,14 @@ EXAMPLES: Mapping[str, str] = {
     "no_oscillation": "No oscillation: the distance stays within 0.3 mm: nothing moves in the beam.",
     "two_modes": "Two oscillations of similar strength overlap, so there is no single period.",
     "overdamped": "The motion is overdamped: it does not oscillate.",
-    "strongly_damped": "Strong damping: the equation of motion itself was fitted.",
+    "strongly_damped": "Strong damping: the equation of motion was solved and fitted, not a decaying sinusoid.",
     "short_record": "Only 4.2 periods were analysed, too few to measure the damping.",
     "touched": "The motion was disturbed at 41.9 s; only the part until 40.78 s was analysed.",
     "restarted": "The bob was released again at 60.2 s; only the part from 62.10 s on was analysed.",
     "phase_jump": "The phase jumps at 30.0 s; only the part from 30.10 s on was analysed.",
     "handled": "The bob does not move freely for 3.4 s; only the part from 117.20 s on was analysed.",
     "at_rest": "The bob hangs still from 0.00 to 2.31 s; that was left out.",
-    "sideways_mode": "A second oscillation of 0.95 mm at 0.8027 Hz, perhaps sideways, shows; the fit includes it.",
+    "sideways_mode": "A second oscillation shows, 0.95 mm at 0.8027 Hz, perhaps sideways; the fit includes it.",
     "amplitude_dependent_frequency": (
         "At 53 mm the frequency is 0.16 % lower than in very small swings; the period is an average."
     ),
@@ -29,15 +29,15 @@ EXAMPLES: Mapping[str, str] = {
     "implausible_motion": "The motion needs 12 times the acceleration of gravity: probably a wrong unit.",
     "implausible_sag": "A period of 305.4 s would stretch the spring by 2.32e+04 m.",
     # Damping.
-    "stated_law_rejected": "The recording contradicts the stated damping law linear: linear+quadratic fits better.",
+    "stated_law_rejected": "The recording contradicts the law that you stated, linear: linear+quadratic fits better.",
     "no_law_fits": "No damping law fits: the best has a reduced chi-square of 5.98, not about 1.",
-    "law_rejected": "7 of 9 damping laws tried do not fit this recording.",
+    "law_rejected": "2 of the 9 damping laws tried fit this recording; 7 do not.",
     "laws_not_separable": "7 damping laws fit this run equally well; a longer run may distinguish them.",
     "mixed_drag": "The damping needs linear and quadratic drag together: one kind alone does not fit.",
     # Distances.
     "clipped": "542 of 2000 samples are cut off at 324.2 mm; they were left out.",
     "false_echoes": "701 of 12000 samples (5.8%) are false echoes; they were left out.",
-    "missing_samples": "144 of 1000 samples have no distance.",
+    "missing_samples": "144 of 1000 samples have no distance; they were left out.",
     "lost_target": "12 distances of 2.4 to 2.6 m are far from all others: the target was lost; kept and flagged.",
     "no_target": "The sensor heard no echo for 2.5 s in total, at most 1.4 s at a time.",
     "quantised": "The distances come in steps of 1 mm, which is more than their noise.",
@@ -83,7 +83,7 @@ EXAMPLES: Mapping[str, str] = {
     "empty_channel": 'The channel "column 3" has no numbers.',
     "preamble": '4 lines of text above the table were skipped; the first is "MIN=0".',
     "unverified": (
-        "run.h5 was changed or damaged after it was written, but was read as you asked: the column 'distance'."
+        "run.h5 was changed or damaged after it was written (the column 'distance'); it was read, as you asked."
     ),
     "unknown_code": "The run file contains a note that this version does not know.",
     "cut_short": "The recording was cut short; everything in its log is here.",

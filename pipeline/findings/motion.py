@@ -76,7 +76,10 @@ def fit_findings(full: FullFit | None, solved: EquationFit | EquationMisfit | No
         )
     if isinstance(solved, EquationFit):
         yield Finding(
-            "strongly_damped", "info", "Strong damping: the equation of motion itself was fitted.", f"{solved.why}."
+            "strongly_damped",
+            "info",
+            "Strong damping: the equation of motion was solved and fitted, not a decaying sinusoid.",
+            f"{solved.why}.",
         )
     elif solved is not None:
         yield Finding(
@@ -181,7 +184,7 @@ def _mode_findings(fitted: Fitted, unit: str) -> Iterator[Finding]:
     yield Finding(
         "sideways_mode",
         "warning" if disturbances.modelled and share > SIDEWAYS else "info",
-        f"A second oscillation of {amount(size_m, unit)} at {f:.4g} Hz, perhaps sideways, shows; {fate}.",
+        f"A second oscillation shows, {amount(size_m, unit)} at {f:.4g} Hz, perhaps sideways; {fate}.",
         " ".join(details),
         {"frequency_hz": f, "amplitude_m": size_m, "beat_s": 1.0 / abs(f - main), "modes": float(len(own))},
     )

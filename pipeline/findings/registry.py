@@ -86,7 +86,7 @@ FINDINGS: Mapping[str, FindingKind] = {
     "strongly_damped": FindingKind(
         _INFO,
         Symptom.MOTION,
-        "The damping is so strong that the equation of motion itself was fitted.",
+        "The damping is strong, so the equation of motion was solved and fitted, not a decaying sinusoid.",
         "A large disc, a liquid, or friction that stops the bob within the recording.",
         "",
         "amplitude",

@@ -75,7 +75,7 @@ def sample_findings(
         yield Finding(
             "missing_samples",
             "info",
-            f"{counts['missing']} of {n} samples have no {noun(unit)}.",
+            f"{counts['missing']} of {n} samples have no {noun(unit)}; they were left out.",
             values={"samples": counts["missing"]},
         )
     if repeated := counts["duplicate_time"]:

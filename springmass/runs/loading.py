@@ -281,7 +281,7 @@ def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[Trap, ...]
         return ()
     named = "; ".join(error.problem for error in differing[:NAMED])
     more = f"; and {len(differing) - NAMED} more" if len(differing) > NAMED else ""
-    message = f"{path.name} was changed or damaged after it was written, but was read as you asked: {named}{more}."
+    message = f"{path.name} was changed or damaged after it was written ({named}{more}); it was read, as you asked."
     return (Trap(UNVERIFIED, message, len(differing)),)
 
 
