@@ -24,7 +24,7 @@ EXAMPLES: Mapping[str, str] = {
     ),
     "rest_drift": "The rest position drifts by 0.52 mm.",
     "not_sinusoidal": "In every period the motion differs from a sinusoid by up to 1.1 mm (2.1 % of the amplitude).",
-    "model_misfit": "Residuals (0.2 mm) exceed the sample noise (0.11 mm), so the uncertainties were increased.",
+    "model_misfit": "Residuals (0.2 mm) exceed the scatter in a period (0.11 mm); the uncertainties were increased.",
     "not_converged": "The fit of the whole waveform did not converge; the values of standard accuracy are given.",
     "implausible_motion": "The motion needs 12 times the acceleration of gravity: probably a wrong unit.",
     "implausible_sag": "A period of 305.4 s would stretch the spring by 2.32e+04 m.",

@@ -266,8 +266,8 @@ def model_finding(check: ModelCheck, unit: str) -> Finding | None:
     details = []
     if Contradiction.RESIDUALS in check.contradictions:
         message = (
-            f"Residuals ({amount(check.rms_m, unit)}) exceed the sample noise ({amount(check.noise_m, unit)}), so the "
-            "uncertainties were increased."
+            f"Residuals ({amount(check.rms_m, unit)}) exceed the scatter in a period "
+            f"({amount(check.noise_m, unit)}); the uncertainties were increased."
         )
     elif Contradiction.HALVES in check.contradictions:
         message = (
