@@ -28,6 +28,9 @@ STARTS = 5
 MOST_UNREAD = 100
 """Lines that wait for a page that reads none; later ones are dropped."""
 
+_AGAIN: Mapping[str, Any] = {"phase": "sent again"}
+"""In place of a state: the last one is sent to a page that has just been started."""
+
 
 class PageProcess:
     """Starts the page; used in a ``with``.
@@ -52,7 +55,7 @@ class PageProcess:
     ----------
     marks : queue of str
         May be changed before the recording begins.
-    asked : queue of dict
+    requests : queue of dict
         Other requests of the page.
     """
 
@@ -118,9 +121,10 @@ class PageProcess:
             except OSError as error:
                 self._failures.note("page", error)
                 return
+            # The gate is the page's first line, so it is written before the page is known to the thread that writes.
+            _write(process, {"gate": self._gate})
             self._process = process
-            self._states.put({"gate": dict(self._gate)})
-            self._states.put(self._last)
+            self._states.put(_AGAIN)
             self._listen(process)
             code = process.wait()
             with self._lock:
@@ -130,21 +134,13 @@ class PageProcess:
 
     def _write_states(self) -> None:
         while (state := self._states.get()) is not None:
-            if "phase" in state:
+            if state is not _AGAIN:
                 self._last = state
-            self._write(json.dumps(state))
+            if self._process is not None:
+                _write(self._process, self._last)
         if self._process is not None and self._process.stdin is not None:
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
-
-    def _write(self, line: str) -> None:
-        """Write to the page that runs now; a later one gets the last state when it starts."""
-        process = self._process
-        if process is None or process.stdin is None:
-            return
-        with contextlib.suppress(OSError, ValueError):
-            process.stdin.write(line.encode() + b"\n")
-            process.stdin.flush()
 
     def _listen(self, process: subprocess.Popen[bytes]) -> None:
         assert process.stdout is not None
@@ -173,3 +169,12 @@ class PageProcess:
         """Write a note into the log as an event; there is a log only during the recording."""
         if text and (tell := self._failures.tell) is not None:
             tell("note", {"text": text})
+
+
+def _write(process: subprocess.Popen[bytes], content: Mapping[str, Any]) -> None:
+    """Write one line to a page; if it has ended, the next one gets the last state when it starts."""
+    if process.stdin is None:
+        return
+    with contextlib.suppress(OSError, ValueError):
+        process.stdin.write(json.dumps(content).encode() + b"\n")
+        process.stdin.flush()

@@ -237,7 +237,8 @@ class _Server:
                     message = self._frame(view, number, sent[number])
                     sent[number] += (len(message) - 16) // 16
                     await socket_.send_bytes(message)
-            if state is not self._state_text and state != self._state_text and view is not None:
+            # A view that was replaced while its samples were sent gets nothing of the next one.
+            if state != self._state_text and view is not None and view is self._page_state.view:
                 state = self._state_text
                 await socket_.send_text(state)
             if motion is not self._motion_text and view is self._page_state.view:
