@@ -54,7 +54,7 @@ def hunt(
     bounds = [f"-runs={runs}", f"-max_total_time={seconds}", "-seed=1", f"-max_len={longest}", *options]
     script = _SCRIPT.format(package=package, imports=imports)
     command = [sys.executable, "-c", script, module, *bounds, f"-artifact_prefix={folder}/", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=10 * seconds)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600 + 10 * seconds)
     assert done.returncode == 0, done.stderr[-3000:]
     tried = re.search(r"Done (\d+) runs", done.stderr)
     assert tried, done.stderr[-3000:]

@@ -119,14 +119,18 @@ class OnTerminal:
         os.write(self._master, keys.encode())
 
     def until(self, words: str, lines: int | None = None, limit_s: float = 120.0) -> None:
-        """Read until words stand on the screen, in so many lines.
+        """Read until words stand on the screen, with so many lines from the line of progress on.
 
         One read may end in the middle of a frame. Who asks for something about a whole frame must say how many
         lines it has.
         """
         end = time.monotonic() + limit_s
-        while words not in self.screen.text or (lines is not None and len(self.screen.text.splitlines()) != lines):
+        while words not in self.screen.text or (lines is not None and self._lines() != lines):
             assert self._read(end - time.monotonic()), f"{words!r} in {lines} lines never came:\n{self.screen.text}"
+
+    def _lines(self) -> int:
+        shown = self.screen.text.splitlines()
+        return len(shown) - next((number for number, line in enumerate(shown) if " | " in line), len(shown))
 
     def end(self, limit_s: float = 120.0) -> int:
         """Read until the program ends; return its exit code."""

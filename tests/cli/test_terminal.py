@@ -101,10 +101,12 @@ def test_a_recording_without_a_trace_has_two_lines(tmp_path: Path) -> None:
 def test_the_address_of_the_page_stays_above_the_progress(tmp_path: Path) -> None:
     """The recorder prints the address, so that the lines that it rewrites do not cover it."""
     (tmp_path / "bench.toml").write_text(SCENE)
-    arguments = ["record", "--simulate", "bench.toml", "--seconds", "4", "--page", "--no-browser", "-o", "run.h5"]
+    arguments = ["record", "--simulate", "bench.toml", "--page", "--no-browser", "-o", "run.h5"]
     with OnTerminal(arguments, tmp_path) as terminal:
-        terminal.until("space marks")
+        terminal.until("page: http://127.0.0.1:")
         terminal.until("trust")
+        terminal.type(" ")
+        terminal.until("mark 1 at")  # in a frame that was drawn after the address
         assert "page: http://127.0.0.1:" in terminal.screen.text
         assert terminal.screen.wrapped == 0
         terminal.type("\x03")

@@ -119,7 +119,7 @@ def dies_at_run001(tasks: Sequence[tuple[str, Job, Path]]) -> list[str]:
     for run, _, folder in tasks:
         if run == "run001":
             os.kill(os.getpid(), signal.SIGKILL)
-        folder.mkdir(parents=True)
+        folder.mkdir(parents=True, exist_ok=True)
     return [""] * len(tasks)
 
 

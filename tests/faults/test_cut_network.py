@@ -70,7 +70,7 @@ def test_a_cut_network_is_a_sensor_gone(bench: Any, tmp_path: Path, far: tuple[s
             assert server.stdout.readline() == b"ready\n"
             url = f"socket://{address}:{port}"
             recording = bench.record(url, out, "--seconds", str(RUN_S), stderr=subprocess.PIPE)
-            recording.until_bytes(16_000)
+            recording.until_bytes(4_000)
             ip("-n", host, "link", "set", card, "down")
             assert recording.ended(RUN_S + ANSWER_S) == 4
             output = recording.process.stderr.read().decode()

@@ -127,6 +127,7 @@ class Result:
     samples: Block
     rows: Readings
     chain: SensorChain
+    begun_ns: int
     events: list[tuple[str, Mapping[str, Any]]] = field(default_factory=list)
     moments: list[int] = field(default_factory=list)
 
@@ -168,6 +169,7 @@ def run(
         reader = PortReader([line], keeper, CLOCK)
         reader.start()
         try:
+            begun_ns = CLOCK.now_ns()
             port.start()
             assert port.done.wait(WAIT_S), "the simulated sensor did not come to its end"
             # A polled sensor that has fallen silent is asked on: no more data is the end of it too.
@@ -177,7 +179,7 @@ def run(
         finally:
             reader.stop()
     recorded = (keeper.events, keeper.moments)
-    return Result(finder.taken, port.sent, port.unsent, keeper.samples, keeper.rows, chain, *recorded)
+    return Result(finder.taken, port.sent, port.unsent, keeper.samples, keeper.rows, chain, begun_ns, *recorded)
 
 
 def waiting(line: Line) -> int:
@@ -319,7 +321,7 @@ def test_a_stall_loses_nothing() -> None:
     np.testing.assert_allclose(result.samples.t, np.arange(300) / 1000.0, atol=1e-9)
     assert not result.samples.flags.any()
     assert result.samples.host_ns is not None
-    assert np.max(np.diff(result.samples.host_ns)) > 100_000_000
+    assert (result.samples.host_ns[105:215] >= result.begun_ns + 215_000_000).all()
 
 
 def test_a_stall_up_to_the_end_loses_nothing() -> None:
@@ -335,12 +337,11 @@ def test_unplugged_and_plugged_in_again_the_run_goes_on() -> None:
     lost, back = (facts for _, facts in result.events)
     assert "disconnected" in lost["why"]
     assert "\n" not in lost["why"]
-    assert 0.1 < back["gap_s"] < WAIT_S
+    assert back["gap_s"] == pytest.approx((result.moments[1] - result.moments[0]) * 1e-9)
     assert result.unsent == 150
     sequence = result.rows.sequence
     after = int(np.flatnonzero(np.diff(sequence) > 1)[0]) + 1
     assert sequence[-1] == 499
-    assert sequence[after - 1] >= 50
     assert np.flatnonzero(result.samples.flags).tolist() == [after]
     assert result.samples.flags[after] == Flag.GAP_BEFORE
     (gap,) = result.chain.timebase.gaps
@@ -354,13 +355,13 @@ def test_unplugged_and_plugged_in_again_the_run_goes_on() -> None:
 def test_unplugged_without_a_device_clock_the_gap_is_flagged_too(name: str) -> None:
     """A sensor that sends no time has its gap flagged by the loss of the port, polled or not."""
     # A request that the plug took with it is asked again after the timeout.
-    result = run(name, seconds=1.0, faults=Faults(unplug=(0.1, 0.15)), position=lambda _: 0.6, timeout_s=0.1)
+    result = run(name, seconds=1.5, faults=Faults(unplug=(0.1, 0.5)), position=lambda _: 0.6, timeout_s=0.1)
     assert result.kinds().count("lost") == result.kinds().count("reopened") == 1
     flagged = np.flatnonzero(result.samples.flags & Flag.GAP_BEFORE)
-    assert flagged.size >= 1
-    t = result.samples.t
-    assert np.max(np.diff(t)[flagged - 1]) > 0.1
-    assert t[-1] > 0.25
+    lost_ns, back_ns = (result.moments[result.kinds().index(kind)] for kind in ("lost", "reopened"))
+    assert result.samples.host_ns is not None
+    before_ns, after_ns = result.samples.host_ns[flagged - 1], result.samples.host_ns[flagged]
+    assert ((before_ns <= lost_ns) & (after_ns >= back_ns)).any()
     np.testing.assert_allclose(result.samples.distance, 0.6, atol=1e-9)
 
 
@@ -370,7 +371,7 @@ def test_at_the_wrong_baud_rate_there_is_no_sample(name: str) -> None:
     result = run(name, seconds=0.2, faults=Faults(wrong_baud=True))
     assert len(result.samples) == 0
     held = result.chain.decoder.pending
-    assert sum(result.chain.decoder.faults.values()) + held > 50
+    assert sum(result.chain.decoder.faults.values()) + held > min(50, result.sent - 1) >= 0
 
 
 def test_a_flood_costs_the_frame_it_hits() -> None:

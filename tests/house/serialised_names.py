@@ -223,7 +223,7 @@ def _messages(folder: Path) -> Iterator[str]:
                 socket.send(json.dumps({"type": "region", "from": 1.0, "to": 20.0}))
                 missing = {"hello", "state", "motion", "region"}
                 while missing:
-                    text = socket.recv(timeout=30.0)
+                    text = socket.recv(timeout=180.0)
                     if isinstance(text, bytes):
                         continue  # samples
                     content = json.loads(text)

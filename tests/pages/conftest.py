@@ -21,7 +21,7 @@ from springmass.cli import main
 from springmass.runs.loading import sample_data
 from tests.browser import chromium, headless
 
-LIMIT_S = 60.0
+LIMIT_S = 180.0
 SCENE = """
 [bob]
 mass_kg = { value = 0.2, u = 0.0001 }
@@ -76,10 +76,13 @@ class Program:
     address: str
     messages: list[str]
     out: Path
+    reader: threading.Thread
 
     def ended(self) -> int:
-        """Wait for its end; return the exit code."""
-        return self.process.wait(LIMIT_S)
+        """Wait for its end and its last message; return the exit code."""
+        code = self.process.wait(LIMIT_S)
+        self.reader.join(LIMIT_S)
+        return code
 
     def end(self) -> None:
         """End it as Ctrl-C does."""
@@ -129,7 +132,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
             assert address_known.wait(LIMIT_S)
             found = re.search(r"page: (http\S+)", "".join(messages))
             assert found, "".join(messages)
-            return Program(process, found[1], messages, tmp_path / "run.h5")
+            return Program(process, found[1], messages, tmp_path / "run.h5", reader)
 
         yield started
 
@@ -183,6 +186,7 @@ OUTSIDE = """() => {
 def page(browser: Browser) -> Iterator[Page]:
     """A page without network, its errors kept as failures."""
     context = browser.new_context(offline=True)
+    context.set_default_timeout(LIMIT_S * 1e3)
     opened = context.new_page()
     errors: list[str] = []
     opened.on("pageerror", lambda error: errors.append(str(error)))

@@ -20,6 +20,17 @@ from storage.run_file.reading import open_run
 
 SEEN = "() => samples.length && samples[0].count > {count}"
 PHASE = "() => bench().phase === '{phase}'"
+# What stands there for a moment only is kept by the page, since a busy computer may look too late.
+STAGES = """() => {
+  const stage = document.getElementById('stage');
+  window.stages = [];
+  new MutationObserver(() => stages.push(stage.textContent)).observe(stage, { childList: true, characterData: true });
+}"""
+LOST_ONCE = """() => {
+  const trouble = document.getElementById('trouble');
+  window.lost_once = false;
+  new MutationObserver(() => { if (!trouble.hidden) window.lost_once = true; }).observe(trouble, { attributes: true });
+}"""
 
 
 def answer(page: Page, *texts: str) -> None:
@@ -113,11 +124,11 @@ def test_the_trigger_keeps_what_came_before(bench: tuple[Any, Page]) -> None:
     program, page = bench
     press(page, "z")
     page.wait_for_function("() => bench().phase === 'ready' && bench().rest_m")
+    page.evaluate(STAGES)
     press(page, "t")
     answer(page, "10", "1.5")
-    page.wait_for_function(PHASE.format(phase="armed"))
-    assert page.inner_text("#stage") == "ARMED: 10 mm, 1.5 s kept"
     page.wait_for_function(PHASE.format(phase="recording"))
+    assert "ARMED: 10 mm, 1.5 s kept" in page.evaluate("stages")
     page.wait_for_function(SEEN.format(count=300))
     program.end()
     with open_run(program.out) as run:
@@ -125,9 +136,11 @@ def test_the_trigger_keeps_what_came_before(bench: tuple[Any, Page]) -> None:
         (event,) = [event for event in run.provenance["events"] if event["kind"] == "trigger"]
     assert event["facts"] == {"threshold_m": 0.01, "keep_s": 1.5}
     moved = np.abs(samples.distance - np.median(samples.distance[:50])) > 0.01
-    # By the stamps of the samples, which decide what is kept: a busy computer reads samples late and stamps them late.
+    # By the stamps of the samples, which decide what is kept: a busy computer reads samples late, several at a time,
+    # and gives them one stamp.
     stamps_s = (samples.host_ns - event["mono_ns"]) * 1e-9
-    assert abs(int(moved.argmax()) - int(np.searchsorted(stamps_s, 0.0))) <= 2
+    first = int(moved.argmax())
+    assert np.abs(stamps_s[first - 1 : first + 2]).min() < 1e-6
     steps_s = np.diff(stamps_s[: moved.argmax()])
     assert -1.5 <= stamps_s[0] <= -1.5 + 0.03 + steps_s.max()
 
@@ -227,8 +240,7 @@ def test_a_killed_server_comes_back(bench: tuple[Any, Page]) -> None:
     page.wait_for_function(SEEN.format(count=100))
     session, killed = page.evaluate("run.session"), page_process(program)
     os.kill(killed, 9)
-    page.wait_for_function("() => !document.getElementById('trouble').hidden")
-    assert "server is lost" in page.inner_text("#trouble")
+    page.wait_for_function("() => document.getElementById('trouble').textContent.includes('server is lost')")
     page.wait_for_function(f"() => run.session !== '{session}' && samples[0].count > 200")
     assert page.is_hidden("#trouble")
     assert page.evaluate("bench().phase") == "recording"
@@ -271,9 +283,9 @@ def test_two_viewers_and_one_controller(viewers: tuple[Any, Page, str], browser:
         assert looking.is_hidden("#mark")
         assert looking.is_hidden("#stop")
         assert looking.evaluate("run.controls") is False
+        looking.evaluate(LOST_ONCE)
         looking.evaluate("ask_server({ type: 'stop' })")  # refused: the connection is closed, and made anew
-        looking.wait_for_function("() => !document.getElementById('trouble').hidden")
-        looking.wait_for_function("() => document.getElementById('trouble').hidden")
+        looking.wait_for_function("() => lost_once && document.getElementById('trouble').hidden")
     press(page, "m")
     answer(page, "seen by all")
     page.wait_for_function("() => state.marks.length === 1")

@@ -67,5 +67,5 @@ def test_runs_sort_and_are_filtered(browser: Browser, course: Path) -> None:
     assert page.get_by_role("status").text_content() == "1 of 5 runs"
     page.get_by_label("Show runs that contain").fill("")
     page.locator("tbody a").click()
-    assert page.url.endswith("report.html")
+    page.wait_for_url("**/report.html")
     page.close()

@@ -6,9 +6,11 @@ import contextlib
 import http.client
 import json
 import resource
+import signal
 import socket
 import struct
 import threading
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 from urllib.parse import urlsplit
@@ -25,8 +27,8 @@ from springmass.page.web import bounds
 from springmass.page.web.server import Opening, serve
 from springmass.runs.loading import load
 from storage.run_file.reading import open_run
+from tests.pages.conftest import LIMIT_S
 
-LIMIT_S = 60.0
 TRIES = 100
 MESSAGES = {
     "binary": b"\x00\x01",
@@ -68,7 +70,9 @@ class Client:
         """Open the page's socket."""
         headers = {"Cookie": self.cookie}
         origin: Any = f"http://{self.netloc}"
-        return connect(f"ws://{self.netloc}/v1/run", origin=origin, additional_headers=headers, ping_interval=None)
+        return connect(
+            f"ws://{self.netloc}/v1/run", origin=origin, additional_headers=headers, ping_interval=None, max_queue=None
+        )
 
     def code_after(self, message: str | bytes) -> int | None:
         """Send a message; return the code with which the page closes the socket."""
@@ -126,9 +130,8 @@ def test_a_message_that_is_none_closes_the_socket(page: tuple[Any, Client], mess
         while not (isinstance(answer := looking.recv(timeout=LIMIT_S), str) and json.loads(answer)["type"] == "region"):
             pass
     lines = lines_after(program)
-    assert len(lines) == 1
-    assert len(lines[0]) < 300
-    assert "1003" in lines[0]
+    assert 1 <= len(lines) <= 2  # once a minute
+    assert all(len(line) < 300 and "1003" in line for line in lines)
 
 
 def test_what_the_gate_does_not_understand_is_refused(page: tuple[Any, Client]) -> None:
@@ -177,9 +180,8 @@ def _is_closed(connection: socket.socket) -> bool:
 
 
 @pytest.fixture
-def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[PageState], Client]]:
-    """Return a function that serves a page from a thread, with a limit of 0.3 s for a request, and makes a client."""
-    monkeypatch.setattr(bounds, "REQUEST_WITHIN_S", 0.3)
+def served() -> Iterator[Callable[[PageState], Client]]:
+    """Return a function that serves a page from a thread, and makes a client."""
     over = threading.Event()
     threads = []
 
@@ -222,22 +224,32 @@ def old_run(page_state: PageState) -> PageState:
     ],
     ids=["nothing", "half a line", "half a head", "half a body", "half a handshake"],
 )
-def test_a_half_sent_request_is_closed(served: Callable[[PageState], Client], parts: list[bytes]) -> None:
+def test_a_half_sent_request_is_closed(
+    served: Callable[[PageState], Client], monkeypatch: pytest.MonkeyPatch, parts: list[bytes]
+) -> None:
     """A request that never ends holds its connection no longer than the limit; a socket that only looks stays."""
     page_state = old_run(PageState(None))
     client = served(page_state)
-    with client.socket() as looking, socket.create_connection(client.place, LIMIT_S) as half:
-        for part in parts:
-            half.sendall(part)
-        while half.recv(1000):
-            pass  # the answer to the head of a request, if there is one; then the end
+    with client.socket() as looking:
+        # From here on, because a busy computer may need longer for the requests that are whole.
+        monkeypatch.setattr(bounds, "REQUEST_WITHIN_S", 0.3)
+        with (
+            socket.create_connection(client.place, LIMIT_S) as half,
+            contextlib.suppress(ConnectionError),  # closed before the last part was sent
+        ):
+            for part in parts:
+                half.sendall(part)
+            while half.recv(1000):
+                pass  # the answer to the head of a request, if there is one; then the end
         looking.send('{"type": "region", "from": 1, "to": 20}')
         while not (isinstance(answer := looking.recv(timeout=LIMIT_S), str) and json.loads(answer)["type"] == "region"):
             pass
     page_state.close()
 
 
-def test_a_second_half_request_is_closed_too(served: Callable[[PageState], Client]) -> None:
+def test_a_second_half_request_is_closed_too(
+    served: Callable[[PageState], Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """After a whole request on the same connection, the time for the next one runs from its first byte."""
     page_state = old_run(PageState(None))
     client = served(page_state)
@@ -245,6 +257,7 @@ def test_a_second_half_request_is_closed_too(served: Callable[[PageState], Clien
     connection.request("GET", "/static/page.css", headers={"Cookie": client.cookie})
     answered = connection.getresponse()
     assert (answered.status, len(answered.read()) > 0) == (200, True)
+    monkeypatch.setattr(bounds, "REQUEST_WITHIN_S", 0.3)
     connection.sock.sendall(b"GET / HTTP/1.1\r\nHost:")
     assert connection.sock.recv(1000) == b""
     connection.close()
@@ -285,24 +298,27 @@ def _answers(client: Client) -> bool:
 @pytest.mark.trials
 def test_no_client_disturbs_a_recording(record: Callable[..., Any]) -> None:
     """All of it during a recording that is open to viewers: every reading is there, and the terminal stays readable."""
-    program = record("--seconds", "8", "--lan")
+    program = record("--lan")
     controller = Client(program.address)
     with controller.socket() as run:
         viewer = Client(json.loads(run.recv())["share"])
     with contextlib.ExitStack() as stack:
         held = [stack.enter_context(socket.create_connection(controller.place, LIMIT_S)) for _ in range(400)]
         assert all(_is_closed(connection) for connection in held[bounds.MOST_CONNECTIONS :])
+    until = time.monotonic() + LIMIT_S
     while not _answers(controller):  # the page learns in its next turn that they are gone
-        pass
+        assert time.monotonic() < until, "the page does not answer any more"
     for message in MESSAGES.values():
         for client in (controller, viewer):
             assert client.code_after(message) == 1003
     assert {viewer.code_after('{"type": "stop"}') for _ in range(TRIES)} == {1003}
-    assert program.ended() == 0
+    program.process.send_signal(signal.SIGINT)
+    assert program.ended() == 130
     with open_run(program.out) as run:
         samples = run.samples()
         (ended,) = [event["facts"] for event in run.provenance["events"] if event["kind"] == "ended"]
-    assert len(samples) > 750
+    assert len(samples) > 100
+    assert np.diff(samples.t).max() < 0.015
     assert np.isfinite(samples.distance).all()
     assert "Traceback" not in "".join(program.messages)
     assert len([line for line in program.messages if line.startswith("springmass: page:")]) < 20

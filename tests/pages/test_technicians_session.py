@@ -19,11 +19,21 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from springmass.runs.analysing import load_and_analyse
-from tests.pages.test_at_the_bench import PHASE, SEEN, answer, press
+from tests.pages.conftest import LIMIT_S
+from tests.pages.test_at_the_bench import PHASE, SEEN, STAGES, answer, press
 
 WIDTHS = {1366: 768, 768: 1024, 390: 844}
 FITTED = "() => motion && motion.estimates && motion.estimates.period && motion.estimates.period.u"
 WHOLE = "() => motion && motion.accuracy === 'standard' && motion.estimates"
+# While the recorder takes the rest position, the key does nothing and a request is refused visibly. In one turn of
+# the page, because that lasts three seconds only.
+NOT_WHILE_BUSY = """() => {
+  if (bench().phase !== 'still') return false;
+  document.dispatchEvent(new KeyboardEvent('keydown', { key: 't', bubbles: true }));
+  request('arm', { type: 'arm', threshold_m: 0.01, keep_s: 1 });
+  return !document.querySelector('#ask[open]') && document.getElementById('told').textContent.includes('Not done');
+}"""
+SHOWN = "[...document.querySelectorAll('#estimates > div')].map((e) => e.getClientRects().length > 0)"
 NUMBERS = "Object.fromEntries(Object.entries(motion.estimates).map(([name, e]) => [name, [e.value, e.u]]))"
 
 
@@ -90,17 +100,14 @@ def test_a_session_from_the_first_minute_to_the_report(
     look_at(page, "1-ready")
     calibrate(page)
     press(page, "z")
-    page.wait_for_function(PHASE.format(phase="still"))
-    page.keyboard.press("t")  # the recorder is busy: nothing happens
-    page.evaluate("request('arm', { type: 'arm', threshold_m: 0.01, keep_s: 1 })")
-    assert "Not done" in page.inner_text("#told")
+    page.wait_for_function(NOT_WHILE_BUSY)
     page.wait_for_function(PHASE.format(phase="ready"))
 
+    page.evaluate(STAGES)
     press(page, "t")
     answer(page, "1 cm", "1.5")
-    page.wait_for_function(PHASE.format(phase="armed"))
-    assert page.inner_text("#stage") == "ARMED: 10 mm, 1.5 s kept"
     page.wait_for_function(PHASE.format(phase="recording"))
+    assert "ARMED: 10 mm, 1.5 s kept" in page.evaluate("stages")
     page.wait_for_function(FITTED)
     assert page.evaluate("motion.accuracy") == "fast"
     assert "Fast accuracy" in page.inner_text("#tier")
@@ -178,6 +185,7 @@ def watch_on_two_phones(browser: Browser, address: str) -> None:
     """On 390 pixels: the chart, three numbers, the rest folded; no action that changes anything."""
     for number in range(2):
         context = browser.new_context(viewport={"width": 390, "height": 844})
+        context.set_default_timeout(LIMIT_S * 1e3)
         page = context.new_page()
         page.goto(address)
         page.wait_for_function(FITTED)
@@ -186,14 +194,14 @@ def watch_on_two_phones(browser: Browser, address: str) -> None:
         assert tops[0] is not None
         assert tops[1] is not None
         assert tops[0]["y"] < 150 < tops[1]["y"] < 844
-        numbers = page.locator("#estimates > div")
-        assert [each.is_visible() for each in numbers.all()] == [i < 3 for i in range(numbers.count())]
+        shown = page.evaluate(SHOWN)
+        assert shown == [i < 3 for i in range(len(shown))]
         for folded in ("#amplitude", "#phase", "#spectrum", "#marks", "#freeze"):
             assert page.is_hidden(folded)
         assert page.is_hidden("#stop")
         page.locator("#unfold").click()
         page.locator("#more").click()
-        assert all(each.is_visible() for each in numbers.all())
+        assert all(page.evaluate(SHOWN))
         for opened in ("#amplitude", "#phase", "#spectrum", "#freeze"):
             assert page.is_visible(opened)
         if number == 0:
@@ -204,14 +212,16 @@ def watch_on_two_phones(browser: Browser, address: str) -> None:
 BUSY = "while True: pass"
 AGES = """(seconds) => new Promise((done) => {
   let worst = 0, seen = 0;
-  const unmarked = [], start = performance.now();
+  const unmarked = [], turns = {}, start = performance.now();
   const timer = setInterval(() => {
     for (const group of document.querySelectorAll("#estimates > div")) {
       const age = now_s() - Number(group.dataset.t);
       seen += 1;
       worst = Math.max(worst, age);
-      if (age > 2.5 && !(group.classList.contains("stale") && /old/.test(group.querySelector(".age").textContent)))
-        unmarked.push([group.dataset.name, age]);
+      const marked = group.classList.contains("stale") && /old/.test(group.querySelector(".age").textContent);
+      // A page that was kept from running marks at its next turn, which may come after this one.
+      turns[group.dataset.name] = age > 2.5 && !marked ? (turns[group.dataset.name] || 0) + 1 : 0;
+      if (turns[group.dataset.name] > 4) unmarked.push([group.dataset.name, age]);
     }
     if (performance.now() - start > 1e3 * seconds) { clearInterval(timer); done({ worst, seen, unmarked }); }
   }, 100);

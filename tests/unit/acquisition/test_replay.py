@@ -134,7 +134,7 @@ def test_a_paused_iterator_waits_for_another_thread() -> None:
     player.start()
     assert not got
     replay.resume()
-    player.join(10)
+    player.join(60)
     assert not player.is_alive()
     assert len(concatenate(got)) == 100
 
@@ -147,7 +147,7 @@ def test_close_ends_a_paused_iterator() -> None:
     player.start()
     replay.close()
     replay.close()
-    player.join(10)
+    player.join(60)
     assert not player.is_alive()
 
 
@@ -159,7 +159,7 @@ def test_a_pause_interrupts_a_long_wait() -> None:
     player.start()
     replay.pause()
     replay.step(100)
-    player.join(10)
+    player.join(60)
     assert not player.is_alive()
     assert len(concatenate(got)) == 100
 
@@ -181,7 +181,7 @@ def test_controls_from_many_threads_lose_no_sample() -> None:
     joined = concatenate(replay)
     done.set()
     for hand in hands:
-        hand.join(10)
+        hand.join(60)
     np.testing.assert_array_equal(joined.distance, whole.distance)
     np.testing.assert_array_equal(joined.flags, whole.flags)
 

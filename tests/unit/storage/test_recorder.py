@@ -14,6 +14,7 @@ import pytest
 
 from acquisition.clock import VirtualClock
 from acquisition.live.line import Sink
+from storage import recorder as recorders
 from storage.disk import DiskNearlyFull, check_disk
 from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
@@ -23,7 +24,7 @@ from storage.wire_log.scanning import parse_log, read_log
 
 HEADER = LogHeader(sensors=(SensorEntry(0, "line"), SensorEntry(1, "line")), mono_ns=0, unix_ns=0)
 HOUR_S = 3600.0
-WAIT_S = 30.0
+WAIT_S = 120.0
 
 
 class Disk:
@@ -113,10 +114,10 @@ def test_everything_put_is_in_the_log_in_order(tmp_path: Path) -> None:
 def test_a_recording_is_never_written_over(tmp_path: Path) -> None:
     """The second recording of a name is refused before a thread starts."""
     Recorder(tmp_path / "run.wire", HEADER, VirtualClock()).close()
-    threads = threading.active_count()
+    before = set(threading.enumerate())
     with pytest.raises(RunExists):
         Recorder(tmp_path / "run.wire", HEADER, VirtualClock())
-    assert threading.active_count() == threads
+    assert set(threading.enumerate()) <= before
 
 
 def test_putting_never_waits_for_the_disk() -> None:
@@ -252,7 +253,7 @@ def test_events_and_marks_outlast_an_overflow() -> None:
     assert recorded + overflow.json()["facts"]["records"] == 19 == recorded + recording.status.dropped_records
 
 
-def test_what_is_given_up_while_a_write_hangs_is_counted(tmp_path: Path) -> None:
+def test_what_is_given_up_while_a_write_hangs_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every read is in the log, in the counts or in the write that hung; a write that returns later adds nothing."""
     path = tmp_path / "run.wire"
 
@@ -294,6 +295,8 @@ def test_what_is_given_up_while_a_write_hangs_is_counted(tmp_path: Path) -> None
     for number in range(200):
         recording.put(number % 2, 2 + number, b"%03d" % number)
     recording.mark("late", host_ns=300)
+    # A busy disk may need longer than the program waits.
+    monkeypatch.setattr(recorders, "GIVE_UP_S", WAIT_S / 2)
     assert recording.give_up()
     contents = read_log(path)
     records = list(contents)

@@ -35,8 +35,8 @@ def squares_without(deadly: Sequence[int], tasks: Sequence[int]) -> list[int]:
 
 
 def endless_but_first(tasks: Sequence[int]) -> list[int]:
-    """Return the square of the first task; others take a minute."""
-    until = time.process_time() + 60.0
+    """Return the square of the first task; others take ten minutes."""
+    until = time.process_time() + 600.0
     while 0 not in tasks and time.process_time() < until:
         pass
     return squares(tasks)
@@ -83,7 +83,7 @@ def test_processes_end_when_nobody_takes_their_results():
     assert set(active_children()) - others
     made.close()
     assert not set(active_children()) - others
-    assert time.monotonic() - began < 50.0
+    assert time.monotonic() - began < 300.0
 
 
 @pytest.mark.trials

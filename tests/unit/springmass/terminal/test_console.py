@@ -15,6 +15,12 @@ from springmass.terminal import console as consoles
 from springmass.terminal.console import Console
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait longer at the end than the program does: a busy computer may still be importing."""
+    monkeypatch.setattr(consoles, "PATIENCE_S", 60.0)
+
+
 @pytest.fixture
 def pipe() -> Iterator[tuple[int, TextIO]]:
     """Return a pipe: the end that is read, and the other as a text stream."""
@@ -58,8 +64,10 @@ def test_lines_that_nobody_reads_make_nobody_wait(pipe: tuple[int, TextIO], monk
     console.wait(0.01)
     console.close()
     assert [type(error) for error in failed] == [TimeoutError] * 2
+    os.set_blocking(read, False)
     while console._thread.is_alive():  # read the pipe empty, so that the thread ends
-        os.read(read, 1 << 16)
+        with contextlib.suppress(BlockingIOError):
+            os.read(read, 1 << 16)
         console._thread.join(0.01)
 
 
@@ -71,7 +79,7 @@ def test_of_what_is_drawn_while_a_line_hangs_the_latest_is_shown(pipe: tuple[int
     go_on = threading.Event()
 
     def hang() -> None:
-        go_on.wait(10.0)
+        go_on.wait(60.0)
 
     console._steps.put(hang)
     for number in range(50):

@@ -16,7 +16,7 @@ from springmass.session.display.progress import LiveState, Progress
 from springmass.session.display.thread import Display
 from springmass.session.failures import KINDS, Failures
 
-WAIT_S = 10.0
+WAIT_S = 60.0
 
 
 def samples() -> Sequence[tuple[int, Block]]:
@@ -30,8 +30,11 @@ def look(shown: LiveState) -> Progress:
 
 
 @pytest.mark.parametrize("error", [IndexError("no such index"), MemoryError(), SystemExit(3), RecursionError()])
-def test_what_a_turn_raises_is_counted_and_the_next_turn_comes(error: BaseException) -> None:
+def test_what_a_turn_raises_is_counted_and_the_next_turn_comes(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
     """The first failure is told; the display shows again as soon as it can."""
+    monkeypatch.setattr(displayed, "LAST_S", WAIT_S)
     failures, events, shown = Failures(), [], threading.Event()
     failures.tell = lambda kind, facts: events.append((kind, facts["error"]))
 
