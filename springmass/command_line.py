@@ -313,7 +313,7 @@ def simulate(*, options: SimulateOptions, read: ChannelOptions = ChannelOptions(
 def convert(
     path: Annotated[File, _argument("IN", "recording, run file or wire log")],
     output: Annotated[
-        File | None, _argument("OUT", ".h5 (run file), .txt (pair), .lvm or .csv; or a folder for the original")
+        File | None, _argument("OUT", ".h5 (run file), .txt (pair), .lvm or .csv; or a folder to copy the original to")
     ] = None,
     /,
     *,
@@ -334,7 +334,7 @@ def trade(
     options: TradeOptions = TradeOptions(),
     read: InputOptions = InputOptions(),
 ) -> int:
-    """Measure on this machine how much time accuracy costs: error relative to its lower bound, and time."""
+    """Measure what accuracy costs on this machine: error relative to its lower bound, and computing time."""
     from springmass.commands.trade import run
 
     return run(path, options, read)
