@@ -1,8 +1,8 @@
-"""Build hook: the wheel owns one top-level name.
+"""Build hook that gives the wheel only one top-level name.
 
-In a checkout `acquisition`, `pipeline` and `storage` stand next to `springmass`. The wheel has them inside
-`springmass`, where a user's own `pipeline.py` and another distribution's `storage` cannot take their place.
-docs/decisions/0022-one-name-in-the-wheel.md says why.
+In a checkout `acquisition`, `pipeline` and `storage` are next to `springmass`. The wheel contains them inside
+`springmass`, where a user's own `pipeline.py` or another distribution's `storage` cannot replace them.
+docs/decisions/0022-one-name-in-the-wheel.md explains why.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 MOVED = ("acquisition", "pipeline", "storage")
-RECORDINGS = "sample_data"  # but for the program that generates them
+RECORDINGS = "sample_data"  # except for the program that generates them
 
 _NAMES = "|".join(MOVED)
 # An import of a whole package, and a dotted name anywhere: in an import, a lazy registry's string, a docstring.
@@ -24,15 +24,15 @@ _DOTTED = re.compile(rf"(?<![\w./])({_NAMES})(?=\.[A-Za-z_{{])")
 
 
 def moved(source: str) -> str:
-    """Return a module's source as it reads inside the wheel."""
+    """Return a module's source with the package names that it needs inside the wheel."""
     return _DOTTED.sub(r"springmass.\1", _IMPORT.sub(r"\1springmass.\2", source))
 
 
 class WheelHook(BuildHookInterface):
-    """Puts the rewritten files of all four packages into a wheel; an editable one stays as it is."""
+    """Puts the rewritten files of all four packages and the recordings into a wheel, unless the wheel is editable."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Write the files into a temporary folder and force them into the wheel."""
+        """Write the files into a temporary folder and include them in the wheel."""
         if version == "editable":
             return
         self._folder = TemporaryDirectory(prefix="springmass-wheel-")

@@ -1,8 +1,8 @@
-"""Write what an installed wheel must get along with, into a folder: `python .ci/around_the_wheel.py FOLDER`.
+"""Write modules that could conflict with an installed wheel, and the tests: `python .ci/around_the_wheel.py FOLDER`.
 
-`neighbours/NAME` is a distribution that owns the top-level name NAME, for each package that a checkout has under that
-name. `user` is a working folder with the user's own `pipeline.py` and `storage`. `tests` holds the tests, with their
-imports as a wheel has them. Whatever imports a neighbour or the user's own module fails.
+`neighbours/NAME` is a distribution with the top-level name NAME, one for each package of that name in a checkout.
+`user` is a working folder with the user's own `pipeline.py` and `storage`. `tests` contains the tests, with their
+imports rewritten as in a wheel. Any import of a neighbour or of a user's module fails.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ version = "1.0"
 
 
 def write(path: Path, text: str) -> None:
-    """Write a file with the folders above it."""
+    """Write a file, and create its parent folders."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
 

@@ -1,6 +1,6 @@
-"""Hold each package to its own percentage of covered lines and branches, ``tool.springmass.fail_under``.
+"""Check that each package has its minimum percentage of covered lines and branches, ``tool.springmass.fail_under``.
 
-Called after the tests ran under coverage: ``python .ci/coverage.py``.
+Call it after the tests have run under coverage: ``python .ci/coverage.py``.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 
 def main() -> int:
-    """Print a line for each package; return 1 where one is below its limit."""
+    """Print a line for each package; return 1 if any package is below its limit."""
     settings = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))
     below = 0
     for package, least in settings["tool"]["springmass"]["fail_under"].items():

@@ -1,7 +1,7 @@
-"""Check the wording of what people read: ``python .ci/wording.py [FOLDER ...]``; ``--names`` lists unclear names too.
+"""Check the wording of all texts: ``python .ci/wording.py [FOLDER ...]``; ``--names`` also lists unclear names.
 
-Two rules fail the build. Phrases that a reader stumbles over must not occur in strings, docstrings, comments and pages;
-each has a plainer form. A sentence of a page has at most 35 words. The list of unclear names is a report, no rule.
+Two rules can fail the build. Phrases that a reader stumbles over must not occur in strings, docstrings, comments and
+pages; each has a plainer form. A sentence of a page has at most 35 words. The list of unclear names is only a report.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ EXEMPT = (".ci/wording.py",)
 
 
 def files(folders: tuple[str, ...]) -> list[Path]:
-    """Return the files under version control that people read."""
+    """Return the Python files and pages under version control."""
     listed = subprocess.run(["git", "ls-files", "*.py", "*.md"], capture_output=True, text=True, check=True).stdout
     paths = [Path(line) for line in listed.splitlines() if line not in EXEMPT]
     return [path for path in paths if path.parts[0] in folders or (len(path.parts) == 1 and path.suffix == ".md")]
 
 
 def python_texts(path: Path) -> Iterator[tuple[int, str]]:
-    """Yield line and text of every string and comment."""
+    """Yield the line number and text of every string and comment."""
     with tokenize.open(path) as file:
         for token in tokenize.generate_tokens(file.readline):
             if token.type in (tokenize.STRING, tokenize.COMMENT):
@@ -61,7 +61,7 @@ def python_texts(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def page_texts(path: Path) -> Iterator[tuple[int, str]]:
-    """Yield line and text of every paragraph, list item and cell, without code."""
+    """Yield the line number and text of every paragraph, list item and table cell, without code blocks."""
     block: list[str] = []
     start, fenced = 1, False
     for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
@@ -84,12 +84,12 @@ def page_texts(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def without_code(text: str) -> str:
-    """Return a text with code as one word each, and links as their words."""
+    """Return a text in which one word replaces each piece of code, and its words replace each link."""
     return re.sub(r"\]\([^)]*\)", "]", re.sub(r"``?[^`]+``?", "CODE", text))
 
 
 def phrases(path: Path) -> Iterator[str]:
-    """Yield every phrase that has a plainer form."""
+    """Yield a message for every phrase that has a plainer form."""
     texts = python_texts(path) if path.suffix == ".py" else ((n, without_code(t)) for n, t in page_texts(path))
     for number, text in texts:
         words = re.sub(r"\s+#?\s*", " ", text)
@@ -99,7 +99,7 @@ def phrases(path: Path) -> Iterator[str]:
 
 
 def long_sentences(path: Path) -> Iterator[str]:
-    """Yield every sentence of a page that has too many words."""
+    """Yield a message for every sentence of a page that has too many words."""
     for number, text in page_texts(path):
         for sentence in re.split(r"(?<=[.!?:;])\s+", without_code(text)):
             if (count := len(re.findall(r"[\w'-]*[A-Za-z][\w'-]*", sentence))) > MOST_WORDS:
@@ -107,7 +107,7 @@ def long_sentences(path: Path) -> Iterator[str]:
 
 
 def unclear_names(paths: list[Path]) -> Counter[str]:
-    """Return how often each unclear name is bound."""
+    """Return how many times each unclear name is bound."""
     found: Counter[str] = Counter()
     for path in paths:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
@@ -119,7 +119,7 @@ def unclear_names(paths: list[Path]) -> Counter[str]:
 
 
 def main() -> int:
-    """Print what fails; return 1 if anything does."""
+    """Print all failures; return 1 if there are any."""
     names = [word for word in sys.argv[1:] if not word.startswith("-")]
     paths = files(tuple(names) or FOLDERS)
     failures = [line for path in paths for line in phrases(path)]

@@ -1,4 +1,4 @@
-"""Turn bytes from a port or a recording into blocks of samples. This package imports no other of the project."""
+"""Turn bytes from a port or a recording into blocks of samples; no other package of the project is imported."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ __all__ = [
     "sniff",
 ]
 
-# Not needed to read files; importing it eagerly would take a tenth of the start-up time.
+# Reading files does not need these names; importing them eagerly would take a tenth of the start-up time.
 _LATER = {"Clock": "clock", "SystemClock": "clock", "VirtualClock": "clock", "Replay": "replay"}
 
 

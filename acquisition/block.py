@@ -1,4 +1,4 @@
-"""A block of consecutive samples: every source delivers blocks, and all other code takes them."""
+"""A block of consecutive samples, the form in which every source delivers its data to all other code."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ UNITS = {
     "voltage": "V",
     "number": "1",
 }
-"""The quantities that a sample may have, each with its SI unit. `pipeline.track.UNITS` is the same table."""
+"""SI unit of each quantity that a source can measure; `pipeline.track.UNITS` is an identical table."""
 
 
 class Flag(enum.IntFlag):
-    """Why a sample may not be taken at face value. The flags of a sample are the sum of these bits.
+    """Reasons to distrust a sample; the flags of a sample are the sum of these bits.
 
-    The values are part of the run file (CF ``flag_masks``) and never change.
+    The values are part of the run file (CF ``flag_masks``) and must never change.
     """
 
     MISSING = 1
@@ -51,24 +51,24 @@ class Block:
     Parameters
     ----------
     first : int
-        Index of the first sample within the run.
+        Index of the first sample of the block within the run.
     t : (n,) float64, s
         Sensor time since the start of the run.
     distance : (n,) float64, m
-        Distance from the sensor; NaN if unmeasured.
+        Distance from the sensor, or another quantity; NaN if it was not measured.
     flags : (n,) uint8
         Sums of :class:`Flag` bits.
     host_ns : (n,) int64, ns, or None
-        Host time at which each sample arrived; None for a recording, which has no host time.
+        Host time at which each sample arrived; None for a recording, which has no host times.
     velocity : (n,) float64, m/s, or None
-        Velocity as stated in the recording; NaN for samples without one.
+        Velocity as stated in the recording; NaN for samples without a velocity.
     quantity, unit : str
         Quantity and unit of ``distance``, from :data:`UNITS`. The velocity is in this unit per second.
 
     Raises
     ------
     ValueError
-        If the quantity is not in the table, or has another unit.
+        If the quantity is not in :data:`UNITS`, or the unit is not the SI unit of the quantity.
     """
 
     first: int
@@ -89,7 +89,7 @@ class Block:
         return int(self.t.size)
 
     def __getitem__(self, rows: slice) -> Block:
-        """Return the samples of a slice (step 1) as a block of views."""
+        """Return the samples of a slice with step 1, as a block whose arrays are views."""
         start, stop, step = rows.indices(len(self))
         if step != 1:
             raise ValueError(f"expected a slice of step 1, got step {step}; index the arrays of the block instead")
@@ -109,13 +109,13 @@ class Block:
 def concatenate(blocks: Iterable[Block]) -> Block:
     """Join blocks into one, in the given order.
 
-    If some blocks lack a column it is filled there: velocity with NaN, host time with -1. Without blocks the result is
-    empty.
+    A column that only some of the blocks have is filled up in the others: velocities with NaN, host times with -1. The
+    result is empty if there are no blocks.
 
     Raises
     ------
     ValueError
-        If their quantities differ.
+        If the quantities of the blocks differ.
     """
     parts = list(blocks)
     if not parts:

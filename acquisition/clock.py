@@ -1,4 +1,4 @@
-"""Clocks that are passed as arguments. Of the three packages only this module reads the system clock."""
+"""Clocks that are passed as arguments; acquisition, pipeline and storage read the system clock only here."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ __all__ = ["Clock", "SystemClock", "VirtualClock"]
 
 
 class Clock(Protocol):
-    """A monotonic clock that can be waited on until an absolute deadline."""
+    """A monotonic clock with a method that waits until an absolute deadline."""
 
     def now_ns(self) -> int:
-        """Return monotonic nanoseconds."""
+        """Return the monotonic time in nanoseconds."""
         ...
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Wait until :meth:`now_ns` reaches ``deadline_ns``; do not wait if it has passed."""
+        """Wait until :meth:`now_ns` reaches ``deadline_ns``; return immediately if the deadline has passed."""
         ...
 
 
 class SystemClock:
     """The machine's monotonic clock.
 
-    Deadlines are absolute, so that the errors of single waits do not add up: 500 waits of 10 ms drifted by 132 ms
-    with relative sleeps and by 0.15 ms with deadlines.
+    Deadlines are absolute, so the errors of individual waits do not accumulate: 500 waits of 10 ms drifted by 132 ms
+    with relative sleeps, but by 0.15 ms with deadlines.
     """
 
     def now_ns(self) -> int:
@@ -32,7 +32,7 @@ class SystemClock:
         return time.monotonic_ns()
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Sleep until the deadline, and sleep again after an early wake-up."""
+        """Sleep until the deadline; after an early wake-up, sleep again."""
         while (remaining_ns := deadline_ns - time.monotonic_ns()) > 0:
             time.sleep(remaining_ns * 1e-9)
 
@@ -40,16 +40,16 @@ class SystemClock:
 class VirtualClock:
     """A clock that never waits: a sleep only advances its time.
 
-    It allows replays at full speed and tests of long runs that take no time.
+    It allows replays at full speed, and tests of long runs that take almost no time.
     """
 
     def __init__(self, start_ns: int = 0) -> None:
         self._now_ns = start_ns
 
     def now_ns(self) -> int:
-        """Return the time reached so far."""
+        """Return the current virtual time."""
         return self._now_ns
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Advance to the deadline, never backward."""
+        """Advance to the deadline; if it has passed, leave the time unchanged."""
         self._now_ns = max(self._now_ns, deadline_ns)

@@ -1,4 +1,4 @@
-"""The error tree of acquisition.
+"""The exception hierarchy of acquisition.
 
 ::
 
@@ -37,10 +37,10 @@ __all__ = [
 
 
 def visible(text: str) -> str:
-    """Return a text on one line, with an escape for each character that a terminal or a page would not print.
+    """Return a text as one line, with every unprintable character replaced by its escape sequence.
 
-    Titles, names and units come from files. An escape sequence in them could clear the screen or fake a line, and a
-    direction mark could reverse a name.
+    Titles, names and units come from files. A control sequence in them could clear the screen or fake a line, and
+    a direction mark could reverse a name.
 
     Examples
     --------
@@ -51,12 +51,12 @@ def visible(text: str) -> str:
 
 
 def _escaped(character: str) -> str:
-    # Other blanks are harmless and occur between a number and its unit.
+    # Space characters other than " " are harmless; some files have them between a number and its unit.
     return character if unicodedata.category(character) == "Zs" else character.encode("unicode_escape").decode()
 
 
 class AcquisitionError(Exception):
-    """Base class of the errors of acquisition. The message is one line for the user."""
+    """Base class of the errors of acquisition; its message is one line, written for the user."""
 
 
 class FormatError(AcquisitionError):
@@ -65,20 +65,20 @@ class FormatError(AcquisitionError):
     Parameters
     ----------
     path : str
-        The file.
+        Path of the file.
     problem : str
-        What is wrong: what was expected and what was found.
+        The problem: what was expected and what was found.
     remedy : str
         What the user can do.
     line : int, optional
-        One-based line of the fault.
+        Number of the faulty line, counted from 1.
     """
 
     def __init__(self, path: str, problem: str, remedy: str, *, line: int | None = None) -> None:
         self.path, self.problem, self.remedy, self.line = path, problem, remedy, line
         where = path if line is None else f"{path}, line {line}"
         text = f"{problem} {remedy}" if problem.endswith("?") else f"{problem}; {remedy}"
-        # Names and units come from the file and may contain line ends. The path comes from the user and stays as it is.
+        # Names and units come from the file and may contain line ends. The path comes from the user and is not escaped.
         super().__init__(f"{where}: {visible(text)}")
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -95,11 +95,11 @@ class NeedsAnswer(FormatError):
     Parameters
     ----------
     question : Question
-        What is missing, and every possible answer, as data.
+        The missing information and its possible answers, as data.
     remedy : str, optional
-        How the user gives the answer; by default the neutral wording of the question.
+        How the user can give the answer; by default the neutral wording of the question.
     line : int, optional
-        One-based line that shows what is missing.
+        Number of the line that shows what is missing, counted from 1.
     """
 
     def __init__(self, question: Question, remedy: str = "", *, line: int | None = None) -> None:
@@ -107,7 +107,7 @@ class NeedsAnswer(FormatError):
         self.question = question
 
     def with_remedy(self, remedy: str) -> NeedsAnswer:
-        """Return the same question with another remedy."""
+        """Return an error with the same question and another remedy."""
         return NeedsAnswer(self.question, remedy, line=self.line)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -115,7 +115,7 @@ class NeedsAnswer(FormatError):
 
 
 class SourceError(AcquisitionError):
-    """A source failed during delivery; the blocks before are valid."""
+    """A source failed during delivery; the blocks delivered before the failure are valid."""
 
 
 class SensorError(AcquisitionError):

@@ -1,4 +1,4 @@
-"""Extensions from other packages by entry points: formats of recordings and families of sensors."""
+"""Load extensions of other packages through entry points: recording formats and sensor families."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["entry_points_of", "load_entry"]
 @cache
 def entry_points_of(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group by name; the result is cached for the process."""
-    from importlib.metadata import entry_points  # its import takes longer than all other code of the registries
+    from importlib.metadata import entry_points  # importing it takes longer than all other code of the registries
 
     return {entry.name: entry for entry in entry_points(group=group)}
 
@@ -25,12 +25,12 @@ def entry_points_of(group: str) -> dict[str, EntryPoint]:
 def load_entry(
     entry: EntryPoint, what: str, refused: type[AcquisitionError], checked: Callable[[Any], Any] = lambda loaded: loaded
 ) -> Any:
-    """Load an entry point and return the result of ``checked`` for it.
+    """Load an entry point, pass the loaded object to ``checked`` and return the result.
 
     Raises
     ------
     refused
-        For any exception while it is loaded or checked; one line.
+        If loading or checking raises any exception; the message is one line.
     """
     try:
         return checked(entry.load())

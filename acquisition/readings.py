@@ -1,4 +1,4 @@
-"""Readings: the frames that a decoder finds in the bytes of a port, before they get a sensor time."""
+"""Readings: the contents of the frames that a decoder finds in the bytes of a port, before timing."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ __all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "Readings", "carried"]
 NAN = math.nan
 
 Read = tuple[int, int, bytes]
-"""One read of a port: channel (the sensor's number within the run), host time in ns, bytes."""
+"""One read of a port, as a tuple of channel (number of the sensor within the run), host time in ns, and bytes."""
 
 
 class Reading(NamedTuple):
     """The content of one frame.
 
-    A frame for "no target" has neither an echo nor a distance. A frame that fails its check gives no reading; the
-    decoder counts it as a fault.
+    A frame that reports "no target" has neither an echo time nor a distance. A frame that fails its check gives no
+    reading; the decoder counts it as a fault.
 
     Parameters
     ----------
     host_ns : int, ns
         Host time of the read that completed the frame.
     sequence : int
-        The device's counter as sent; -1 if it sends none.
+        Counter value that the device sent; -1 if it sends none.
     device_us : int, us
-        The device's clock as sent (it may wrap at 2^32); -1 if it sends none.
+        Clock time that the device sent (it may wrap at 2^32); -1 if it sends none.
     echo_us : float, us
-        Time of flight there and back; NaN if the device sends a distance instead.
+        Round-trip time of flight; NaN if the device sends a distance instead or saw no target.
     distance_m : float, m
-        Distance as sent; NaN if the device sends an echo time instead or saw no target.
+        Distance that the device sent; NaN if it sends an echo time instead or saw no target.
     temperature_c : float, degC
-        NaN if it sends none.
+        Temperature that the device sent; NaN if it sends none.
     """
 
     host_ns: int
@@ -49,11 +49,11 @@ class Reading(NamedTuple):
 
 
 COLUMNS = (*Reading._fields, "flags")
-"""The columns of readings."""
+"""Names of the columns of :class:`Readings`."""
 
 
 def carried(values: F8, known: NDArray[np.bool_], before: float) -> F8:
-    """Return values (n,) with each unknown one replaced by the last known one, or by ``before`` if there is none."""
+    """Return the (n,) values with unknown ones replaced by the last known value before them, initially ``before``."""
     if known.all():
         return values
     latest = np.maximum.accumulate(np.where(known, np.arange(values.size), -1))
@@ -61,52 +61,52 @@ def carried(values: F8, known: NDArray[np.bool_], before: float) -> F8:
 
 
 class Readings(tuple[Reading, ...]):
-    """Consecutive readings of one rangefinder: a tuple of rows with properties for its columns as arrays.
+    """Consecutive readings of one rangefinder: a tuple of rows, with its columns available as arrays.
 
     Notes
     -----
-    During a recording a read of the port usually completes one frame. Seven arrays for one row would cost more than
-    decoding it, so the arrays are made only on demand.
+    During a recording, a read of the port usually completes one frame. Seven arrays for one row would take longer than
+    decoding it, so the arrays are created only on demand.
     """
 
     __slots__ = ()
 
     @property
     def host_ns(self) -> I8:
-        """(n,) int64, ns."""
+        """Host times in ns, (n,) int64."""
         return np.array([row.host_ns for row in self], np.int64)
 
     @property
     def sequence(self) -> I8:
-        """(n,) int64; -1 if there is none."""
+        """Counter values, (n,) int64; -1 for readings without one."""
         return np.array([row.sequence for row in self], np.int64)
 
     @property
     def device_us(self) -> I8:
-        """(n,) int64, us; -1 if there is none."""
+        """Device clock times in us, (n,) int64; -1 for readings without one."""
         return np.array([row.device_us for row in self], np.int64)
 
     @property
     def echo_us(self) -> F8:
-        """(n,) float64, us; NaN if there is none."""
+        """Echo times in us, (n,) float64; NaN for readings without one."""
         return np.array([row.echo_us for row in self], np.float64)
 
     @property
     def distance_m(self) -> F8:
-        """(n,) float64, m; NaN if there is none."""
+        """Distances in m, (n,) float64; NaN for readings without one."""
         return np.array([row.distance_m for row in self], np.float64)
 
     @property
     def temperature_c(self) -> F8:
-        """(n,) float64, degC; NaN if there is none."""
+        """Temperatures in degC, (n,) float64; NaN for readings without one."""
         return np.array([row.temperature_c for row in self], np.float64)
 
     @property
     def flags(self) -> U8:
-        """(n,) uint8: ``Flag.MISSING`` for readings without echo and distance."""
+        """Flags, (n,) uint8: ``Flag.MISSING`` for readings with neither an echo time nor a distance, else 0."""
         silent = np.isnan(self.echo_us) & np.isnan(self.distance_m)
         return np.where(silent, np.uint8(Flag.MISSING), np.uint8(0))
 
 
 NO_READINGS = Readings()
-"""What a decoder returns if no frame was completed."""
+"""The result of a decoder if the bytes complete no frame."""

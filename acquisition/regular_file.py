@@ -1,4 +1,4 @@
-"""Open files for reading: regular files only, and without waiting."""
+"""Open regular files for reading, without blocking; refuse pipes, sockets, devices and directories."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _OTHERS = (
 
 
 def open_regular(path: str | os.PathLike[str]) -> FileIO:
-    """Open a regular file for reading, unbuffered.
+    """Open a regular file for unbuffered reading.
 
-    Opening a pipe without a writer waits for ever, and reading a terminal or a device may never end. So the kind of
-    file is checked before it is opened and again afterwards, and opening does not wait.
+    Opening a pipe without a writer blocks forever, and reading a terminal or a device may never end. The kind of
+    file is therefore checked before and after opening, and the opening itself does not block.
 
     Raises
     ------
     OSError
-        If it is not a regular file or cannot be opened; ``strerror`` gives the reason in a few words.
+        If the path is not a regular file or cannot be opened; ``strerror`` gives the reason in a few words.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Replay a recording through the interface of a live source.
 
-Time is kept as in rosbag2: the clock is an argument, and a new snapshot (clock time, recording time) is taken
-whenever the replay pauses or jumps. Between snapshots every deadline is absolute, so nothing drifts.
+Timing works as in rosbag2: the clock is an argument, and a new snapshot (clock time, recording time) is taken
+whenever the replay pauses or jumps. Between snapshots every deadline is absolute, so the timing does not drift.
 """
 
 from __future__ import annotations
@@ -20,38 +20,38 @@ from acquisition.source import SourceInfo
 
 __all__ = ["Replay"]
 
-_LONGEST_SLEEP_NS = 50_000_000  # the longest delay until a jump or a pause takes effect
+_LONGEST_SLEEP_NS = 50_000_000  # maximum delay until a jump or a pause takes effect
 
 
 class Replay:
-    """Delivers blocks at the speed at which they were recorded, or at another.
+    """Delivers the blocks of a recording at the recorded speed or at another speed.
 
     Parameters
     ----------
     blocks : iterable of Block
-        A whole run, in order.
+        All blocks of a run, in order.
     clock : Clock
-        Waits between blocks; a :class:`acquisition.clock.VirtualClock` does not wait.
+        Clock that waits between blocks; a :class:`acquisition.clock.VirtualClock` does not wait.
     info : SourceInfo
-        Of the recording; ``kind`` becomes "replay", but simulated data stay "simulated".
+        Description of the recording; ``kind`` becomes "replay", except that simulated data stay "simulated".
     speed : float or None
-        Seconds of the recording per second of the clock; None or infinity never waits.
+        Seconds of the recording per second of the clock; with None or infinity the replay never waits.
     block_samples : int
-        Largest number of samples in a block.
+        Maximum number of samples in a block.
     loop : bool
         Whether to start again after the end.
 
     Notes
     -----
-    A block is due when its last sample is due, as from a port. At any speed ``t``, ``distance`` and ``velocity`` are
-    as recorded, bit for bit, and so are ``flags`` within the first segment.
+    A block is due when its last sample is due, as with a port. At any speed, ``t``, ``distance`` and ``velocity`` are
+    bit for bit as recorded, and so are the ``flags`` of the first segment.
 
-    A seek during the replay and each turn of a loop begin a new *segment*. ``segment`` counts them, ``t`` is the time
-    of the recording and so may jump back, ``first`` continues to count delivered samples, and the first sample has
-    the flag ``GAP_BEFORE``. A consumer with a state must reset it there.
+    A seek during the replay begins a new *segment*, and so does each repetition of a loop. ``segment`` numbers the
+    segments, and ``first`` continues to count delivered samples. ``t`` is the time of the recording, so it may jump
+    back. The first sample of a new segment has the flag ``GAP_BEFORE``; a stateful consumer must reset its state there.
 
-    Control methods may be called from any thread, even while another one iterates. One thread iterates at a time; a
-    second iteration continues where the first one stopped. Entering the ``with`` again rewinds.
+    Control methods may be called from any thread, even while another thread iterates. Only one thread may iterate at
+    a time; a second iteration continues where the first stopped. Entering the ``with`` again after a close rewinds.
 
     Examples
     --------
@@ -80,7 +80,7 @@ class Replay:
             raise ValueError(f"speed must be positive, or None to never wait, got {speed!r}")
         self.info = info if info.kind == "simulated" else replace(info, kind="replay")
         self._run = concatenate(blocks)
-        # Times that jump back and unknown times are due immediately.
+        # Samples whose time is unknown or jumps back are due immediately.
         known = self._run.t[np.isfinite(self._run.t)]
         self._due = np.fmax.accumulate(np.concatenate([known[:1], self._run.t]))[known[:1].size :]
         if not known.size:
@@ -100,28 +100,28 @@ class Replay:
         self._cut = False
         self._steps = 0
         self._closed = False
-        self._reference: tuple[int, float] | None = None  # clock ns, recording s; None until the replay begins
+        self._reference: tuple[int, float] | None = None  # (clock ns, recording s); None before the replay begins
 
     def __enter__(self) -> Self:
-        """Open; rewind if it was closed."""
+        """Open the replay; rewind it if it was closed."""
         with self._changed:
             if self._closed:
                 self._rewind()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close."""
+        """Close the replay."""
         self.close()
 
     def close(self) -> None:
-        """End the iteration, also a paused one; may be repeated."""
+        """End the iteration, even while paused; further calls do nothing."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     @property
     def segment(self) -> int:
-        """Number of seeks and loop turns before the block that was delivered last."""
+        """Number, from 0, of the segment of the block that was delivered last."""
         return self._segment
 
     @property
@@ -131,12 +131,12 @@ class Replay:
 
     @property
     def position_s(self) -> float:
-        """Current time of the recording, s."""
+        """Current position in the recording, s."""
         with self._changed:
             return self._position()
 
     def pause(self) -> None:
-        """Pause until :meth:`resume`."""
+        """Pause until :meth:`resume` is called."""
         with self._changed:
             if not self._paused:
                 self._move_reference(self._position())
@@ -151,12 +151,12 @@ class Replay:
                 self._changed.notify_all()
 
     def step(self, n: int = 1) -> None:
-        """Deliver the next ``n`` samples immediately and pause again; only while paused.
+        """Deliver the next ``n`` samples of a paused replay immediately, and stay paused.
 
         Raises
         ------
         ValueError
-            If ``n`` is less than 1 or play is not paused.
+            If ``n`` is less than 1, or the replay is not paused.
         """
         with self._changed:
             if n < 1 or not self._paused:
@@ -165,7 +165,7 @@ class Replay:
             self._changed.notify_all()
 
     def seek(self, t_s: float) -> None:
-        """Go to the first sample at or after a time of the recording, s; beyond the last sample, to the end.
+        """Seek to the first sample at or after the recording time ``t_s`` in s, or to the end if there is none.
 
         Raises
         ------
@@ -182,14 +182,14 @@ class Replay:
             self._move_reference(float(min(max(t_s, start), end)))
 
     def __iter__(self) -> Iterator[Block]:
-        """Yield the remaining blocks, each when it is due; the replay begins at the first ``next``."""
+        """Yield each remaining block when it is due; the replay begins with the first ``next``."""
         with self._changed:
             self._reference = None
         while (block := self._take()) is not None:
             yield block
 
     def _take(self) -> Block | None:
-        """Wait for the next block; None at the end."""
+        """Wait for the next block and return it; return None at the end."""
         while True:
             with self._changed:
                 while self._paused and not self._steps and not self._closed:
@@ -205,11 +205,11 @@ class Replay:
                 deadline_ns, now_ns = self._deadline_ns(stop - 1), self._clock.now_ns()
                 if now_ns >= deadline_ns:
                     return self._deliver(stop)
-            # Wait in slices, so that a control call takes effect soon.
+            # Wait in short slices, so that a control call takes effect soon.
             self._clock.sleep_until_ns(min(deadline_ns, now_ns + _LONGEST_SLEEP_NS))
 
     def _find_next(self) -> bool:
-        """Return whether a sample remains; a loop returns to the first one in a new segment."""
+        """Return whether a sample remains; a loop continues with the first sample, in a new segment."""
         size = len(self._run)
         if self._next < size:
             return True
@@ -218,7 +218,7 @@ class Replay:
         self._next = 0
         self._cut = self._delivered > 0
         if self._reference is not None and not self._paused:
-            # The first sample is due one period after the due time of the last, not after it was consumed.
+            # The first sample is due one period after the last was due, not one period after the last was consumed.
             reference_ns, reference_s = self._reference
             lasted = self._due[-1] - reference_s + 1.0 / self.info.rate_hz
             self._reference = reference_ns + round(lasted / self._speed * 1e9), float(self._due[0])
@@ -240,7 +240,7 @@ class Replay:
         return block
 
     def _deadline_ns(self, row: int) -> int:
-        """Return the clock time at which a sample is due; at infinite speed the time of the reference."""
+        """Return the clock time at which a sample is due; at infinite speed this is the time of the snapshot."""
         reference_ns, reference_s = self._reference or self._take_reference(float(self._due[self._next]))
         return reference_ns + round((float(self._due[row]) - reference_s) / self._speed * 1e9)
 
@@ -253,12 +253,12 @@ class Replay:
         if self._paused:
             return reference_s
         played = (self._clock.now_ns() - reference_ns) * 1e-9 * self._speed
-        # The position is never ahead of the next block to deliver.
+        # The position never runs ahead of the end of the next block to deliver.
         ahead = self._due[min(self._next, len(self._run) - 1)] + 1.0 / self.info.rate_hz * self._block_samples
         return float(min(reference_s + played, ahead, self._due[-1]))
 
     def _move_reference(self, position_s: float) -> None:
-        if self._reference is not None:  # there is none before the replay begins
+        if self._reference is not None:  # None before the replay begins
             self._take_reference(position_s)
 
     def _take_reference(self, position_s: float) -> tuple[int, float]:

@@ -1,4 +1,4 @@
-"""The common interface of everything that delivers samples: a live port, a replayed recording, a simulation."""
+"""The common interface of all sources of samples: live ports, replayed recordings and simulations."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ ClockKind = Literal["nominal", "device", "host"]
 
 @dataclass(frozen=True, slots=True)
 class SourceInfo:
-    """What is known of a source before its first sample.
+    """The description of a source, available before its first sample.
 
     Parameters
     ----------
     kind : {"live", "replay", "simulated"}
-        It stays with the data, so that simulated data cannot pass for measured.
+        Kind of the source. It is stored with the data, so that simulated data cannot be mistaken for measurements.
     name : str
-        Port, file or scene.
+        Name of the port, file or scene.
     rate_hz : float
         Samples per second, Hz.
     sigma_m : float or None
-        Standard deviation of a distance, m, if the source knows it.
+        Standard deviation of a single distance, m; None if unknown.
     quantum_m : float or None
-        Smallest step of a distance, m (a timer's tick or the last printed digit), if known.
+        Resolution of a distance, m (one tick of a timer or the last printed digit); None if unknown.
     clock : {"nominal", "device", "host"}
-        Origin of the sample times; "nominal" times are row numbers divided by the rate, not measured times.
+        Origin of the sample times; "nominal" times were not measured: they are row numbers divided by the rate.
     stated_error_m : float or None
-        The error of a distance that the recording states, m. It need not be the noise.
+        Error of a distance as stated in the recording, m; None if not stated. It may differ from the noise.
     """
 
     kind: Kind
@@ -46,15 +46,15 @@ class SourceInfo:
 
 
 class Source(Protocol):
-    """An iterator of blocks inside a ``with``.
+    """An iterable of blocks, used inside a ``with`` statement.
 
-    Iteration ends with the source. A fault raises :class:`acquisition.errors.SourceError`; ``None`` is never
+    The iteration ends when the source ends. A fault raises :class:`acquisition.errors.SourceError`; ``None`` is never
     delivered.
     """
 
     @property
     def info(self) -> SourceInfo:
-        """What is known before the first sample."""
+        """The description of the source, available before the first sample."""
         ...
 
     def __enter__(self) -> Self: ...

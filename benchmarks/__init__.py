@@ -1,1 +1,1 @@
-"""What is measured, as programs, and tests that each of them runs."""
+"""Benchmark programs, and tests that each of them runs."""

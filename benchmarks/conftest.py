@@ -1,8 +1,8 @@
-"""Which files of the benchmarks are no tests, and Ctrl-C as a terminal leaves it."""
+"""Exclude benchmark files that are not tests, and restore the default handling of Ctrl-C."""
 
 import signal
 
 collect_ignore = ["accuracy"]  # a program of several modules
 
-# A job in the background is started with Ctrl-C ignored, and hands that on to the programs that are interrupted here.
+# A background job starts with Ctrl-C ignored, and the programs that are interrupted in these tests would inherit this.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,9 +1,10 @@
-"""Count the numbers that decide something: `python benchmarks/constants.py [--list] [ROOM ...]`.
+"""Count the numeric constants of the code: `python benchmarks/constants.py [--list] [ROOM ...]`.
 
-Counted are module-level assignments of numbers, also of tuples and arrays of them, and numeric defaults of classes
-named ``Params``, in acquisition, pipeline, storage and springmass. A table counts as one, ``A, B = 1, 2`` as two. A
-number has a source where its comment, or its entry in the docstring of ``Params``, names a publication, a probability,
-a standard or a measurement. ``--list`` prints those that name none; a ROOM such as pipeline/motion limits both to it.
+The count covers module-level assignments of numbers, including tuples and arrays of numbers, and numeric defaults of
+classes named ``Params``, in acquisition, pipeline, storage and springmass. A table counts as one constant,
+``A, B = 1, 2`` as two. A constant has a source if its comment, or its entry in the docstring of ``Params``, names a
+publication, a probability, a standard or a measurement. ``--list`` prints the constants without a source. A ROOM such
+as pipeline/motion limits count and list to that folder.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ SOURCE = re.compile(
 
 
 class Constant(NamedTuple):
-    """A number that stands in the code, with what is written about it."""
+    """A numeric constant in the code, with its comments and documentation."""
 
     path: Path
     line: int
@@ -38,18 +39,18 @@ class Constant(NamedTuple):
 
     @property
     def room(self) -> str:
-        """The package and its part."""
+        """The package and subpackage that contain the constant."""
         parts = self.path.relative_to(ROOT).parts
         return "/".join(parts[: min(2, len(parts) - 1)])
 
     @property
     def sourced(self) -> bool:
-        """Whether a source, a probability or a measurement is named."""
+        """Whether the documentation names a source, a probability or a measurement."""
         return SOURCE.search(self.words) is not None
 
 
 def constants(path: Path) -> Iterator[Constant]:
-    """Yield the numbers of a module in order."""
+    """Yield the numeric constants of a module in order."""
     tree = ast.parse(path.read_bytes())
     comments = _comments(path)
     for node in tree.body:
@@ -65,7 +66,7 @@ def constants(path: Path) -> Iterator[Constant]:
 
 
 def _assigned(node: ast.stmt) -> Iterator[tuple[str, ast.expr]]:
-    """Names to which a statement assigns numbers, with these."""
+    """Yield each name to which a statement assigns a number, with the expression of the number."""
     if isinstance(node, ast.AnnAssign) and node.value is not None:
         targets: list[ast.expr] = [node.target]
         value = node.value
@@ -84,7 +85,7 @@ def _assigned(node: ast.stmt) -> Iterator[tuple[str, ast.expr]]:
 
 
 def _is_number(node: ast.expr) -> bool:
-    """Whether an expression is made of numbers, at least one of them written out, and of nothing else."""
+    """Return whether an expression consists of numbers only, of which at least one is a literal."""
     literals = [each.value for each in ast.walk(node) if isinstance(each, ast.Constant)]
     return bool(literals) and all(type(each) in (int, float, complex) for each in literals) and _is_arithmetic(node)
 
@@ -115,7 +116,7 @@ def _comments(path: Path) -> dict[int, str]:
 
 
 def _beside(node: ast.stmt, comments: dict[int, str]) -> str:
-    """The comments on a statement's lines and directly above it."""
+    """Return the comments on a statement's lines and directly above it."""
     lines = list(range(node.lineno, (node.end_lineno or node.lineno) + 1))
     above = node.lineno - 1
     while above in comments:
@@ -125,7 +126,7 @@ def _beside(node: ast.stmt, comments: dict[int, str]) -> str:
 
 
 def _entries(docstring: str) -> dict[str, str]:
-    """Return what a docstring says of each parameter."""
+    """Return the text of a docstring for each parameter."""
     entries: dict[str, str] = {}
     names: list[str] = []
     for line in docstring.splitlines():
@@ -137,7 +138,7 @@ def _entries(docstring: str) -> dict[str, str]:
 
 
 def main() -> None:
-    """Print the counts by room, and the total."""
+    """Print the counts by folder, and the total."""
     parser = argparse.ArgumentParser(description="Count the numbers that decide something.")
     parser.add_argument("rooms", nargs="*", metavar="ROOM", help="folders to count; all packages by default")
     parser.add_argument("--list", action="store_true", help="print each number that names no source")

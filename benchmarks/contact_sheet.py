@@ -1,7 +1,7 @@
 """Draw every shared recording with its fit, residuals and findings: ``python benchmarks/contact_sheet.py FOLDER``.
 
-The recordings and the options that read them are those of ``tests/recordings/findings.toml``. The pages are PNG files.
-A change to a check shows here first: look at all pages for findings that a recording does not deserve.
+The recordings and their reading options come from ``tests/recordings/findings.toml``. The pages are PNG files. After a
+change to a check, look through all pages for findings that a recording does not deserve.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ ROOT = Path(__file__).resolve().parents[1]
 RECORDINGS = ROOT.parent / "shared" / "recordings"
 TABLE = ROOT / "tests" / "recordings" / "findings.toml"
 PER_PAGE = 4
-PERIODS = 8  # that the middle panel shows
+PERIODS = 8  # number of periods in the second panel
 
 
 def listed() -> list[dict[str, Any]]:
-    """Return the table of recordings: ``file``, the options that read it, and ``codes``."""
+    """Return the table of recordings: ``file``, its reading options, and ``codes``."""
     return list(tomllib.loads(TABLE.read_text("utf-8"))["recording"])
 
 
 def analysed(row: Mapping[str, Any]) -> Analysis:
-    """Analyse one recording of the table without any scene, and without what is noted next to the file."""
+    """Analyse one recording of the table without a scene and without the notes next to the file."""
     options = {name: value for name, value in row.items() if name not in ("file", "codes")}
     recording = open_recording(RECORDINGS / row["file"], **options)
     track = to_track(recording.samples, recording.info, recorded_format=recording.format)
@@ -71,7 +71,7 @@ def draw(axes: Any, row: Mapping[str, Any], result: Analysis | PipelineError) ->
     ----------
     axes : (4,) matplotlib.axes.Axes
     row : mapping
-        Of the table.
+        The recording's row of the table.
     result : Analysis or PipelineError
     """
     whole, first, residuals, text = axes
@@ -103,7 +103,7 @@ def draw(axes: Any, row: Mapping[str, Any], result: Analysis | PipelineError) ->
 
 
 def main() -> None:
-    """Draw all recordings of the table that are there, some to a page."""
+    """Draw all recordings of the table, four to a page."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -127,7 +127,7 @@ def main() -> None:
                 panel.tick_params(labelsize=6)
             try:
                 draw(axes, row, analysed(row))
-            except PipelineError as error:  # a refusal is drawn too, in its own words
+            except PipelineError as error:  # a refusal is also drawn, with its message
                 draw(axes, row, error)
         figure.tight_layout()
         figure.savefig(given.folder / f"page-{page:02d}.png", dpi=90)

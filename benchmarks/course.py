@@ -1,18 +1,18 @@
-"""A course of runs: speed against loops of pandas and lmfit, second passes, memory, efficiency, a search.
+"""Measure a course of runs: speed against loops of pandas and lmfit, second passes, memory, efficiency, a search.
 
-Run ``python benchmarks/course.py [--runs N] [--searched N]``; the whole is ``--runs 10000``. Ratios are taken within
-one run. Recordings are made by this script: records of 12,000 samples, and variations of real ones where these are at
-hand (another clock, another scale, noise added; written as tables).
+Run ``python benchmarks/course.py [--runs N] [--searched N]``; the full benchmark is ``--runs 10000``. Both sides of a
+ratio are measured by one call. The script makes its recordings: simulated records of 12,000 samples and, if real
+recordings are available, variations of them (another clock, another scale, added noise; written as tables).
 
-- runs per second and core of ``batch --jobs 1`` over a loop of ``pandas.read_csv`` and one lmfit damped sine, taken in
-  turn;
-- the same over a loop of lmfit that gives the same answer: every law of one closed form, their choice, and the
-  covariance of the best;
-- what a second pass over unchanged inputs takes of the first;
-- speed of two processes over that of two passes by one process, each over half of the runs at the same time: both
-  sides have both cores busy. By what each process used and waited for: a neighbour on the machine does not count;
-- the largest resident memory of a worker, MB;
-- a search of many rows, which are loaded into memory for it, s.
+- speed of ``batch --jobs 1``, in runs per second and core, relative to a loop of ``pandas.read_csv`` and one lmfit
+  damped sine; the two alternate;
+- the same speed relative to a loop of lmfit that gives the same answer: a fit of every law of one closed form, the
+  selection of a law, and its covariance;
+- time of a second pass over unchanged inputs relative to the first pass;
+- speed of one pass by two processes relative to two simultaneous passes by one process each over half of the runs, so
+  that both sides keep both cores busy. Only the used and idle time of these processes counts, not other load;
+- maximum resident memory of a worker, MB;
+- processor time of a search of many rows, including their loading into memory, s.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ from springmass.cli import main
 from storage.catalog import search_rows
 
 SAMPLES = 12_000
-PART = 500  # runs of a pass, between two looks at the loop
-SHARE = 2500  # runs of a pass by two processes, between two passes side by side
+PART = 500  # number of runs in a pass; the loop is timed after each pass
+SHARE = 2500  # number of runs in a pass by two processes, which alternates with two passes side by side
 REAL = (
     ("AyushPandhi__Pandhi_Ayush_PHY224/damped position.txt", {}),
     ("filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv", {"channel": "position", "unit": "m"}),
@@ -66,26 +66,26 @@ for part in (jobs[: len(jobs) // 2], jobs[len(jobs) // 2 :]):
 print(json.dumps(peaks))
 """
 CHILDREN = (resource.RUSAGE_CHILDREN,)
-EVERY_S = 0.02  # between two looks at what the processes of a pass have used
+EVERY_S = 0.02  # interval between two readings of the processor time of a pass, s
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What was measured.
+    """The results of the benchmark.
 
     Parameters
     ----------
     runs : int
     fast, standard : float
-        Runs per second over those of read_csv and one lmfit fit.
+        Speed of each tier relative to read_csv and one lmfit fit.
     same_answer : float
-        Runs per second of the standard tier over those of lmfit with every law.
+        Speed of the standard tier relative to lmfit with every law.
     second_pass : float
-        Of the first.
+        Time of a second pass relative to the first.
     efficiency : float
-        Of two processes, with what they leave idle by :func:`idle_of_two`.
+        Efficiency of two processes, including the idle time that :func:`idle_of_two` returns.
     half_mb, whole_mb : float
-        Largest memory of a worker after half of the runs, and after all.
+        Maximum memory of a worker after half of the runs and after all of them, MB.
     """
 
     runs: int
@@ -99,7 +99,7 @@ class Measured:
 
 
 def recordings(folder: Path, runs: int) -> None:
-    """Write so many recordings: simulated ones, and of every 34 one that varies a real one, where these are at hand."""
+    """Write ``runs`` recordings; if real recordings are available, one in 34 is a variation of a real one."""
     t = np.arange(SAMPLES) / 100.0
     real = list(_real())
     for i in range(runs):
@@ -125,16 +125,16 @@ def _real() -> Iterator[tuple[np.ndarray, np.ndarray]]:
 
 
 def measure(runs: int, folder: Path) -> Measured:
-    """Measure on so many runs; the loops take every tenth of them, and 20 at least."""
+    """Measure with ``runs`` recordings; the reference loop uses a tenth of them, but at least 20."""
     inputs = folder / "runs"
     inputs.mkdir()
     recordings(inputs, runs)
     files = sorted(inputs.iterdir())
     parts = _split(files, max(2, runs // PART))
     every = max(1, runs // max(20, runs // 10))
-    _passed(parts[0], folder / "warm", "fast")  # imports, and the disk's cache
+    _passed(parts[0], folder / "warm", "fast")  # loads the modules and fills the disk's cache
     loop, took, again = 0.0, {"fast": 0.0, "standard": 0.0}, 0.0
-    for i, part in enumerate(parts):  # in turn: a machine that slows down slows every side
+    for i, part in enumerate(parts):  # alternate, so that a slower machine slows both sides
         for tier in took:
             took[tier] += _passed(part, folder / f"{tier}{i}", tier)
             loop += 0.5 * _looped(part[::every]) * len(part)
@@ -157,18 +157,18 @@ def measure(runs: int, folder: Path) -> Measured:
 
 
 def _split(files: Sequence[Path], count: int) -> list[Sequence[Path]]:
-    """Return so many parts, alike in what they hold."""
+    """Split files into ``count`` parts with similar content."""
     return [files[i::count] for i in range(count)]
 
 
 def _looped(files: Sequence[Path]) -> float:
-    """Read files and fit a damped sine to each; return the seconds of processor that one takes."""
+    """Read files and fit a damped sine to each; return the processor time per file, s."""
     with threadpool_limits(1):
         return _processor(lambda: [damped_sine(*_read(file)) for file in files]) / len(files)
 
 
 def _passed(files: Sequence[Path], out: Path, tier: str) -> float:
-    """Make a pass by one process; return the seconds of processor that it took."""
+    """Run a pass by one process; return its processor time, s."""
     options = ["-o", str(out), "--reports", "0", "--jobs", "1", "--accuracy", tier]
 
     def call() -> None:
@@ -180,7 +180,7 @@ def _passed(files: Sequence[Path], out: Path, tier: str) -> float:
 
 
 def _processor(call: Callable[[], object], *of: int) -> float:
-    """Return seconds of processor: a neighbour on the machine does not count."""
+    """Return the processor time of a call, s; other load on the machine does not count."""
 
     def used() -> float:
         each = [resource.getrusage(who) for who in of or (resource.RUSAGE_SELF, *CHILDREN)]
@@ -198,7 +198,7 @@ def _started(files: Sequence[Path], out: Path, *options: str) -> subprocess.Pope
 
 
 def _two_halves(files: Sequence[Path], out: Path) -> None:
-    """Make two passes by one process at the same time, each over half of the runs."""
+    """Run two simultaneous passes by one process each, each over half of the runs."""
     halves = [_started(files[i::2], Path(f"{out}-{i}"), "--jobs", "1") for i in (0, 1)]
     for half in halves:
         _whole(half)
@@ -210,10 +210,10 @@ def _whole(process: subprocess.Popen[bytes]) -> None:
 
 
 def _efficiency(files: Sequence[Path], folder: Path) -> float:
-    """Return what two passes side by side use of what one by two processes does: of some runs after the others."""
+    """Return the cost of two passes side by side relative to one pass by two processes, over all runs in parts."""
     apart = two = 0.0
     for i, share in enumerate(_split(files, max(1, len(files) // SHARE))):
-        for side_by_side in (True, False) if i % 2 == 0 else (False, True):  # which comes first changes too
+        for side_by_side in (True, False) if i % 2 == 0 else (False, True):  # the order alternates
             if side_by_side:
                 apart += _processor(partial(_two_halves, share, folder / f"halves{i}"), *CHILDREN)
             else:
@@ -222,20 +222,20 @@ def _efficiency(files: Sequence[Path], folder: Path) -> float:
 
 
 def _by_two(files: Sequence[Path], out: Path) -> float:
-    """Make a pass by two processes; return the seconds of processor that it used and those that it left idle."""
+    """Run a pass by two processes; return the sum of its processor time and the idle time of the cores, s."""
     idle: list[float] = []
     used = _processor(lambda: idle.append(idle_of_two(files, out)), *CHILDREN)
     return used + sum(idle)
 
 
 def idle_of_two(files: Sequence[Path], out: Path) -> float:
-    """Make a pass by two processes; return for how long they leave one of two cores idle, s. By Linux's ``/proc``.
+    """Run a pass by two processes; return how long they leave one of two cores idle, s, read from Linux's ``/proc``.
 
-    That is what the two wait for work, and what the first process uses while it is alone. The time in which a process
-    could run and a neighbour on the machine had the core is the neighbour's.
+    The idle time is the time in which the two workers wait for work, and the processor time of the parent process
+    while it runs without workers. Time in which a process was ready but other load used the core does not count.
     """
     process = _started(files, out, "--jobs", "2")
-    seen: dict[int, tuple[float, float, float]] = {}  # of each worker: first look, last look, not idle by then, s
+    seen: dict[int, tuple[float, float, float]] = {}  # by worker: times of the first and last reading, busy time, s
     alone, mine = 0.0, 0.0
     while process.poll() is None:
         now = time.monotonic()
@@ -251,7 +251,7 @@ def idle_of_two(files: Sequence[Path], out: Path) -> float:
 
 
 def _below(pid: int) -> list[int]:
-    """Return the processes of a pass's pool."""
+    """Return the process numbers of a pass's workers."""
     with contextlib.suppress(OSError):
         below = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
         return [int(one) for one in below if b"spawn_main" in Path(f"/proc/{one}/cmdline").read_bytes()]
@@ -259,7 +259,7 @@ def _below(pid: int) -> list[int]:
 
 
 def _busy(pid: int) -> tuple[float, float] | None:
-    """Return for how long a process has run and has waited for a core, s; None where it has ended."""
+    """Return how long a process has run and how long it has waited for a core, s; None if it has ended."""
     try:
         used, queued, _ = Path(f"/proc/{pid}/schedstat").read_text().split()
     except OSError:
@@ -273,7 +273,7 @@ def _read(file: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def damped_sine(t: np.ndarray, y: np.ndarray) -> object:
-    """Fit what a user would, started from a look at the spectrum."""
+    """Fit a damped sine as a user would, with start values from the spectrum."""
 
     def model(t, amplitude, gamma, frequency, phase, offset):  # type: ignore[no-untyped-def]
         return offset + amplitude * np.exp(-gamma * t) * np.cos(2 * np.pi * frequency * t + phase)
@@ -282,10 +282,10 @@ def damped_sine(t: np.ndarray, y: np.ndarray) -> object:
 
 
 def all_laws(t: np.ndarray, y: np.ndarray) -> object:
-    """Fit every damping law to the samples by lmfit and take that of the least BIC, with its covariance."""
+    """Fit every damping law to the samples with lmfit; return the covariance of the fit with the minimum BIC."""
 
     def amplitude(t, a, mu, gamma, beta):  # type: ignore[no-untyped-def]
-        # dA/dt = -(mu + gamma A + beta A^2), by small steps: one form for every law.
+        # Integrate dA/dt = -(mu + gamma A + beta A^2) in small steps; this form includes every law.
         grid = np.linspace(t[0], t[-1], 400)
         values, step = np.empty_like(grid), grid[1] - grid[0]
         values[0] = a
@@ -309,7 +309,7 @@ def all_laws(t: np.ndarray, y: np.ndarray) -> object:
         ("mu", "gamma", "beta"),
     ):
         guess = _guess(t, y)
-        parameters = lmfit.create_params(  # coefficients below are bounded: a negative one runs away
+        parameters = lmfit.create_params(  # the coefficients below are bounded: negative ones diverge
             amplitude_=guess.pop("amplitude"), **guess, mu=0.0, gamma=0.0, beta=0.0
         )
         for name, start in (("mu", 1e-4), ("gamma", 0.01), ("beta", 0.1)):
@@ -325,7 +325,7 @@ def _guess(t: np.ndarray, y: np.ndarray) -> dict[str, float]:
 
 
 def search_s(rows: int) -> tuple[float, int]:
-    """Return the processor time of a search over so many rows, the loading of them included, s, and how many match."""
+    """Return the processor time of loading and searching ``rows`` rows, s, and the number of matching rows."""
     rng = np.random.default_rng(1)
     columns = columns_of(("section",))
     numbers = [name for name in columns if name.endswith("_u") or f"{name}_u" in columns][:60]

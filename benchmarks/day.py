@@ -1,9 +1,9 @@
-"""A simulated day at 100 Hz: memory while it is recorded, memory and time of its recovery: `python benchmarks/day.py`.
+"""Measure memory during a simulated day at 100 Hz, and cost of its recovery: `python benchmarks/day.py`.
 
-A session records through its own threads, log and live analysis; only the clock and the port are simulated. The port
-advances the clock by a tenth of a second whenever the session has nothing more to do, and sends what a sensor would
-have sent by then, so that a day takes minutes. The log is then recovered by a separate process, which says what it
-took: time by the clock and by the processor, and the peak of its memory (VmHWM).
+A session records with its usual threads, log and live analysis; only the clock and the port are simulated. Whenever
+the session is idle, the port advances the clock by a tenth of a second and sends the readings of that time, so that a
+day takes minutes. A separate process then recovers the log. It reports its wall time, its processor time and its peak
+memory (VmHWM).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PEAK_MB = 200.0
 
 
 class LockstepClock:
-    """A clock that moves on only while a sleeper waits for it."""
+    """A clock that advances only while a thread waits for it."""
 
     def __init__(self) -> None:
         self._now_ns = 1_000_000_000
@@ -47,14 +47,14 @@ class LockstepClock:
         return self._now_ns
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
-        """Wait until the simulated time has come there."""
+        """Wait until the simulated time reaches the deadline."""
         with self._changed:
             self._deadline_ns = deadline_ns
             self._changed.notify_all()
             self._changed.wait_for(lambda: self._now_ns >= deadline_ns)
 
     def advance(self, patience_s: float) -> bool:
-        """Go one step on as soon as somebody sleeps; False where nobody does."""
+        """Advance by one step as soon as a thread waits; return False if none waits within ``patience_s``."""
         with self._changed:
             if not self._changed.wait_for(lambda: self._deadline_ns > self._now_ns, patience_s):
                 return False
@@ -64,7 +64,7 @@ class LockstepClock:
 
 
 class SimulatedPort:
-    """A port without a descriptor: each read brings what a sensor sent in a tenth of a second."""
+    """A port without a descriptor: each read returns the bytes that a sensor sends in a tenth of a second."""
 
     name = "simulated day"
 
@@ -74,11 +74,11 @@ class SimulatedPort:
         self._sent = 0
 
     def fileno(self) -> int:
-        """Have none."""
+        """Return -1, because there is no descriptor."""
         return -1
 
     def read(self, wait_s: float = 0.25) -> bytes:
-        """Return the next frames."""
+        """Return the next frames; empty if the session does not wait."""
         if not self._clock.advance(wait_s):
             return b""
         count = RATE_HZ * STEP_NS // 1_000_000_000
@@ -98,33 +98,33 @@ class SimulatedPort:
         )
 
     def write(self, data: bytes) -> None:
-        """Ignore requests: this sensor sends by itself."""
+        """Ignore requests, because this sensor sends without them."""
 
     def discard_input(self) -> None:
-        """Hold nothing to discard."""
+        """Do nothing, because no input is buffered."""
 
     def reopen(self) -> None:
-        """Be open."""
+        """Do nothing, because the port is always open."""
 
     def close(self) -> None:
-        """Have nothing to close."""
+        """Do nothing, because there is nothing to close."""
 
 
 def resident_mb() -> float:
-    """Memory of this process that is in use, MB."""
+    """Return the resident memory of this process, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def peak_mb() -> float:
-    """Greatest memory that this process has had in use, MB."""
+    """Return the maximum resident memory of this process so far, MB."""
     (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
     return int(line.split()[1]) * 1024 / 1e6
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a recovery took."""
+    """The cost of a recovery: samples, wall time, processor time and peak memory."""
 
     samples: int
     seconds: float
@@ -133,7 +133,7 @@ class Cost:
 
 
 def recovered(log: Path) -> Cost:
-    """Recover a log in a separate process, and remove it as a recording's end does."""
+    """Recover a log in a separate process, and remove it as at the end of a recording."""
     command = [sys.executable, __file__, "--recover", str(log)]
     output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return Cost(**json.loads(output))
@@ -148,7 +148,7 @@ def recover_here(log: Path) -> Cost:
 
 
 def record(hours: float, points: int) -> tuple[list[tuple[float, float]], int, int, Cost]:
-    """Record; return (hours, MB) at that many equal steps, readings in the log, records dropped, and its recovery."""
+    """Record; return (hours, MB) at ``points`` times, readings in the log, dropped records, and recovery cost."""
     clock = LockstepClock()
     session = Session([Sensor(get_family("line-protocol"), SimulatedPort(clock))], clock, kind="simulated")
     seconds = hours * 3600.0
@@ -173,7 +173,7 @@ def record(hours: float, points: int) -> tuple[list[tuple[float, float]], int, i
 
 
 def main() -> int:
-    """Print memory against time; 1 where it grew."""
+    """Print memory over time; return 1 if a limit is exceeded or a reading is missing."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0, metavar="H", help="length of the run (%(default)s)")
     parser.add_argument("--limit-mb", type=float, default=8.0, metavar="MB", help="growth that is flat (%(default)s)")

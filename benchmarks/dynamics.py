@@ -1,4 +1,4 @@
-"""Speed of trajectories as ratios to named references: `python benchmarks/dynamics.py`."""
+"""Measure the speed of trajectories as ratios to named references: `python benchmarks/dynamics.py`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STEP_S, COUNT = 0.01, 12_000
 
 
 def main() -> int:
-    """Print each ratio, its reference and its limit; exit with 1 where a limit is broken."""
+    """Print each ratio, its reference and its limit; return 1 if a limit is exceeded."""
     bad = 0
     for name, reference, limit, share, ours, theirs, rounds in cases():
         mine, other = alternate(ours, theirs, rounds)
@@ -37,7 +37,7 @@ def main() -> int:
 
 
 def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable[[], object], int]]:
-    """Return name, reference, limit, share of our time that counts, the two to be timed, and how often."""
+    """Return name, reference, limit, share of our time that counts, the two calls, and the number of rounds."""
     strang, exact = get_integrator("strang"), get_integrator("exact")
     a, b, c, d = flow(8.66, 0.0073, STEP_S)
     pulse = np.zeros(COUNT + 1)
@@ -75,12 +75,12 @@ def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable
 
 
 def equal_lsoda() -> SolveIvp:
-    """Return LSODA at the tolerance at which it errs no less than Strang at the step of the samples."""
+    """Return LSODA with a third of the error of Strang splitting, which is no smaller than that of step halving."""
     return replace(LSODA, rtol=3e-10)
 
 
 def errors() -> dict[str, float]:
-    """Return the errors of the compared runs over the amplitude, against Strang splitting in a 64th of the step."""
+    """Return the maximum errors of the compared runs over the amplitude; Strang with step / 64 is the reference."""
     truth = get_integrator("strang").run(MIXED, STEP_S / 64, COUNT * 64, every=64).y
     runs = {
         "strang": get_integrator("strang").run(MIXED, STEP_S, COUNT),

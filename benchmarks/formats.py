@@ -1,8 +1,8 @@
-"""Speed and memory of reading old recordings, as ratios to named readers within one run: `make bench`.
+"""Measure speed and memory of reading old recordings, as ratios to named readers within one run: `make bench`.
 
-Each pair runs alternately, each call in a separate process, and the least of each side is compared: for cold starts
-the processor time of the whole process, for files that of the call alone and the peak of resident memory.
-Processor time (user and system, of all threads) is what a call costs whoever else runs on the machine.
+The two sides of a pair alternate, each call runs in a separate process, and the minima of both sides are compared. For
+cold starts this is the processor time of the whole process; for files it is that of the call alone, or the peak
+resident memory. Processor time (user and system, of all threads) does not depend on other programs on the machine.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LOAD = (
     "from springmass.runs.loading import load as f; "
     "import storage.run_file.reading, acquisition.recordings.families.motion_sensor"
 )
-AGAIN = f"; g = f; f = lambda p: [g(p) for _ in range({TIMES})]"  # a short file is read again and again, warm
+AGAIN = f"; g = f; f = lambda p: [g(p) for _ in range({TIMES})]"  # a short file is read repeatedly, warm
 PANDAS = "import pandas; f = lambda p: pandas.read_csv(p, sep='\\t', skiprows=1, engine='c')"
 LVM = "import acquisition.recordings.families.motion_sensor, acquisition.recordings.families.lvm; "
 LVM += "from acquisition.recordings.identify import open_recording; "
@@ -51,7 +51,7 @@ COLD = "import sys\n{setup}\nkept = f(sys.argv[1])"
 
 @dataclass(frozen=True)
 class Ratio:
-    """One ratio of ours to another's, with its limit."""
+    """One ratio of our cost to that of another reader, with its limit."""
 
     name: str
     limit: float
@@ -59,10 +59,10 @@ class Ratio:
     theirs: Callable[[], float]
     rounds: int = 5
     calls: int = 1
-    """Calls of each side per process; with several, the time of one is printed in ms."""
+    """Number of calls of each side per process; if there are several, the time of one call is printed in ms."""
 
     def take(self, rounds: int | None = None) -> tuple[float, float]:
-        """Return the least of each side, taken in turn."""
+        """Return the minimum of each side; the two sides alternate."""
         best = [float("inf"), float("inf")]
         for _ in range(rounds or self.rounds):
             for side, call in enumerate((self.ours, self.theirs)):
@@ -71,7 +71,7 @@ class Ratio:
 
 
 def write_motion_sensor(path: Path, rows: int, seed: int = 0) -> Path:
-    """Write a MotionSensor.vi position file of so many rows at 100 Hz."""
+    """Write a MotionSensor.vi position file with ``rows`` rows at 100 Hz."""
     rng = np.random.default_rng(seed)
     with path.open("w", newline="") as file:
         file.write("Motion Sensor Data File Sep 20, 2018 1:40 PM\r\nTime (s)\tDistance (cm)\tDist Error (cm)\r\n")
@@ -99,7 +99,7 @@ def write_lvm(path: Path, rows: int, seed: int = 0) -> Path:
 
 
 def timed(setup: str, path: Path, what: int) -> Callable[[], float]:
-    """Return a call that reads a file in a separate process: its seconds (0) or its peak memory, KiB (1)."""
+    """Return a call that reads a file in a separate process and returns its time, s (0), or peak memory, KiB (1)."""
 
     def call() -> float:
         code = TIMED.format(setup=setup)
@@ -112,7 +112,7 @@ def timed(setup: str, path: Path, what: int) -> Callable[[], float]:
 
 
 def cold(setup: str, path: Path) -> Callable[[], float]:
-    """Return a call that times a whole process; both sides find their modules compiled, as installed ones are."""
+    """Return a call that times a whole process; both sides use compiled modules, as after an installation."""
     environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(path.parent / "compiled"), "PYTHONDONTWRITEBYTECODE": ""}
 
     def call() -> float:
@@ -126,7 +126,7 @@ def cold(setup: str, path: Path) -> Callable[[], float]:
 
 
 def ratios(folder: Path, cold_rows: int, long_rows: int, lvm_rows: int) -> Iterator[Ratio]:
-    """Yield every ratio, over files written into a folder."""
+    """Yield every ratio, to be measured on files written into a folder."""
     from springmass.runs.loading import load
     from storage.run_file.writing import write_run
 
@@ -143,12 +143,12 @@ def ratios(folder: Path, cold_rows: int, long_rows: int, lvm_rows: int) -> Itera
     yield Ratio(f"{name}, seconds", 10.0, timed(OPEN, long, 0), timed(PANDAS, long, 0))
     yield Ratio(f"{name}, peak memory", 2.0, timed(OPEN, long, 1), timed(PANDAS, long, 1), 1)
     yield Ratio(f"LVM, {lvm_rows} rows: ours / lvm_read", 1.0, timed(LVM, lvm, 0), timed(LVM_READ, lvm, 0))
-    # A run file is verified whenever it is loaded: unpacking and hashing the original's bytes is three fifths of it.
+    # A run file is verified at every load: unpacking and hashing the original's bytes take three fifths of the time.
     yield Ratio(f"{long_rows} rows: run file / its text", 1 / 2, timed(LOAD, run, 0), timed(LOAD, long, 0), 9)
 
 
 def main() -> int:
-    """Print each ratio with its limit; exit with 1 where a limit is broken."""
+    """Print each ratio with its limit; return 1 if a limit is exceeded."""
     over = 0
     with tempfile.TemporaryDirectory(prefix="springmass-bench-") as folder:
         for each in ratios(Path(folder), COLD_ROWS, LONG_ROWS, LVM_ROWS):

@@ -1,7 +1,8 @@
-"""Twenty records of two minutes: one joint table, and their reports.
+"""Measure the analysis of twenty records of two minutes: one joint table, and their reports.
 
-Run ``python benchmarks/many.py``: processor and wall time of ``springmass analyse`` over twenty files, warm (a second
-call in this process), without reports; and per run and core with reports by a process a core.
+Run ``python benchmarks/many.py``. It prints the wall and processor time of ``springmass analyse`` over twenty files,
+warm (after a first call in this process) and without reports. It also prints the time per run and core with reports,
+which are made by one process per core.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ SECONDS = 120
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """What a call took.
+    """The cost and output of a call.
 
     Parameters
     ----------
     wall_s, processor_s : float
-        The latter of this process and its children.
+        Wall time, and processor time of this process and its children, s.
     table : str
-        What was printed.
+        The printed text.
     """
 
     wall_s: float
@@ -55,7 +56,7 @@ def recordings(folder: Path, runs: int = RUNS, seconds: int = SECONDS) -> list[P
 
 
 def analysed(paths: list[Path], out: Path, *options: str) -> Taken:
-    """Call the command in this process, and take its times."""
+    """Run the command in this process and measure its times."""
     printed = io.StringIO()
     before, start = _processor_s(), time.perf_counter()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):

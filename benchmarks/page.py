@@ -1,10 +1,11 @@
-"""What the page costs while a bench records: processor time, memory, and the time from a reading to a viewer.
+"""Measure the cost of the page during a recording: processor time, memory, and the delay from a reading to a viewer.
 
-Prints a line for each figure. The recording is a simulated bench at 100 Hz behind a pseudo-terminal; viewers are
-sockets that read all they are sent, in this process, or a browser (``--browser``), whose screen is drawn.
+Prints a line for each figure. The recording is a simulated bench at 100 Hz behind a pseudo-terminal. The viewers are
+sockets in this process that read everything they receive, or a browser (``--browser``) that draws the page.
 ``--history H`` plays H hours in a browser and prints the time between frames.
-``--floor`` tells what the server alone costs, without springmass, that sends one viewer as many bytes as often.
-``--suspend S`` lets one viewer read nothing for so long; ``--slip`` compares the sampler with and without the page.
+``--floor`` measures a bare server without springmass that sends the same amount to one viewer at the same rate.
+``--suspend S`` makes one viewer stop reading for S seconds.
+``--slip`` compares the time stamps of the sampler with and without the page.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ mass_kg = 0.01
 displacement_m = 0.05
 """
 SETTLED_S = 6.0
-"""So long the history and what the first analysis loads take."""
+"""Time for sending the history and for loading the modules of the first analysis, s."""
 DRAWN = """() => {
   window.drawn = [];
   let seen = samples[0].count;
@@ -87,7 +88,7 @@ FRAMES = """(count) => new Promise((done) => {
 
 @dataclass(frozen=True)
 class Bench:
-    """A recording that runs."""
+    """A running recording."""
 
     address: str
     page: int
@@ -106,7 +107,7 @@ class Bench:
 
 @contextmanager
 def recording(folder: Path, *, page: bool = True, seconds: float | None = None) -> Iterator[Bench | None]:
-    """Record a simulated bench, with its page or without."""
+    """Record a simulated bench, with or without its page."""
     scene = folder / "bench.toml"
     scene.write_text(SCENE)
     command = ["record", "--simulate", str(scene), "-o", str(folder / "run.h5")]
@@ -132,7 +133,7 @@ def recording(folder: Path, *, page: bool = True, seconds: float | None = None) 
 
 
 def _sockets(bench: Bench) -> dict[str, object]:
-    """Return how to open a socket of the page."""
+    """Return the arguments that open a socket of the page."""
     parts = urlsplit(bench.address)
     connection = http.client.HTTPConnection(parts.netloc)
     connection.request("GET", f"/?{parts.query}")
@@ -147,7 +148,7 @@ def _sockets(bench: Bench) -> dict[str, object]:
 
 
 def measure(seconds: float, viewers: int, suspended_s: float = 0.0) -> dict[str, float]:
-    """Return shares of a core, the lag of samples at their viewers, s, and what a suspended viewer costs, MB and s."""
+    """Return shares of a core, the lag of samples at a viewer, s, and the cost of a suspended viewer, MB and s."""
     with tempfile.TemporaryDirectory() as folder, recording(Path(folder)) as bench:
         assert bench is not None
         return _watch(bench, seconds, viewers, suspended_s)
@@ -197,12 +198,12 @@ def _watch(bench: Bench, seconds: float, viewers: int, suspended_s: float) -> di
     for thread in threads:
         thread.join()
     lag = came - taken
-    lag -= lag.min()  # the earliest counts as no lag: clocks of two processes have no common zero
+    lag -= lag.min()  # the minimum counts as zero, because the two clocks have no common origin
     return {**found, "p50_s": float(np.median(lag)), "p95_s": float(np.quantile(lag, 0.95))}
 
 
 def floor(seconds: float) -> float:
-    """Return the share of a core of a server that does nothing but send samples to one viewer at the page's pace."""
+    """Return the share of a core of a bare server that sends samples to one viewer at the page's rate."""
     from websockets.sync.client import connect
 
     from springmass.page.web.server import TURN_S
@@ -222,7 +223,7 @@ def floor(seconds: float) -> float:
 
 
 def screen(seconds: float) -> dict[str, float]:
-    """Return the time from the host's stamp of a sample to the frame that shows it, in headless Chromium, s."""
+    """Return the delay from a sample's host time to its frame in headless Chromium, s, and shares of a core."""
     from tests.browser import headless
 
     with tempfile.TemporaryDirectory() as folder:
@@ -240,14 +241,14 @@ def screen(seconds: float) -> dict[str, float]:
         with open_run(Path(folder) / "run.h5") as run:
             samples = run.samples()
     assert samples.host_ns is not None
-    offset_s = time.time() - time.monotonic()  # the stamps' clock is the monotonic one
+    offset_s = time.time() - time.monotonic()  # the time stamps come from the monotonic clock
     stamped = np.interp(drawn[:, 1], samples.t, samples.host_ns * 1e-9 + offset_s)
     lag = drawn[:, 0] - stamped
     return {"cpu": cpu, "serving": serve, "p50_s": float(np.median(lag)), "p95_s": float(np.quantile(lag, 0.95))}
 
 
 def history(hours: float, frames: int = 240) -> dict[str, float]:
-    """Return the time between frames while ``hours`` are played, s: with all of them in view, and with one minute."""
+    """Return the time between frames while ``hours`` are played, s: with all hours in view, and with one minute."""
     from tests.browser import headless
 
     with tempfile.TemporaryDirectory() as folder, headless() as browser:
@@ -279,7 +280,7 @@ def history(hours: float, frames: int = 240) -> dict[str, float]:
 
 
 def slip(seconds: float, *, page: bool) -> float:
-    """Return by how much the sampler's stamps slip against the sensor's clock, 99th percentile, s."""
+    """Return the 99th percentile of the sampler's delay relative to the sensor's clock, s."""
     with tempfile.TemporaryDirectory() as folder:
         with recording(Path(folder), page=page, seconds=None if page else seconds) as bench:
             if bench is not None:
@@ -299,7 +300,7 @@ def _listed(found: dict[str, float]) -> str:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure, and print the results."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--viewers", type=int, default=1)

@@ -1,12 +1,13 @@
-"""What reading many ports costs and whether it keeps its limits: ``python benchmarks/ports.py``.
+"""Measure the cost of reading many ports and check its limits: ``python benchmarks/ports.py``.
 
-A separate process writes the line protocol to pseudo-terminals, with the moment of sending as the device's clock; so
-the processor time counted is the reader's alone, and each sample tells how long it took from the wire until it was
-decoded. They are read as ``springmass record`` reads them: one thread reads every port, puts what came into the
-recorder's queue and gives it to the port's chain.
+A separate process writes the line protocol to pseudo-terminals, with the time of sending as the device's clock. So the
+measured processor time is that of the reader alone, and each sample shows its delay from sending to decoding. The
+ports are read as in ``springmass record``: one thread reads every port, puts the bytes into the recorder's queue and
+passes them to the port's chain.
 
-The limits: 16 ports at 100 Hz and one at 1 kHz with no sample lost, and half the samples decoded within a millisecond
-of being sent. Each figure is printed over its limit; the exit code is 1 where one of them is exceeded.
+The limits apply to one port at 100 Hz, one port at 1 kHz and 16 ports at 100 Hz. No sample may be lost, and half of
+the samples must be decoded within a millisecond of sending. The median delay is printed relative to its limit; the
+exit code is 1 if a limit is exceeded.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
 
 PLANS = ((1, 100.0), (1, 1000.0), (16, 100.0))
-"""Ports, and readings per second of each, Hz."""
+"""Number of ports, and readings per second of each port, Hz."""
 LIMIT_MS = 1.0
 WRAP_US = 1 << 32
 BAUD = 115200
@@ -49,7 +50,7 @@ SETTLE_S, PATIENCE_S, LOOK_S = 0.5, 10.0, 1.0
 
 @dataclass(frozen=True)
 class Figures:
-    """What one plan gave: samples, processor time per second, and delays from the wire to the sample."""
+    """The results of one plan: samples, processor time per second, and delays from the wire to the sample."""
 
     received: int
     expected: int
@@ -60,11 +61,11 @@ class Figures:
 
     @property
     def broken(self) -> bool:
-        """Whether a limit is."""
+        """Whether a sample is lost or the median delay exceeds its limit."""
         return not (self.received == self.recorded == self.expected and self.p50_ms <= LIMIT_MS)
 
     def line(self, name: str) -> str:
-        """Return one row for people."""
+        """Return the results as a line of text."""
         count = f"{self.received} of {self.expected} samples, {self.recorded} in the log"
         ratio = f"{self.p50_ms / LIMIT_MS:.2f} of its limit"
         delay = f"wire to sample p50 {self.p50_ms:.3f} ms ({ratio}), p99 {self.p99_ms:.3f} ms"
@@ -72,7 +73,7 @@ class Figures:
 
 
 class TimedTee(Tee):
-    """What a recording puts between ports, recorder and chains; it notes when the readings of a wake-up were there."""
+    """A recording's link between ports, recorder and chains that also measures the delay of each reading."""
 
     def __init__(self, chains: Sequence[SensorChain]) -> None:
         super().__init__(chains)
@@ -80,16 +81,16 @@ class TimedTee(Tee):
         self.delays_us: list[int] = []
 
     def reads(self, reads: Sequence[Read]) -> None:
-        """Take what one wake-up read."""
+        """Pass on the reads of one wake-up, and measure the delays of their readings."""
         super().reads(reads)
         now_us = time.monotonic_ns() // 1000
         for channel in {channel for channel, _, _ in reads}:
-            # The device stamps each line with the moment of sending.
+            # The device stamps each line with its time of sending.
             self.delays_us += [(now_us - reading.device_us) % WRAP_US for reading in self._timed[channel].last]
 
 
 def measure(*, ports: int, rate_hz: float, seconds: float) -> Figures:
-    """Record so many ports for so long."""
+    """Record ``ports`` ports for ``seconds`` seconds, and return the results."""
     command = [sys.executable, os.path.abspath(__file__), "--send"]
     command += ["--ports", str(ports), "--rate", str(rate_hz), "--seconds", str(seconds)]
     with (
@@ -139,7 +140,7 @@ def measure(*, ports: int, rate_hz: float, seconds: float) -> Figures:
 
 
 def send(ports: int, rate_hz: float, seconds: float) -> None:
-    """Write frames to pseudo-terminals, the ports evenly spread over each step; say how many."""
+    """Write frames to pseudo-terminals, with the ports evenly spread over each step; print the number of frames."""
     pairs = [pty.openpty() for _ in range(ports)]
     for _, slave in pairs:
         tty.setraw(slave)
@@ -161,11 +162,11 @@ def send(ports: int, rate_hz: float, seconds: float) -> None:
             )
             os.write(master, frame)
     print(steps * ports, flush=True)
-    sys.stdin.readline()  # the ports stay until everything is read
+    sys.stdin.readline()  # keep the ports open until everything is read
 
 
 def main() -> int:
-    """Send, or measure every plan; 1 where a limit is broken."""
+    """Send frames, or measure every plan; return 1 if a limit is exceeded."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=20.0, metavar="S", help="of each plan (%(default)s)")
     parser.add_argument("--send", action="store_true", help=argparse.SUPPRESS)

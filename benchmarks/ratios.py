@@ -1,9 +1,9 @@
-"""Speed as ratios to named references, all within one run: `make bench`.
+"""Measure speed as ratios to named references, all within one run: `make bench`.
 
-A time says nothing without the machine it was taken on; the ratio of two, taken in turn on one machine, does. Each
-pair is run alternately and the minimum of each side is taken, which is what the code costs without its neighbours.
-Fits and analyses run on one thread of linear algebra each; what the same analysis takes with a library's own number of
-threads, on a quiet machine and next to two busy loops, is a separate case.
+A time depends on the machine on which it was measured, so each time is compared with another one from the same
+machine. The two sides of a pair alternate, and the minimum of each is used, because it is least affected by other
+programs. Fits and analyses use one linear-algebra thread each. A separate case measures the analysis with the
+libraries' default number of threads, on a quiet machine and next to two busy loops.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ REAL = {
         {"channel": "position", "unit": "m"},
     ),
 }
-"""Real recordings, measured if they are at hand, with the reading options that each needs."""
+"""Real recordings, which are used if they are available, with their reading options."""
 LIMITS = {"fast": 1.0, "standard": 3.0, "best": 6.0}
 BUSY_LIMIT, BUSY_LOOPS = 3.0, 2
 TABLE = {".txt": "sep='\\t', header=1, usecols=[0, 1]", ".csv": "sep=';', usecols=[0, 1]"}
@@ -52,7 +52,7 @@ fit = lmfit.Model(model).fit(
 )
 print(len(y), fit.params["frequency"].value)
 """
-"""What a user would write for one file: read it by pandas, fit it by lmfit."""
+"""A script that a user would write for one file: read it with pandas and fit it with lmfit."""
 CHILD = """
 import json, sys, time
 from springmass import analyse, load
@@ -69,16 +69,17 @@ print(best)
 
 @dataclass(frozen=True)
 class Case:
-    """A pair to be timed.
+    """A pair of calls to be timed.
 
     Parameters
     ----------
     name, reference : str
     limit : float
-        Of the ratio.
+        Maximum ratio of the two times.
     times : callable
-        Of a number of rounds to the least seconds of the two.
+        Takes the number of rounds and returns the minimum time of each call, s.
     rounds : int
+        Default number of rounds.
     """
 
     name: str
@@ -89,7 +90,7 @@ class Case:
 
 
 def main() -> int:
-    """Print each ratio, its reference and its limit; exit with 1 where a limit is broken."""
+    """Print each ratio, its reference and its limit; return 1 if a limit is exceeded."""
     bad = 0
     for case in cases():
         mine, other = case.times(case.rounds)
@@ -104,7 +105,7 @@ def main() -> int:
 
 
 def cases() -> Iterator[Case]:
-    """Yield every pair; those of real recordings where they are at hand."""
+    """Yield every pair, including those of real recordings if they are available."""
     python = sys.executable
     program = str(Path(python).parent / "springmass")
     bundled = sample_data() / "damped_simulated_position.txt"
@@ -134,7 +135,7 @@ def cases() -> Iterator[Case]:
 
 
 def tier(accuracy: str, limit: float, name: str, track: Track, scene: Scene) -> Case:
-    """Return one accuracy on one record, everything from track to findings, against one lmfit fit."""
+    """Return the case of one accuracy on one record: the analysis from track to findings, against one lmfit fit."""
     params = params_for(accuracy)
     there = np.isfinite(track.t) & np.isfinite(track.y)
     return pair(
@@ -155,7 +156,7 @@ def clean_record() -> Track:
 
 
 def damped_sine(t: np.ndarray, y: np.ndarray) -> Callable[[], object]:
-    """Return one lmfit fit of a damped sine, started as a user would: from a look at the graph."""
+    """Return a call that fits a damped sine with lmfit from start values that a user could read off a graph."""
 
     def model(t, amplitude, gamma, frequency, phase, offset):  # type: ignore[no-untyped-def]
         return offset + amplitude * np.exp(-gamma * t) * np.cos(2 * np.pi * frequency * t + phase)
@@ -173,7 +174,7 @@ def damped_sine(t: np.ndarray, y: np.ndarray) -> Callable[[], object]:
 
 
 def beside_busy_loops(path: Path, options: Mapping[str, str], rounds: int) -> tuple[float, float]:
-    """Return the least seconds of an analysis in a separate process, next to busy loops and quiet."""
+    """Return the minimum times of an analysis in a separate process, next to busy loops and without them, s."""
     quiet = in_a_process(path, options, rounds)
     loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY_LOOPS)]
     try:
@@ -185,13 +186,13 @@ def beside_busy_loops(path: Path, options: Mapping[str, str], rounds: int) -> tu
 
 
 def in_a_process(path: Path, options: Mapping[str, str], rounds: int) -> float:
-    """Return the least seconds of an analysis, s, with whatever number of threads its libraries choose."""
+    """Return the minimum time of an analysis in a separate process, with its libraries' number of threads, s."""
     command = [sys.executable, "-c", CHILD, str(path), str(rounds), json.dumps(options)]
     return float(subprocess.run(command, check=True, capture_output=True, env=plain()).stdout)
 
 
 def plain() -> dict[str, str]:
-    """Return a user's environment: no number of threads is set, and modules are compiled once, not at every start."""
+    """Return a user's environment: the number of threads is not set, and compiled modules are kept between starts."""
     kept = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     kept.pop("PYTHONDONTWRITEBYTECODE", None)
     return kept
@@ -205,12 +206,12 @@ def process(*command: str) -> Callable[[], object]:
 def pair(
     name: str, reference: str, limit: float, ours: Callable[[], object], theirs: Callable[[], object], rounds: int
 ) -> Case:
-    """Return a case of two calls, timed in turn."""
+    """Return a case of two calls that are timed alternately."""
     return Case(name, reference, limit, lambda rounds: alternate(ours, theirs, rounds), rounds)
 
 
 def alternate(ours: Callable[[], object], theirs: Callable[[], object], rounds: int) -> tuple[float, float]:
-    """Return the shortest time of each, s, taken in turn."""
+    """Return the minimum time of each call, s; the two calls alternate."""
     best = [float("inf"), float("inf")]
     with threadpool_limits(1):
         for _ in range(rounds):

@@ -1,9 +1,9 @@
-"""What a recording costs and keeps, over its limit of 4 % of a core: `python benchmarks/recording.py`.
+"""Measure the cost of a recording relative to its limit of 4 % of a core: `python benchmarks/recording.py`.
 
-A simulated sensor runs in a separate process; `springmass record` reads it twice, for a short and a long run. The
-difference of the two is the recording with what its readings cost in the run file built at its end, without the start.
-Both are done with the progress line going nowhere, and with it on a terminal. The exit code is 1 where the limit is
-exceeded or a reading is missing.
+A simulated sensor runs in a separate process; `springmass record` reads it twice, in a short and a long run. The
+difference of the two is the cost of recording and of building the run file at the end, without that of the start.
+Both runs are made with the progress line discarded, and again with the progress line on a terminal. The exit code is 1
+if the limit is exceeded or a reading is missing.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pathlib import Path
 from springmass import load
 
 LIMIT = 0.04
-"""Of a core, for one sensor at 100 Hz."""
+"""Maximum share of a core, for one sensor at 100 Hz."""
 
 SENSOR = """
 import sys
@@ -41,7 +41,7 @@ with VirtualPort(get_family("line-protocol"), finder, SystemClock(), seconds=360
 
 
 def main() -> int:
-    """Record a short and a long run, without and with a terminal; print samples and CPU; 1 where a limit is broken."""
+    """Record short and long runs, without and with a terminal; print samples and CPU; return 1 if one fails."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--short", type=int, default=5, metavar="S", help="seconds of the short run (%(default)s)")
     parser.add_argument("--long", type=int, default=125, metavar="S", help="seconds of the long run (%(default)s)")
@@ -64,7 +64,7 @@ def main() -> int:
 
 
 def measure(port: str, seconds: int, *, terminal: bool) -> tuple[int, int, float]:
-    """Record once; return samples, gaps and CPU seconds."""
+    """Record once; return the numbers of samples and gaps, and the processor time, s."""
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "run.h5"
         command = ["record", "--port", port, "--sensor", "line-protocol", "--seconds", str(seconds), "-o", str(run)]
@@ -81,7 +81,7 @@ def measure(port: str, seconds: int, *, terminal: bool) -> tuple[int, int, float
 
 @contextlib.contextmanager
 def _stderr(terminal: bool) -> Iterator[int]:
-    """Give where the progress line goes: nowhere, or a terminal that somebody reads."""
+    """Yield the destination of the progress line: the null device, or a terminal whose output is read."""
     if not terminal:
         yield subprocess.DEVNULL
         return
@@ -97,7 +97,7 @@ def _stderr(terminal: bool) -> Iterator[int]:
 
 
 def _read_on(master: int) -> None:
-    """Read until the other side is closed, which a pseudo-terminal says with an error."""
+    """Read until the other side is closed, which a pseudo-terminal reports as an error."""
     with contextlib.suppress(OSError):
         while os.read(master, 4096):
             pass

@@ -1,4 +1,4 @@
-"""Time a comparison of 24 and of 100 runs of one spring, two of them exchanged: ``python benchmarks/springs.py``."""
+"""Time the comparison of 24 and 100 runs of one spring, two of them exchanged: ``python benchmarks/springs.py``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STIFFNESS = 15.0
 
 
 def runs_of(count: int, rng: np.random.Generator) -> list[SpringRun]:
-    """Return runs with bobs of 0.1 to 0.4 kg; the masses of the second and of the last one are exchanged."""
+    """Return runs with bobs of 0.1 to 0.4 kg; the masses of the second and the last run are exchanged."""
     typed = np.linspace(0.1, 0.4, count)
     hung = typed.copy()
     hung[[1, -1]] = hung[[-1, 1]]
@@ -31,7 +31,7 @@ def runs_of(count: int, rng: np.random.Generator) -> list[SpringRun]:
 
 
 def main() -> None:
-    """Print one line a case: runs, seconds, and which runs are exchanged."""
+    """Print one line per case: number of runs, seconds, exchanged runs and spring constant."""
     for count in (24, 100):
         runs = runs_of(count, np.random.default_rng(count))
         for spring in (None, Estimate(SPRING_KG, 1e-4, "kg")):

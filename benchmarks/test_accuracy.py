@@ -1,4 +1,4 @@
-"""The accuracy benchmark in its short form: every requirement is measured, and none is missed by a wide margin."""
+"""Test the accuracy benchmark in its short form: every requirement is measured, and none fails by a wide margin."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import pytest
 from benchmarks.accuracy import checks
 
 SEEDS = 8
-# What is measured; the names are those of `--only`.
+# The parts of the benchmark, by the names that `--only` accepts.
 PARTS = ("efficiency", "damping", "laws", "echoes", "weak", "invariance", "ranges")
 
 
 def test_every_part_is_tested() -> None:
-    """The list here is that of the command."""
+    """The list in this module equals the list of the command."""
     assert tuple(checks.CHECKS) == PARTS
 
 
 @pytest.mark.trials
 @pytest.mark.parametrize("part", PARTS)
 def test_requirements_hold_in_short_form(part: str) -> None:
-    """With few seeds no limit is exceeded by more than their scatter allows."""
+    """With few seeds, no limit is exceeded by more than the scatter allows."""
     lines = list(checks.CHECKS[part](checks.Bench(SEEDS, map)))
     assert lines
     missed = [f"{line.what}: {line.measured}, {line.limit}" for line in lines if not line.ok]
@@ -40,12 +40,12 @@ def test_requirements_hold_in_short_form(part: str) -> None:
     ],
 )
 def test_a_share_beyond_its_scatter_fails(share: float, count: int, low: float, high: float, ok: bool) -> None:
-    """Three standard errors are allowed beyond a limit, not more."""
+    """A measured share may exceed its limit by at most three standard errors."""
     assert checks.share_line("share", share, count, low, high).ok is ok
 
 
 def test_errors_beyond_the_limit_fail() -> None:
-    """Errors of 1.3 bounds with a bias of a quarter and intervals half as wide break every limit of a tier."""
+    """Errors of 1.3 bounds, a bias of a quarter of a bound and uncertainties of half a bound exceed every limit."""
     rng = np.random.default_rng(1)
     error = 1.3 * rng.standard_normal(2000) + 0.25
     lines = list(checks.quantity_lines("", error, np.full(2000, 0.5), "best"))

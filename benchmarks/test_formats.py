@@ -1,4 +1,4 @@
-"""Every ratio of benchmarks/formats.py can be taken; with timing off, over short files."""
+"""Test on short files, without timing limits, that every ratio of benchmarks/formats.py can be measured."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from benchmarks import formats
 
 @pytest.mark.trials
 def test_every_ratio_can_be_taken(tmp_path):
-    """Each reader reads its file in a separate process and returns its time."""
+    """Each reader reads its file in a separate process and returns its time or memory."""
     taken = [(each.name, each.limit, each.take(1)) for each in formats.ratios(tmp_path, 1200, 2500, 300)]
     assert len(taken) == 6
     for name, limit, (ours, theirs) in taken:
@@ -20,7 +20,7 @@ def test_every_ratio_can_be_taken(tmp_path):
 
 
 def test_the_files_it_writes_are_recordings(tmp_path):
-    """Reading gives as many samples as rows were written, at the rate they were written at."""
+    """Reading returns one sample per written row, at the sampling rate of the file."""
     motion = open_recording(formats.write_motion_sensor(tmp_path / "run.txt", 2500))
     assert (motion.format, len(motion.samples), motion.info.rate_hz) == ("motion-sensor", 2500, 100.0)
     lvm = open_recording(formats.write_lvm(tmp_path / "run.lvm", 300), channel="Acceleration_1", unit="m")
@@ -28,7 +28,7 @@ def test_the_files_it_writes_are_recordings(tmp_path):
 
 
 def test_reading_a_long_text(benchmark, tmp_path):
-    """A hundred thousand rows give as many samples, none flagged."""
+    """A hundred thousand rows give a hundred thousand samples, of which none is flagged."""
     path = formats.write_motion_sensor(tmp_path / "run.txt", 100_000)
     recording = benchmark(open_recording, path)
     assert len(recording.samples) == 100_000

@@ -1,4 +1,4 @@
-"""What ``import springmass`` costs, beside ``import numpy`` in the same interpreter."""
+"""Compare the cost of ``import springmass`` with that of ``import numpy`` in the same interpreter."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ print((middle - start) / (time.process_time() - middle))
 
 
 def test_importing_springmass_takes_no_longer_than_importing_numpy() -> None:
-    """By processor time, the least of a few fresh interpreters; springmass goes first and pays for what both need."""
+    """The minimum ratio of processor times is at most 1; springmass is first and also loads the shared modules."""
     ratios = []
     for _ in range(ROUNDS):
         done = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True)

@@ -1,4 +1,4 @@
-"""The benchmark of the page runs."""
+"""Test that the benchmark of the page runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from benchmarks import page
 
 @pytest.mark.trials
 def test_the_page_is_measured() -> None:
-    """Two viewers for two seconds: samples arrive, a suspended one gets them later, and the page's process is found."""
+    """Two viewers receive samples for two seconds, a suspended one receives them later, and all costs are measured."""
     found = page.measure(2.0, 2, 1.0)
     assert 0.0 <= found["cpu"] < 1.5
     assert 0.0 <= found["p50_s"] <= found["p95_s"]

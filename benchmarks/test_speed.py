@@ -1,4 +1,4 @@
-"""The benchmarked calls as tests: with timing off they still must run and give what they should."""
+"""Test the benchmarked calls without timing limits: they must run and give the expected results."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from springmass.runs.scenes import read_scene
 
 @pytest.fixture(scope="module")
 def damped():
-    """The damped bundled recording and its scene."""
+    """Return the bundled damped recording and its scene."""
     data = sample_data()
     return load(data / "damped_simulated_position.txt").track, read_scene(data / "damped.scene.toml")
 
@@ -24,14 +24,14 @@ def test_reading_a_text_recording(benchmark):
 
 
 def test_the_whole_analysis(benchmark, damped):
-    """The analysis at standard accuracy selects the law that made the record."""
+    """The analysis at standard accuracy selects the law with which the record was simulated."""
     result = benchmark(analyse, *damped)
     assert result.motion.damping.selected == "linear+quadratic"
 
 
 @pytest.mark.trials
 def test_every_ratio_can_be_taken():
-    """Each pair of the ratio table runs, so that `make bench` does not rot."""
+    """Each pair of the ratio table runs, so that `make bench` keeps working."""
     for case in ratios.cases():
         mine, other = case.times(1)
         assert mine > 0, case.name

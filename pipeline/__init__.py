@@ -1,14 +1,18 @@
 """Stages from a track to findings: only arithmetic, no input or output.
 
-The rooms in the order in which data flows; each imports only from those before it::
+The packages are listed in the order of the data flow; each imports only from those above it::
 
-    track, errors   one run as arrays; what a stage refuses
-    numerics/       least squares, regression, spectra, random walks, estimates: knows nothing of springs
-    bench/          scene, air, instrument: what is known beforehand
-    oscillation/    samples to amplitude, phase and rest position against time
-    damping/        amplitudes to the laws by which they fall
+    track, errors   one run as arrays; the errors that stages raise
+    numerics/       least squares, regression, spectra, random walks, estimates; independent of springs
+    registry/       the names of estimates, budget inputs, effects and laws
+    bench/          scene, air and instrument: what is known before the analysis
+    samples/        which samples a fit may use
+    windows/        amplitude, phase and rest position once per period
+    damping/        the laws by which the amplitudes decay
     dynamics/       the equation of motion and its integrators
-    motion/         which kind of motion it is, and the fit for that kind
-    results/        checks/ of the record against itself before a number is believed; estimates, effects, findings
-    analyse         the line through the rooms; accuracy: its presets; streaming: the same while samples still come
+    motion/         the kind of motion, and the fit for that kind
+    checks/         tests of the record against its own model
+    results/        estimates with their budgets, effects, curves, comparisons
+    findings/       what is reported about a run, in words
+    analyse         runs all stages in order; accuracy has its presets, and streaming runs it during a recording
 """

@@ -1,4 +1,4 @@
-"""Accuracy: the tiers between which a user trades time for error, each a set of options of the one path."""
+"""Accuracy: tiers that trade computing time for accuracy, each a set of options of the same analysis."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def params_for(accuracy: str) -> Params:
     Raises
     ------
     AnalysisError
-        If there is no such tier.
+        If no tier has this name.
 
     Examples
     --------

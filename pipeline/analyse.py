@@ -1,8 +1,7 @@
-"""The line of analysis: from a track to estimates and findings, one stage after the other.
+"""The analysis: from a track to estimates and findings, one stage after the other.
 
-Follow a sample from the top of :func:`analyse` to its end. Each line is a stage: a pure function with its own options.
-A stage that runs again, on fewer samples or without what was found, is called here again. The names of the stages are
-those of the modules that hold them.
+Read :func:`analyse` from top to bottom. Each stage is a pure function with its own options, and is named after its
+module. If a stage must run again, on fewer samples or after a disturbance was removed, it is called here again.
 """
 
 from __future__ import annotations
@@ -75,8 +74,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     ----------
     track : Track
     scene : Scene, optional
-        What is known of the bench; left out, nothing is. Its damping law is the stated one, unless ``params`` state
-        another.
+        What is known about the bench; by default nothing. Its damping law counts as the stated law unless ``params``
+        states another.
     params : Params, optional
 
     Returns
@@ -116,7 +115,7 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     windows, disturbances = separate(samples, cycles, windows, params.disturbances, params.demodulate)
     damping = fit_damping(windows, _start_s(samples, windows.angular_frequency), params.damping)
 
-    # Strong damping, or friction that stops the bob, needs the equation of motion itself, not its average over a cycle.
+    # For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.
     solved = fit_equation(samples, windows, damping, params.motion, params.damping, stopped=part.stopped)
     if _may_be_overdamped(windows, damping, solved, params):
         relaxed = find_overdamped(samples, params.relaxation)
@@ -142,8 +141,8 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
 class _FreePart:
     """The part of a recording that oscillates freely.
 
-    ``samples`` is the whole recording with the samples outside the part flagged, ``segments`` says which part that is
-    (None: all of it), and ``stopped`` whether friction stopped the bob within it.
+    ``samples`` contains the whole recording, in which samples outside the part are flagged. ``segments`` describes the
+    part (None for the whole recording), and ``stopped`` says whether friction stopped the bob in it.
     """
 
     samples: Conditioned
@@ -153,10 +152,11 @@ class _FreePart:
 
 
 def _free_part(samples: Conditioned, params: Params) -> _FreePart | NoOscillation:
-    """Leave out, one after the other, the time before trigger and release, long after the stop, and all but one part.
+    """Find the part that oscillates freely, without the time before the release and long after the stop.
 
-    After each step the samples are conditioned again: what was left out may have hidden the plateaus and the noise of
-    the part that stays.
+    The time before the trigger, the time before the release, the time long after the stop, and all but one free part
+    are left out in this order. The samples are conditioned again after each step, because the part left out may have
+    hidden the plateaus and the noise of the rest.
     """
     segments = None
     release = partial(before_release, periods=params.segments.held_periods)
@@ -182,7 +182,7 @@ def _free_part(samples: Conditioned, params: Params) -> _FreePart | NoOscillatio
 
 
 def _cycles(samples: Conditioned, params: Params, share: float) -> tuple[Cycles | NoOscillation, bool]:
-    """Return the cycles, of the moving part if the bob stops within a share of the samples, and whether it does."""
+    """Return the cycles and whether the bob stops before a share of the samples; if so, those of the moving part."""
     cycles = find_cycles(samples, params.cycles)
     moving = moving_part(samples, params.late if isinstance(cycles, NoOscillation) else share)
     if moving is None or isinstance(trimmed := find_cycles(moving, params.cycles), NoOscillation):
@@ -191,14 +191,14 @@ def _cycles(samples: Conditioned, params: Params, share: float) -> tuple[Cycles 
 
 
 def _start_s(samples: Conditioned, omega: float) -> float:
-    """Time for which amplitude and phase are stated, s: of the part's first row, though an echo may stand there.
+    """Return the time at which amplitude and phase are stated, s: that of the first row, even if it is a false echo.
 
-    Where more than a period is missing at the start it is the time of the first sample used. A single false echo must
-    not move it.
+    If at least one period is missing at the start, it is the time of the first sample used. A single false echo at the
+    start must not change the time.
     """
     track = samples.track
     first = float(track.t[np.argmax(samples.used)])
-    # A row whose time is wrong begins nothing.
+    # A row with a wrong time cannot be the start.
     out = Quality.OUTSIDE | Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME | Quality.MALFORMED
     rows = ((samples.flags & np.uint8(out)) == 0) & (track.t <= first)
     begin = float(np.min(track.t[rows], initial=first))
@@ -208,7 +208,7 @@ def _start_s(samples: Conditioned, omega: float) -> float:
 def _may_be_overdamped(
     windows: Demodulated, damping: Damping, solved: EquationFit | EquationMisfit | None, params: Params
 ) -> bool:
-    """Whether the damping is strong and, as far as the equation of motion was solved, linear."""
+    """Return whether the damping is strong and, if the equation of motion was fitted, linear."""
     linear = not isinstance(solved, EquationFit) or solved.damping.best is solved.damping.of_powers(1)
     return linear and damping.best.rate_at_start() / windows.angular_frequency > params.relaxation.least_damping
 
@@ -221,7 +221,7 @@ def _oscillation(
     scene: Scene,
     params: Params,
 ) -> Analysis:
-    """Return what follows from an oscillation, however it was fitted: checks, results and findings, in this order."""
+    """Run checks, results and findings, in this order, for an oscillation fitted by any method."""
     track, unit = samples.track, samples.track.unit
     fitted = fitted.in_unit(unit)
     windows, damping, phase, disturbances = fitted.demodulated, fitted.damping, fitted.phase, fitted.disturbances
@@ -235,7 +235,7 @@ def _oscillation(
     plausible = check_plausibility(samples, windows, phase, params.checks.plausibility)
     misfits += plausible.misfits
     found += plausibility_findings(plausible, track)
-    # Strong damping bends every period, which would look like harmonics, and its fit is of the whole motion already.
+    # Strong damping distorts every period, which would look like harmonics; its fit describes the whole motion anyway.
     residuals = residuals_of(samples, windows, disturbances, phase) if by_windows else None
     unexplained = residuals
     if residuals is not None:
@@ -250,7 +250,7 @@ def _oscillation(
             found.append(held_finding(held.count, held.interval_s, unit))
             unexplained = None
         elif not windows.noise_m > max(rounding_m, (samples.quantum_m or 0.0) / COARSE):
-            unexplained = None  # rounding, or steps, which the finding quantised reports
+            unexplained = None  # rounding, or coarse steps, which the finding "quantised" reports
         elif (
             smoothed := find_joined(samples, residuals, params.checks.sensor)
             or find_smoothing(residuals, params.checks.sensor)
@@ -304,15 +304,15 @@ def _oscillation(
 
 
 def _settling_fit(fitted: Fitted, samples: Conditioned, params: Params) -> Callable[[], Fitted] | None:
-    """Return the fit of the whole waveform, to be made where windows contradict themselves; None for long runs."""
+    """Return a function that fits the whole waveform if the halves disagree; None if it was fitted or is too long."""
     if not params.settle or fitted.full is not None or len(samples.track) > params.most_settled:
         return None
-    # Only the selected law is fitted: the comparison needs amplitude and phase, and no choice among laws.
+    # Only the selected law is fitted: the comparison needs amplitude and phase, but no selection among laws.
     return lambda: fit_waveform(fitted, samples, WaveformParams(besides=())).in_unit(samples.track.unit)
 
 
 def _without_period(samples: Conditioned, why: NoOscillation, scene: Scene, params: Params) -> Analysis:
-    """Classify a recording without a period: a relaxation, two modes that hide each other, or a bob at rest."""
+    """Classify a recording without a clear period: a relaxation, two modes of similar strength, or a bob at rest."""
     relaxed = find_overdamped(samples, params.relaxation)
     if isinstance(relaxed, Overdamped):
         return _overdamped(samples, relaxed, scene, params)
@@ -322,13 +322,13 @@ def _without_period(samples: Conditioned, why: NoOscillation, scene: Scene, para
 
 
 def _overdamped(samples: Conditioned, found: Overdamped, scene: Scene, params: Params) -> Analysis:
-    """Return a motion that damping ends within a few cycles or without any."""
+    """Return the analysis of a motion that damping ends within a few cycles, or before one cycle is complete."""
     estimates = {**_at_rest(samples), **found.estimates, **spring_constant(found, scene)}
     return _ended(samples, found, (overdamped_finding(found),), estimates, scene, params)
 
 
 def _two_modes(samples: Conditioned, two: TwoModes, scene: Scene, params: Params) -> Analysis:
-    """Return a recording of two oscillations, neither of which is the motion."""
+    """Return the analysis of a recording of two oscillations, neither of which is the main one."""
     finding = Finding(
         "two_modes",
         "error",
@@ -340,7 +340,7 @@ def _two_modes(samples: Conditioned, two: TwoModes, scene: Scene, params: Params
 
 
 def _still(samples: Conditioned, why: NoOscillation, scene: Scene, params: Params) -> Analysis:
-    """Return a recording without any motion to fit."""
+    """Return the analysis of a recording without a motion to fit."""
     findings = [Finding("no_oscillation", "error", f"No oscillation: {why.why}.")]
     if (held := held_count(samples)) > 1:
         findings.append(held_finding(held, held / samples.track.rate_hz, samples.track.unit))
@@ -366,16 +366,16 @@ def _ended(
 
 
 def _at_rest(samples: Conditioned) -> dict[str, Estimate]:
-    """Mean and noise of the samples used."""
+    """Return the mean and the noise of the samples used."""
     y, noise_m, unit = samples.track.y[samples.used], samples.noise_m, samples.track.unit
     if not y.size:
         raise AnalysisError("no usable sample is left; see the counts of flagged samples")
-    # Where the distance steps or creeps, neighbours are alike: their number would make the mean look certain.
+    # If the distance steps or creeps, neighbouring samples are correlated: the mean is less certain than n suggests.
     u = float(np.std(y) * np.sqrt(correlation_length(y) / y.size))
-    # A sensor at rest between two steps gives all but a few distances alike, and these few were taken for echoes.
+    # A sensor with coarse steps gives nearly all distances alike at rest; the few others were flagged as false echoes.
     every = samples.track.y[np.isfinite(samples.track.y)]
     if (quantum_m := coarsest_step(np.sort(every), samples.quantum_m) or 0.0) > COARSE * noise_m:
-        u = float(np.hypot(u, quantum_m / np.sqrt(12.0)))  # rounding that noise does not average out
+        u = float(np.hypot(u, quantum_m / np.sqrt(12.0)))  # rounding error, which noise does not average out
     return {
         "offset": Estimate(float(np.mean(y)), u, unit),
         "noise": Estimate(noise_m, noise_m / np.sqrt(2.0 * y.size), unit),

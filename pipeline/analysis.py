@@ -27,7 +27,7 @@ __all__ = ["Analysis", "Motion", "Oscillation", "Overdamped", "Still"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Oscillation(Fitted):
-    """An oscillation, strongly damped or not: the fit, and what follows from it.
+    """An oscillation, strongly damped or not: its fit and the results derived from it.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ class Oscillation(Fitted):
 
 @dataclass(frozen=True, slots=True)
 class Still:
-    """A recording without a motion that these stages can fit.
+    """A recording without a motion that the stages can fit.
 
     Parameters
     ----------
     why : str
-        One sentence.
+        The reason, one sentence.
     """
 
     why: str
@@ -57,7 +57,7 @@ Motion = Oscillation | Overdamped | Still
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysis:
-    """One run, analysed.
+    """The analysis of one run.
 
     Parameters
     ----------
@@ -66,12 +66,13 @@ class Analysis:
     params : Params
     conditioned : Conditioned
     motion : Oscillation, Overdamped or Still
-        Of an overdamped motion ``estimates`` hold the rates, of a still one offset and noise alone.
+        For an overdamped motion, ``estimates`` contains the relaxation rates. For a still bob it contains only the
+        offset and the noise, and for two overlapping modes their periods and amplitudes as well.
     effects : tuple of Effect
     findings : tuple of Finding
-        Gravest first.
+        The most severe first.
     estimates : mapping of str to Estimate
-        By names of :data:`pipeline.registry.quantities.QUANTITIES`.
+        The keys are names in :data:`pipeline.registry.quantities.QUANTITIES`.
 
     Raises
     ------
@@ -94,17 +95,17 @@ class Analysis:
 
     @property
     def flags(self) -> U8:
-        """(n,) uint8: the final flags of every sample."""
+        """The final flags of all samples, (n,) uint8."""
         return self.motion.demodulated.flags if isinstance(self.motion, Oscillation) else self.conditioned.flags
 
     @property
     def quality(self) -> dict[str, int]:
-        """Counts of samples by flag, and of those used."""
+        """The number of samples with each flag, and the number of samples used."""
         return count_quality(self.flags)
 
     @one_thread
     def smoothed(self) -> Smoothed:
-        """Position, velocity and acceleration at every sample with their uncertainties; calculated when called.
+        """Return position, velocity and acceleration at every sample, with their uncertainties.
 
         Raises
         ------

@@ -1,14 +1,14 @@
-"""The error tree of the pipeline.
+"""The exception hierarchy of the pipeline.
 
 ::
 
     PipelineError
-    |-- SceneError      a scene says something impossible (file, key, value, what is allowed)
-    |-- TrackError      arrays that are no track: lengths differ, no finite sample, not one-dimensional
-    |-- AnalysisError   a track that a stage cannot work on (too short, no motion)
-    `-- DynamicsError   a motion that cannot be computed: coefficient, start, step, tolerance or method
+    |-- SceneError      a scene contains an impossible value (file, key, value, what is allowed)
+    |-- TrackError      arrays do not form a track: different lengths, not one-dimensional, an unknown quantity
+    |-- AnalysisError   a stage cannot process a track (too short, no motion)
+    `-- DynamicsError   a motion cannot be computed: coefficient, start, step, tolerance or method
 
-Every message is one line: where, what is wrong, what was given, and what to do.
+Every message is one line. It says where the error is, what is wrong, which value was given, and what to do.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ __all__ = ["AnalysisError", "DynamicsError", "PipelineError", "SceneError", "Tra
 
 
 class PipelineError(Exception):
-    """Anything that the pipeline refuses; its text is a single line meant for the user."""
+    """Base class of all errors that the pipeline raises; the message is a single line for the user."""
 
 
 class SceneError(PipelineError):
@@ -25,12 +25,12 @@ class SceneError(PipelineError):
 
 
 class TrackError(PipelineError):
-    """Arrays that do not make a track."""
+    """Arrays that do not form a track."""
 
 
 class AnalysisError(PipelineError):
-    """A track that a stage cannot work on; the message names the stage."""
+    """A track that a stage cannot process; the message says why."""
 
 
 class DynamicsError(PipelineError):
-    """A motion that cannot be computed as asked: a coefficient, start, step, tolerance or method, or a blow-up."""
+    """A motion that cannot be computed: an invalid coefficient, start, step, tolerance or method, or a divergence."""

@@ -21,7 +21,7 @@ class CheckParams:
     Parameters
     ----------
     harmonics, sensor, model, plausibility
-        Of the checks in :mod:`pipeline.checks` of those names.
+        Options of the checks with the same names in :mod:`pipeline.checks`.
     """
 
     harmonics: harmonics.Params = field(default_factory=harmonics.Params)
@@ -37,21 +37,22 @@ class Params:
     Parameters
     ----------
     condition, cycles, demodulate, segments, disturbances, damping, phase, derive, relaxation, motion, checks
-        Of the stages of those names.
+        Options of the stages with the same names.
     full : pipeline.motion.waveform_fit.Params, optional
-        Of the fit of the whole waveform; None leaves it out.
+        Options of the fit of the whole waveform; None omits this fit.
     settle : bool
-        Whether the whole waveform is fitted where the halves of a run contradict the model of the windows.
+        Whether the whole waveform is also fitted if the two halves of a run contradict the model fitted to the windows.
     most_settled : int
-        Samples of a run up to which that is done though nobody asked for it: 50,000 take about a second.
+        Maximum number of samples for which ``settle`` applies: the fit takes about a second for 50,000 samples.
     most_parts : int
-        Times that a freely moving part is looked for within the part found before.
+        Maximum number of times that a freely moving part is sought within the part found before.
     early, late : float
-        Shares of the samples used. A bob that stops before the first share is looked at without its rest; one that
-        stops before the second, only where the whole recording shows no oscillation.
+        Shares of the samples used. If the bob stops before the share ``early``, its rest is left out. If it stops later
+        but before ``late``, its rest is left out only if the whole recording shows no oscillation, or if a time at rest
+        was already left out.
     beating : float
-        Share of the amplitude by which periods miss the oscillation fitted, from which two modes are tried: where one
-        is a third of the other, the middle of the motion is off by as much.
+        Threshold for trying a fit of two modes: the share of the amplitude by which typical periods differ from the
+        fitted oscillation. The typical difference is about this large if one mode is a third of the other.
     """
 
     condition: condition.Params = field(default_factory=condition.Params)

@@ -1,7 +1,7 @@
-"""Streaming: period and amplitude while the samples still come, by the same stages as afterwards.
+"""Streaming: period and amplitude during a recording, by the same stages as in a batch analysis.
 
-An accumulator takes samples with ``push``, gives the motion with ``value`` and forgets with ``clear``. Its value is
-the analysis of the samples it holds, so that live and batch agree on the same samples to the last bit.
+An accumulator takes samples with ``push``, returns the motion with ``value`` and discards all samples with ``clear``.
+Its value is the analysis of the stored samples, so live and batch analysis of the same samples agree to the last bit.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ __all__ = ["LiveMotion", "MotionAccumulator", "NotYet"]
 
 @dataclass(frozen=True, slots=True)
 class LiveMotion:
-    """What the latest seconds say.
+    """The motion in the latest seconds.
 
     Parameters
     ----------
     period, amplitude, offset, noise : Estimate
-        As :func:`pipeline.analyse.analyse` gives them for the samples held; the amplitude at the first of them.
+        The estimates of :func:`pipeline.analyse.analyse` for the stored samples; the amplitude is that at their start.
     seconds : float
-        How long the samples held span, s.
+        Time from the first to the last stored sample, s.
     """
 
     period: Estimate
@@ -39,34 +39,34 @@ class LiveMotion:
 
 @dataclass(frozen=True, slots=True)
 class NotYet:
-    """Why there is no value.
+    """The reason why no value is available yet.
 
     Parameters
     ----------
     why : str
-        One sentence.
+        The reason, in one line.
     """
 
     why: str
 
 
 class MotionAccumulator:
-    """Holds the latest samples and analyses them on request.
+    """Buffer of the latest samples, analysed on request.
 
     Parameters
     ----------
     rate_hz : float
         Nominal samples per second, Hz.
     window_s : float
-        How many seconds to hold.
+        Duration of the stored samples, s.
     params : pipeline.analyse.Params, optional
     quantity, unit : str
-        What the samples are of.
+        Recorded quantity and its unit.
 
     Notes
     -----
-    Memory is the window's, whatever the length of the run. A value over 10 s at 100 Hz costs a few milliseconds, so
-    once a second it takes less than a hundredth of a core.
+    The memory needed depends on the window and not on the length of the run. A value over 10 s at 100 Hz takes a few
+    milliseconds, so one value a second uses less than a hundredth of a core.
     """
 
     def __init__(
@@ -86,8 +86,8 @@ class MotionAccumulator:
         self.clear()
 
     def clear(self) -> None:
-        """Forget all samples."""
-        # Twice the room: samples are moved to the front once per room, not at every push.
+        """Discard all samples."""
+        # The buffers have twice the capacity, so samples are moved to the front once per window, not at every push.
         self._t = np.empty(2 * self._room)
         self._y = np.empty(2 * self._room)
         self._flags = np.empty(2 * self._room, np.uint8)
@@ -97,7 +97,7 @@ class MotionAccumulator:
         return min(self._stop, self._room)
 
     def push(self, t: F8, y: F8, flags: U8) -> None:
-        """Take samples: times (n,) in s, values (n,) in their unit, flags (n,)."""
+        """Append samples: times (n,) in s, values (n,) in their unit, flags (n,)."""
         t, y, flags = t[-self._room :], y[-self._room :], flags[-self._room :]
         n = t.size
         if self._stop + n > self._t.size:
@@ -110,7 +110,7 @@ class MotionAccumulator:
         self._stop += n
 
     def track(self) -> Track:
-        """Return the samples held, as a batch analysis would get them."""
+        """Return the stored samples as a track, as a batch analysis would get them."""
         held = slice(max(self._stop - self._room, 0), self._stop)
         return Track(
             self._t[held].copy(),
@@ -123,7 +123,7 @@ class MotionAccumulator:
         )
 
     def value(self) -> LiveMotion | NotYet:
-        """Return the motion of the stored samples, or the reason why there is none."""
+        """Return the motion of the stored samples, or the reason why no value is available."""
         if len(self) < 16:
             return NotYet(f"{len(self)} samples so far")
         track = self.track()

@@ -1,4 +1,4 @@
-"""The pipeline's border: a track is one run as plain arrays, in SI units."""
+"""The input of the pipeline: a track is one run as plain arrays, in SI units."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ UNITS = {
     "voltage": "V",
     "number": "1",
 }
-"""What a track may be of, and the one SI unit that it is then in: `acquisition.block.UNITS`, held equal by a test."""
+"""The quantities that a track may contain, with their SI units; a test compares it with `acquisition.block.UNITS`."""
 
 
 class Quality(enum.IntFlag):
-    """Why a sample may not be taken at face value; the bits of the run file's ``quality``.
+    """Reasons to distrust a sample; the bits of ``quality`` in the run file.
 
-    The table of ``acquisition.Flag``, which the pipeline may not import (a test holds them equal), and one more that
-    the analysis alone sets: ``OUTSIDE`` the part in which one free oscillation runs.
+    The bits are those of ``acquisition.Flag``, which the pipeline may not import (a test keeps them equal), and one
+    that only the analysis sets: ``OUTSIDE``, for samples outside the part with one free oscillation.
     """
 
     MISSING = 1
@@ -46,7 +46,7 @@ class Quality(enum.IntFlag):
 
 
 UNUSABLE = ~np.uint8(Quality.GAP_BEFORE)
-"""Any of these bits keeps a sample out of a fit; a gap before a sample says nothing against it."""
+"""The bits that exclude a sample from fits: all but ``GAP_BEFORE``, which does not affect the sample itself."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,50 +58,52 @@ class Track:
     t : (n,) float64, s
         Time since the start of the run.
     y : (n,) float64
-        Distance from the sensor in m, or another quantity in its ``unit``; NaN where unmeasured. What is called ``_m``
-        here and in the stages is in that unit.
+        Distance from the sensor in m, or another quantity in ``unit``; NaN where unmeasured. Names that end in ``_m``,
+        here and in the stages, are in this unit.
     flags : (n,) uint8
-        Sums of :class:`Quality` bits known before any analysis.
+        Sums of the :class:`Quality` bits known before the analysis.
     rate_hz : float
-        Nominal samples per second, Hz.
+        Nominal sampling rate, Hz.
     sigma_m : float or None
-        Standard deviation of one distance, m, where somebody knows it; None: estimated from the record.
+        Standard deviation of one distance, m, if it is known; None if it must be estimated from the record.
     quantum_m : float or None
-        Smallest step of a distance, m.
+        Resolution of the distances, m.
     stated_error_m : float or None
-        The error column of the file, m, if there is one.
+        Error from the error column of the file, m; None if the file has no such column.
     clock : str
         "nominal", "device" or "host".
     kind : str
         "live", "replay" or "simulated".
     velocity : (n,) float64, m/s, or None
-        The velocity that the recording states.
+        Velocity from the recording.
     rate_error, u_rate_error : float or None
-        By what share the sensor's clock runs faster than the host's, and the standard uncertainty; None where nobody
-        compared the two.
+        Relative amount by which the sensor's clock runs faster than the host's, and its standard uncertainty; None if
+        the clocks were not compared.
     clock_limit : float or None
-        By what share the sensor's clock may be off at most; None where nobody says.
+        Maximum relative rate error of the sensor's clock; None if it is not stated.
     held_samples : int
-        Samples that came later than any jitter explains, in bursts behind a silence: the comparison leaves them out.
+        Number of samples that came in bursts after a stall, later than jitter explains. The comparison of the clocks
+        excludes them.
     longest_stall_s : float
-        By which the latest of them came late, s.
+        Maximum delay of these samples, s.
     compared_s : float or None
-        Over how long the clocks were compared, s; None: from the first sample to the last.
+        Duration of the comparison of the clocks, s; None if it lasts from the first sample to the last.
     speed_of_sound_m_per_s : float or None
-        That made distances of echo times, m/s; None where it is not known.
+        Speed of sound with which echo times were converted to distances, m/s; None if it is unknown.
     u_scale : float
-        Relative standard uncertainty of the distances' scale from a calibration; 0 where none was made.
+        Relative standard uncertainty of the scale of the distances, from a calibration; 0 without a calibration.
     u_offset_m : float
-        Standard uncertainty of their zero from a calibration, m; 0 where none was made.
+        Standard uncertainty of the zero of the distances, from a calibration, m; 0 without a calibration.
     quantity, unit : str
-        What ``y`` holds, of :data:`UNITS`. Only what :meth:`demand_length` guards needs a length.
+        Quantity in ``y`` and its unit, an entry of :data:`UNITS`. Only methods that call :meth:`demand_length` need a
+        length.
     trigger_s : float or None
-        Moment at which the bob was seen to leave its rest, which began the recording, s; None where nothing waited.
+        Time at which the trigger saw the bob leave its rest and started the recording, s; None without a trigger.
 
     Raises
     ------
     TrackError
-        If the quantity is not of the table, or in another unit.
+        If the quantity is not in :data:`UNITS`, or has another unit.
     """
 
     t: F8
@@ -136,11 +138,12 @@ class Track:
         return int(self.t.size)
 
     def demand_length(self, what: str) -> None:
-        """Refuse what is no length where ``what`` needs one.
+        """Raise an error if the track is no length, which ``what`` needs.
 
         Raises
         ------
         TrackError
+            If the quantity is not a length.
         """
         if self.quantity != "length":
             raise TrackError(f"{what} needs a length in m, got {self.quantity} in {self.unit}; leave it out")
@@ -159,30 +162,30 @@ class Track:
         quantity: str = "length",
         unit: str = "m",
     ) -> Track:
-        """Make a track of anything array-like.
+        """Make a track from array-like objects.
 
         Parameters
         ----------
         t : (n,) array_like, s
-            NaN, or infinite, where unknown.
+            NaN or infinite where unknown.
         y : (n,) array_like, m
             NaN where unmeasured.
         rate_hz : float, optional
-            Samples per second; left out, it is the reciprocal of the median time step.
+            Sampling rate, Hz; by default the reciprocal of the median time step.
         flags : (n,) array_like of int, optional
         sigma_m, quantum_m : float, optional
-            As the attributes.
+            As the attributes of the same names.
         kind : str
             "live", "replay" or "simulated".
         quantity, unit : str
-            What ``y`` holds.
+            Quantity in ``y`` and its unit.
 
         Raises
         ------
         TrackError
-            If the arrays are not one-dimensional or of different lengths, if fewer than two samples are
-            there, if the rate, sigma_m or quantum_m is not positive and finite, or if the quantity is none of
-            :data:`UNITS`.
+            If the arrays are not one-dimensional or have different lengths, if there are fewer than two samples, if
+            time never increases and no rate is given, if the rate, sigma_m or quantum_m is not positive and finite, or
+            if the quantity or its unit is not in :data:`UNITS`.
 
         Examples
         --------
@@ -204,7 +207,7 @@ class Track:
             if not steps.size:
                 raise TrackError("time never increases, so the rate is unknown: give rate_hz")
             rate_hz = float(np.round(1.0 / np.median(steps), 6))
-        # An infinite time is as unknown as one that is no number; only the latter passes through a cosine in silence.
+        # An infinite time is as unknown as NaN, but only NaN passes through a cosine without a warning.
         t_s[~np.isfinite(t_s)] = np.nan
         for name, value in (("rate_hz", rate_hz), ("sigma_m", sigma_m), ("quantum_m", quantum_m)):
             if value is not None and not (np.isfinite(value) and value > 0):

@@ -1,17 +1,17 @@
-"""Make the simulated recordings of this folder, byte for byte, with their truth beside them.
+"""Generate the simulated recordings of this folder, reproducibly byte for byte, and files with their true values.
 
-``python sample_data/generate.py [--check] [DIR]`` writes every file to DIR (this folder if left out);
-``--check`` writes nothing and exits with 1 where a file differs from what would be written, naming each.
+``python sample_data/generate.py [--check] [DIR]`` writes every file to DIR (by default this folder). ``--check``
+writes nothing; it names each missing or different file, and exits with 1 if there is one.
 
-The recordings judge the estimator, so nothing is imported from the packages they judge: the physics, the
-density of the air and the file format are stated here a second time, on purpose.
+The recordings test the estimator, so nothing is imported from the tested packages: the physics, the density of
+the air and the file format are deliberately implemented a second time here.
 
 Notes
 -----
-The distance is ``y(t) = offset + A(t) cos(omega (t - t_first) + phase)`` with ``omega = sqrt(k / m)``
-constant, ``m = bob + spring / 3 + (8/3) rho a^3`` (the last term the added mass of a disc of radius a in air
-of density rho) and the averaged amplitude law ``dA/dt = -(gamma A + beta A^2)``. README.md describes the
-sensor's model.
+The distance is ``y(t) = offset + A(t) cos(omega (t - t_first) + phase)`` with constant ``omega = sqrt(k / m)``.
+The mass is ``m = bob + spring / 3 + (8/3) rho a^3``, where the last term is the added mass of a disc of radius a in
+air of density rho. ``A`` follows the averaged amplitude law ``dA/dt = -(gamma A + beta A^2)``. README.md describes
+the model of the sensor.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ STATED_ERROR_CM = "0.239"  # the instrument prints this constant on every row; i
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bench:
-    """What hangs from the spring: a bob (kg), and a disc (diameter, m) or None."""
+    """The load on the spring: a bob (mass in kg), and a disc (diameter in m) or None."""
 
     scene_file: str
     bob_mass_kg: float
@@ -58,7 +58,7 @@ class Bench:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """One simulated recording; a title of None leaves both header lines out, as in a cropped file."""
+    """One simulated recording; if the title is None, both header lines are omitted, as in a cropped file."""
 
     name: str
     title: str | None
@@ -80,9 +80,9 @@ class Run:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """A run's samples: ``ticks`` (n,) of the quantum, and the rows (sorted, from 0) of each disturbance.
+    """A run's samples ``ticks`` (n,), in units of the quantum, and the sorted rows of each disturbance.
 
-    ``exact_ticks`` (n,) is the reading before it is rounded to a tick.
+    Rows are counted from 0. ``exact_ticks`` (n,) are the readings before rounding to ticks.
     """
 
     exact_ticks: F8
@@ -165,9 +165,9 @@ RUNS = (
 
 
 def air_density_kg_per_m3() -> float:
-    """Return the density of the scene's moist air as an ideal mixture (vapour by Magnus), kg/m^3.
+    """Return the density of the scene's moist air as an ideal mixture (vapour pressure by Magnus), kg/m^3.
 
-    Rounded to 1e-4: no printed digit may hang on the last bit of a library's exp.
+    It is rounded to 1e-4, so that no printed digit depends on the last bit of a library's exp.
     """
     vapour_pa = RELATIVE_HUMIDITY * 611.2 * math.exp(17.62 * TEMPERATURE_C / (243.12 + TEMPERATURE_C))
     dry_molar_kg, vapour_molar_kg, gas_constant = 0.0289647, 0.0180153, 8.314462618
@@ -176,7 +176,7 @@ def air_density_kg_per_m3() -> float:
 
 
 def added_mass_kg(bench: Bench) -> float:
-    """Return the mass of air that moves with the disc, (8/3) rho a^3; 0 without a disc."""
+    """Return the mass of air that moves with the disc, (8/3) rho a^3, in kg; 0 without a disc."""
     if bench.disc_diameter_m is None:
         return 0.0
     radius_m = bench.disc_diameter_m / 2
@@ -184,17 +184,17 @@ def added_mass_kg(bench: Bench) -> float:
 
 
 def effective_mass_kg(bench: Bench) -> float:
-    """Return bob + spring / 3 + added mass, kg."""
+    """Return the effective mass, bob + spring / 3 + added mass, in kg."""
     return bench.bob_mass_kg + SPRING_MASS_KG / 3 + added_mass_kg(bench)
 
 
 def angular_frequency_rad_per_s(bench: Bench) -> float:
-    """Return sqrt(k / m), rad/s."""
+    """Return the angular frequency sqrt(k / m), in rad/s."""
     return math.sqrt(SPRING_CONSTANT_N_PER_M / effective_mass_kg(bench))
 
 
 def scene_tables(bench: Bench) -> Tables:
-    """Return the scene's tables; the values are the true ones, ``u`` what a scale and a ruler would state."""
+    """Return the scene's tables with the true values; ``u`` is the uncertainty of a scale or ruler."""
     tables: Tables = {
         "bob": {"mass_kg": {"value": bench.bob_mass_kg, "u": 0.00005}},
         "spring": {"mass_kg": {"value": SPRING_MASS_KG, "u": 0.0005}},
@@ -214,19 +214,22 @@ def scene_tables(bench: Bench) -> Tables:
 
 
 def seconds_since_first(run: Run, samples: int) -> F8:
-    """Return (samples,) the time since the first sample, s."""
+    """Return the times since the first sample (samples,), in s."""
     return np.arange(samples) / run.rate_hz
 
 
 def amplitude(run: Run, t: F8) -> F8:
-    """Return the solution of dA/dt = -(gamma A + beta A^2) at t (n,), s since the first sample, m."""
+    """Return the amplitude (n,), in m, which solves dA/dt = -(gamma A + beta A^2).
+
+    ``t`` (n,) are the times since the first sample, in s.
+    """
     lost = -np.expm1(-run.gamma_per_s * t)
     falling: F8 = run.amplitude_m * (1 - lost)
     return falling / (1 + run.beta_per_m_s * run.amplitude_m / run.gamma_per_s * lost)
 
 
 def motion(run: Run, t: F8) -> F8:
-    """Return the true distance (n,), m, at t (n,), s since the first sample."""
+    """Return the true distances (n,), in m, at the times ``t`` (n,), in s since the first sample."""
     angle = angular_frequency_rad_per_s(run.bench) * t + run.phase_rad
     return run.offset_m + amplitude(run, t) * np.cos(angle)
 
@@ -245,13 +248,13 @@ def near_turning_rows(run: Run, samples: int) -> I8:
 
 
 def uniforms(bits: np.random.PCG64, n: int) -> F8:
-    """Return (n,) numbers in (0, 1) from the raw bits, a stream numpy promises never to change."""
+    """Return uniform numbers (n,) in (0, 1) from the raw bits, a stream that numpy promises never to change."""
     raw = np.asarray(bits.random_raw(n), dtype=np.uint64)
     return ((raw >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
 
 
 def noise(bits: np.random.PCG64, samples: int) -> tuple[F8, NDArray[np.bool_]]:
-    """Return (samples,) errors, m, and which were drawn from the wide part of the mixture."""
+    """Return errors (samples,), in m, and a mask of those drawn from the wide part of the mixture."""
     radius = np.sqrt(-2 * np.log(uniforms(bits, samples)))
     normal = radius * np.cos(2 * math.pi * uniforms(bits, samples))
     heavy = uniforms(bits, samples) < HEAVY_FRACTION
@@ -259,10 +262,10 @@ def noise(bits: np.random.PCG64, samples: int) -> tuple[F8, NDArray[np.bool_]]:
 
 
 def false_echoes(run: Run, bits: np.random.PCG64, samples: int) -> F8:
-    """Return (samples,) the displacement by false echoes, m, 0 where the echo is the bob's.
+    """Return the displacements by false echoes (samples,), in m; 0 where the echo comes from the bob.
 
-    Turning points are taken in a random order that favours large amplitudes, each with one cluster, until the
-    run's share of rows is used up.
+    Each turning point gets one cluster, in a random order that favours large amplitudes, until the run's share of
+    rows is used up.
     """
     shift = np.zeros(samples)
     turns = near_turning_rows(run, samples)
@@ -283,7 +286,7 @@ def false_echoes(run: Run, bits: np.random.PCG64, samples: int) -> F8:
 
 
 def cluster(length: int, size: float, slope: float) -> F8:
-    """Return (length,) one displacement, m: nearly constant, with a ramp of up to two rows at the ends.
+    """Return the displacements of one cluster (length,), in m: nearly constant, with ramps of up to two rows.
 
     ``size`` and ``slope`` are in (0, 1).
     """
@@ -296,7 +299,7 @@ def cluster(length: int, size: float, slope: float) -> F8:
 
 
 def measure(run: Run) -> Record:
-    """Return what the sensor reads: motion, limit, false echoes and noise, rounded to ticks of the timer."""
+    """Return the sensor's readings: motion, limit, false echoes and noise, rounded to ticks of the timer."""
     samples = max(run.rows, run.velocity_rows or 0)
     bits = np.random.PCG64(run.seed)
     errors, heavy = noise(bits, samples)
@@ -314,7 +317,7 @@ def measure(run: Run) -> Record:
 
 
 def rows_where(condition: NDArray[np.bool_], rows: int) -> list[int]:
-    """Return the row numbers below ``rows`` at which the condition (n,) holds."""
+    """Return the row numbers below ``rows`` at which the condition (n,) is true."""
     found: list[int] = np.flatnonzero(condition[:rows]).tolist()
     return found
 
@@ -323,20 +326,20 @@ def rows_where(condition: NDArray[np.bool_], rows: int) -> list[int]:
 
 
 def three_decimals(numerator: int, denominator: int) -> str:
-    """Return numerator / denominator with three decimals, by whole numbers; a half rounds away from 0."""
+    """Return numerator / denominator with three decimals by integer arithmetic; a half is rounded away from 0."""
     thousandths = (2000 * abs(numerator) + denominator) // (2 * denominator)
     sign = "-" if numerator < 0 and thousandths else ""
     return f"{sign}{thousandths // 1000}.{thousandths % 1000:03d}"
 
 
 def text_file(run: Run, columns: str, rows: Sequence[str]) -> bytes:
-    """Return the file's bytes: header lines, rows, CRLF between them and nothing after the last."""
+    """Return the file's bytes: header lines and rows, with CRLF between them and nothing after the last one."""
     header = [] if run.title is None else [run.title, columns]
     return "\r\n".join([*header, *rows]).encode("ascii")
 
 
 def position_file(run: Run, record: Record) -> bytes:
-    """Return the position file: nominal time (s), distance (cm), the constant error column (cm)."""
+    """Return the position file: nominal time (s), distance (cm) and the constant error column (cm)."""
     times = (three_decimals(run.first + i, run.rate_hz) for i in range(run.rows))
     distances = (three_decimals(tick * run.quantum_nm, 10**7) for tick in record.ticks[: run.rows].tolist())
     rows = [f"{t}\t{distance}\t{STATED_ERROR_CM}" for t, distance in zip(times, distances, strict=True)]
@@ -344,7 +347,7 @@ def position_file(run: Run, record: Record) -> bytes:
 
 
 def velocity_file(run: Run, record: Record) -> bytes:
-    """Return the velocity file: nominal time (s), backward difference of the unprinted distance (cm/s)."""
+    """Return the velocity file: nominal time (s) and backward difference of the distance before printing (cm/s)."""
     steps = np.diff(record.ticks[: run.velocity_rows]).tolist()
     speeds = ["NaN", *(three_decimals(step * run.quantum_nm * run.rate_hz, 10**7) for step in steps)]
     rows = [f"{three_decimals(run.first + i, run.rate_hz)}\t{speed}" for i, speed in enumerate(speeds)]
@@ -352,7 +355,7 @@ def velocity_file(run: Run, record: Record) -> bytes:
 
 
 def truth_values(run: Run) -> dict[str, dict[str, object]]:
-    """Return what was put in, name to value and unit; amplitude, phase, damping rate at the first sample."""
+    """Return the true values and units by name; amplitude, phase and damping rate are those at the first sample."""
     omega = angular_frequency_rad_per_s(run.bench)
     rate = run.gamma_per_s + run.beta_per_m_s * run.amplitude_m
     values: dict[str, tuple[float, str]] = {
@@ -377,7 +380,7 @@ def truth_values(run: Run) -> dict[str, dict[str, object]]:
 
 
 def truth_file(run: Run, record: Record, files: Sequence[str]) -> bytes:
-    """Return the truth as JSON, one line a quantity and one line a list of rows."""
+    """Return the true values as JSON, with one line per quantity and one line per list of rows."""
     content: dict[str, object] = {
         "kind": "simulated",
         "format": "MotionSensor.vi",
@@ -412,7 +415,7 @@ def truth_file(run: Run, record: Record, files: Sequence[str]) -> bytes:
 
 
 def json_lines(content: Mapping[str, object], indent: str = "") -> str:
-    """Return a JSON object with one line a key, objects opened to one further level."""
+    """Return a JSON object with one line per key; nested objects are expanded by one level."""
     lines = []
     for key, value in content.items():
         inner = json_lines(value, indent + "  ") if isinstance(value, dict) and not indent else json.dumps(value)
@@ -436,13 +439,13 @@ def toml_value(value: object) -> str:
 
 
 def format_number(value: object) -> str:
-    """Return a number without an exponent, so that 0.00005 does not read 5e-05."""
+    """Return a number without an exponent, so that 0.00005 is not written as 5e-05."""
     text = f"{value:.6f}".rstrip("0") if isinstance(value, float) else str(value)
     return text + "0" if text.endswith(".") else text
 
 
 def run_files(run: Run) -> dict[str, bytes]:
-    """Return the files of one run, name to bytes."""
+    """Return the bytes of each file of one run, by name."""
     record = measure(run)
     files = {f"{run.name}_position.txt": position_file(run, record)}
     if run.velocity_rows is not None:
@@ -451,7 +454,7 @@ def run_files(run: Run) -> dict[str, bytes]:
 
 
 def every_file() -> dict[str, bytes]:
-    """Return all that belongs in the folder, name to bytes."""
+    """Return the bytes of each file that belongs in the folder, by name."""
     files = {bench.scene_file: scene_file(bench) for bench in (UNDAMPED, DAMPED)}
     for run in RUNS:
         files |= run_files(run)
@@ -462,7 +465,7 @@ def every_file() -> dict[str, bytes]:
 
 
 def check(folder: Path, files: Mapping[str, bytes]) -> int:
-    """Name on stderr each file that is missing or differs; return 1 if there is one, else 0."""
+    """Print on stderr each file that is missing or differs; return 1 if there is one, otherwise 0."""
     wrong = 0
     for name, content in files.items():
         path = folder / name
@@ -477,7 +480,7 @@ def check(folder: Path, files: Mapping[str, bytes]) -> int:
 
 
 def write(folder: Path, files: Mapping[str, bytes]) -> int:
-    """Write the files, the folder made if need be; return 0."""
+    """Write the files, creating the folder if necessary; return 0."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
@@ -485,7 +488,7 @@ def write(folder: Path, files: Mapping[str, bytes]) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write or check the files; return the exit code, 3 where the folder cannot be used."""
+    """Write or check the files; return the exit code, which is 3 if the folder cannot be used."""
     parser = argparse.ArgumentParser(description="Write the simulated recordings and their truth.")
     parser.add_argument("folder", nargs="?", type=Path, default=HERE, metavar="DIR", help="where (default: here)")
     parser.add_argument("--check", action="store_true", help="compare instead of writing; exit 1 where files differ")

@@ -1,7 +1,7 @@
 """springmass: from a rangefinder's samples to period, spring constant and damping law.
 
-The program puts acquisition, pipeline and storage together: `cli` takes a line apart, `commands` do the work by `runs`,
-`session`, `report` and `trade`. These names are what scripts may rely on; everything else may move.
+The program combines acquisition, pipeline and storage. `cli` runs a command line, and `commands` do the work by means
+of `runs`, `session`, `report` and `trade`. Scripts may rely on the names exported here; everything else may move.
 
 Examples
 --------
@@ -63,7 +63,7 @@ __all__ = [
     "write_run",
 ]
 
-# Name to module: loaded on first use, so that `springmass --help` waits for none of them.
+# The module of each public name. It is imported on first use, so that `springmass --help` need not wait for it.
 _WHERE = {
     "Analysis": "springmass.api.analysis",
     "Comparison": "springmass.api.sources",

@@ -1,4 +1,4 @@
-"""The program: it calls a command, turns what goes wrong into one line on stderr, and returns the exit code."""
+"""The program: it calls a command, reports an error as one line on stderr, and returns the exit code."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line and return its exit code; a user's mistake is one line on stderr, and so is a defect."""
+    """Run a command line and return its exit code; a user's error and a program defect each give one line on stderr."""
     before = manner()
     try:
         return _run(arguments)
@@ -37,8 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    # A title or a name that the terminal's code lacks is shown escaped. Line by line, so that both streams come in the
-    # order they were written in where they go to one place.
+    # Characters that the terminal's encoding lacks are shown escaped. Line buffering keeps the order of both streams
+    # when they go to the same place.
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace", line_buffering=True)
@@ -55,7 +55,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         complain(NO_MEMORY)
         return UNREADABLE
     except BrokenPipeError:
-        # The reader of our output went away (`| head`): nothing is left to say, not even at exit.
+        # The reader of the output has closed the pipe (`| head`): print nothing more, not even at exit.
         _abandon_output()
         return OK
     except Exception as error:
@@ -75,7 +75,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _call(words: Sequence[str]) -> int:
-    """Call a command; a mistake on the command line and a question of a reader are worded here, for both need it."""
+    """Call a command; word command-line errors and a reader's questions, because both need the command line."""
     from cyclopts import CycloptsError
 
     from springmass.command_line import COMMANDS, call, without_reading
@@ -99,17 +99,17 @@ def _call(words: Sequence[str]) -> int:
 
 
 _OUTPUT_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
-"""Why a system refuses to write to standard output."""
+"""Error numbers with which a system refuses to write to standard output."""
 
 
 def _abandon_output() -> None:
-    """Send what is left of standard output nowhere, so that Python's own exit does not fail on it."""
+    """Redirect the rest of standard output to the null device, so that Python's exit does not fail on it."""
     with contextlib.suppress(OSError, ValueError):  # a stream without a descriptor has nothing that could fail
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _exit_code(error: Exception) -> int | None:
-    """Exit code of an error that is meant for the user; None for a defect of the program."""
+    """Return the exit code of an error that is meant for the user, or None for a defect of the program."""
     if isinstance(error, ProgramError):
         return error.exit_code
     from acquisition.errors import AcquisitionError, CalibrationError, PortError, SensorError

@@ -56,7 +56,7 @@ Shell = Literal["bash", "zsh", "fish", "powershell"]
 
 
 def _argument(name: str, words: str, *, required: bool | None = None) -> Parameter:
-    """Return an argument, which has a place and no option."""
+    """Return the declaration of a positional argument."""
     return Parameter(name=name, metavar=name, help=words, required=required)
 
 
@@ -113,7 +113,7 @@ def _begin(
 
 
 def _renamed(words: Sequence[str]) -> list[str]:
-    """Return a command line in which the options of version 0.1 have their present names, and ``-`` is no option."""
+    """Return a command line with the option names of version 0.1 replaced, and ``-`` replaced by the path of stdin."""
     end = words.index("--") if "--" in words else len(words)
     now = "--folder" if words[0] == "simulate" else "--output"
     return [STDIN if word == "-" else re.sub(r"^--out(?==|$)", now, word) for word in words[:end]] + list(words[end:])
@@ -132,7 +132,7 @@ def call(words: Sequence[str]) -> int:
     Raises
     ------
     cyclopts.CycloptsError
-        If the words are no command line.
+        If the words are not a valid command line.
     """
     return int(app.meta(list(words), exit_on_error=False, print_error=False, result_action="return_value") or OK)
 
@@ -146,7 +146,7 @@ def _read(*, read: ChannelOptions = ChannelOptions()) -> ChannelOptions:
 
 
 def without_reading(words: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Return a command line without the options that say how to read a recording, and those options.
+    """Return a command line without the options for reading a recording, and these options as a dictionary.
 
     Examples
     --------

@@ -1,11 +1,11 @@
-"""Exit codes of the program, and which error leads to which.
+"""Exit codes of the program and the errors that lead to them.
 
 ====  ================================================================
 0     everything done
 1     some inputs failed, others were done
-2     usage: an option or a scene that cannot be
-3     an input that cannot be read or holds nothing to analyse
-4     sensor or port, or a disk that takes nothing more of a recording
+2     usage: an invalid option or scene
+3     an input that cannot be read or contains nothing to analyse
+4     sensor, port or calibration error, or a nearly full disk
 5     rejected under ``--strict``
 70    internal error: a defect of the program
 130   Ctrl-C, with the file closed cleanly
@@ -48,12 +48,12 @@ NO_MEMORY = "there is not enough memory; end other programs, or raise the limit"
 
 
 class ProgramError(Exception):
-    """One line for the user, and the exit code that goes with it.
+    """An error for the user: a message of one line and an exit code.
 
     Parameters
     ----------
     message : str
-        Where, what is wrong, the value, and what to do.
+        Where the error is, what is wrong, the value, and what to do.
     exit_code : int
         One of the codes above.
     """
@@ -63,41 +63,41 @@ class ProgramError(Exception):
         self.exit_code = exit_code
 
     def __reduce__(self) -> tuple[type[ProgramError], tuple[str, int]]:
-        """Return how it is made again where it arrives from another process."""
+        """Return how to rebuild the error in another process that receives it."""
         return type(self), (str(self), self.exit_code)
 
 
 def complain(message: object) -> None:
-    """Write one line to stderr, also where a file's name or a library's message breaks over several."""
+    """Write a message to stderr as one line, even if a file name or a library's message contains line breaks."""
     _write(f"springmass: {' '.join(str(message).splitlines())}")
 
 
 def tell(message: str) -> None:
-    """Write one line to stderr, control characters in it made visible; nothing under ``-q``."""
+    """Write one line to stderr with control characters made visible, unless ``-q`` is set."""
     if not _quiet:
         _write(message)
 
 
 def detail(message: str) -> None:
-    """Write one line to stderr on what is being done, under ``-v`` only."""
+    """Write one line about the current step to stderr, only under ``-v``."""
     if _verbose:
         _write(message)
 
 
 def manner() -> tuple[bool, bool]:
-    """Return whether this process says but what is wrong, and whether it says what is done, too."""
+    """Return whether this process prints only errors and warnings, and whether it also prints details."""
     return _quiet, _verbose
 
 
 def adopt(quiet: bool, verbose: bool) -> None:
-    """Be as quiet or as verbose as :func:`manner` says of another command or of the process that began this one."""
+    """Set quiet and verbose to what :func:`manner` returned earlier, or in the process that started this one."""
     global _quiet, _verbose
     _quiet, _verbose = quiet, verbose
 
 
 @contextlib.contextmanager
 def quietly() -> Iterator[None]:
-    """Say nothing but what is wrong until the ``with`` ends."""
+    """Print only errors and warnings until the ``with`` block ends."""
     global _quiet
     before, _quiet = _quiet, True
     try:
@@ -107,12 +107,12 @@ def quietly() -> Iterator[None]:
 
 
 def internal_error(error: BaseException) -> str:
-    """Return one line on a defect of the program; its traceback goes to a file, or to stderr where none can be written.
+    """Return one line about a program defect; write its traceback to a file, or to stderr if that fails.
 
     Parameters
     ----------
     error : BaseException
-        As it was caught.
+        The exception that was caught.
     """
     import tempfile
     import traceback
@@ -131,7 +131,7 @@ def internal_error(error: BaseException) -> str:
 
 
 def suggest(command: str) -> None:
-    """Say what to type next, where somebody watches."""
+    """Print the next command to type, if stderr is a terminal."""
     with contextlib.suppress(OSError, ValueError):
         if sys.stderr is not None and sys.stderr.isatty():
             tell(f"next: {command}")
@@ -140,5 +140,5 @@ def suggest(command: str) -> None:
 def _write(message: str) -> None:
     from acquisition.errors import visible  # its package imports numpy, which `--help` does not need
 
-    with contextlib.suppress(OSError, ValueError):  # nobody hears it; the exit code still says what it was
+    with contextlib.suppress(OSError, ValueError):  # stderr cannot be written; the exit code still reports the error
         print(visible(message), file=sys.stderr)

@@ -1,4 +1,4 @@
-"""Everything that a package of your own needs to add a sensor, a format, a damping law or an integrator.
+"""Everything that your own package needs to add a sensor, a format, a damping law or an integrator.
 
 These names are public: they keep their meaning until a changelog says otherwise, in a checkout and in an installed
 wheel alike. Import them from here; the modules that define them may move.
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-# As in springmass/__init__.py nothing is imported before it is used.
+# As in springmass/__init__.py, nothing is imported before its first use.
 if TYPE_CHECKING:
     from acquisition.block import Block, Flag
     from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll

@@ -1,4 +1,4 @@
-"""The words of springmass: one meaning for each, for the glossary page and the end of a report."""
+"""The terms of springmass, each with one meaning, for the glossary page and the end of a report."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ __all__ = ["TERMS", "Term"]
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A word and what it means here.
+    """A term and its meaning in springmass.
 
     Parameters
     ----------
     name : str
-        In lower case, apart from proper names; singular.
+        Singular, in lower case apart from proper names.
     meaning : str
         One or two sentences of plain text.
     symbol : str or None
-        The symbol in tables and figures; None where there is none.
+        The symbol in tables and figures; None if the term has none.
     of_program : bool
-        Whether it is about files and programs, not about results. A report omits these.
+        Whether the term is about files and programs rather than results. A report omits such terms.
     """
 
     name: str
@@ -164,4 +164,4 @@ TERMS: tuple[Term, ...] = (
     Term("window", "The samples of one period or a few that give one amplitude and one phase."),
     Term("wire log", "The file NAME.wire with every byte of the sensor, written during a recording.", of_program=True),
 )
-"""All terms, in the order of the alphabet."""
+"""All terms, in alphabetical order."""

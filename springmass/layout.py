@@ -1,4 +1,4 @@
-"""Where the parts of the program are: next to ``springmass`` in a checkout, inside it when installed from a wheel."""
+"""Locations of the program's parts: next to ``springmass`` in a checkout, inside it when installed from a wheel."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from pathlib import Path
 __all__ = ["PACKAGES", "PREFIX", "STDIN", "part", "static_file"]
 
 STDIN = "<stdin>"
-"""The path that stands for standard input, ``-`` on the command line."""
+"""The path that represents standard input, which is ``-`` on the command line."""
 PACKAGES = ("acquisition", "pipeline", "storage")
 
 _HOME = Path(__file__).resolve().parent
 
 PREFIX = "springmass." if (_HOME / PACKAGES[0]).is_dir() else ""
-"""What stands before the name of each of the packages when it is imported."""
+"""The prefix of each package's name in an import."""
 
 
 def part(name: str) -> Path:
-    """Return the folder of one of the packages, or of the bundled recordings; whether it exists is not checked.
+    """Return the folder of one of the packages or of the bundled recordings, without checking that it exists.
 
     Examples
     --------
@@ -28,7 +28,7 @@ def part(name: str) -> Path:
 
 
 def static_file(name: str) -> Path:
-    """Return a file that browsers get: a script, a style or a picture.
+    """Return the path of a file for browsers: a script, a style sheet or a picture.
 
     Examples
     --------

@@ -1,7 +1,8 @@
 """The options of every command, each declared once: name, type, range, help.
 
-A command takes a few of these dataclasses; the command line flattens them into options. How a recording is read is
-declared in :mod:`springmass.runs.options`. docs/reference/command-line.md is generated from these declarations.
+A command takes a few of these dataclasses; the command line flattens them into options. The options for reading a
+recording are declared in :mod:`springmass.runs.options`. docs/reference/command-line.md is generated from these
+declarations.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def _option(metavar: str, words: str, *names: str) -> Parameter:
 
 
 def _output(metavar: str, words: str) -> Parameter:
-    """Return the option that names what is written."""
+    """Return the option that names the output."""
     return _option(metavar, words, "-o", "--output")
 
 
@@ -147,7 +148,7 @@ BENCH = {
     ("disc", "diameter_m"): ("disc_diameter_m", "disc_diameter_u_m"),
     ("air", "temperature_c"): ("temperature_c", "temperature_u_c"),
 }
-"""Table and key of the scene to the fields of :class:`BenchOptions` for its value and its standard uncertainty."""
+"""Table and key of the scene, mapped to the fields of :class:`BenchOptions` for the value and its uncertainty."""
 
 
 @Parameter(name="*", group=THE_PAGE)

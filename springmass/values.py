@@ -1,4 +1,4 @@
-"""The types of numbers that options take: each states its range, and the command line refuses what lies outside."""
+"""The numeric types of options: each declares its range, and the command line rejects values outside it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 
 
 def _where(holds: Callable[[float], bool], demand: str) -> Parameter:
-    """Return what refuses numbers for which something does not hold; of several numbers each is looked at."""
+    """Return a validator that rejects infinities, NaN and numbers for which ``holds`` is false, also in a tuple."""
 
     def validate(_: object, value: Any) -> None:
         for each in value if isinstance(value, tuple) else (value,):
@@ -43,7 +43,7 @@ def _where(holds: Callable[[float], bool], demand: str) -> Parameter:
 
 
 ANY_LAW = "any"
-"""In place of a law's name: the recording chooses, whatever the scene states."""
+"""The value in place of a law's name that lets the recording choose, regardless of the scene."""
 
 
 def _one_of_the_laws(_: object, name: str | None) -> None:

@@ -69,15 +69,15 @@ def write_whole(path: str | os.PathLike[str], data: bytes | str, *, overwrite: b
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Iterator[Path]:
-    """Give a temporary file to write, and put it in place when the ``with`` ends without an error.
+    """Yield a temporary file for writing, and move it into place when the ``with`` ends without an error.
 
     Parameters
     ----------
     path : str or PathLike
-        The file to be made; its folder must exist.
+        The file to create; its folder must exist.
     overwrite : bool
         Whether an existing file may be replaced. This is checked before the body runs and again when the new file is
-        put in place.
+        moved into place.
 
     Yields
     ------
@@ -89,8 +89,8 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
     RunExists
         If the file exists and may not be replaced.
     WriteFailed
-        If the temporary file cannot be made, synced or put in place. After any error, including one of the body,
-        the temporary file is removed and an existing file is unchanged.
+        If the temporary file cannot be created, synced or moved into place. After any error, including one of the
+        body, the temporary file is removed and an existing file is unchanged.
 
     Notes
     -----
@@ -119,14 +119,14 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
 def whole_h5(
     path: str | os.PathLike[str], *, overwrite: bool = True, libver: tuple[str, str] | None = None
 ) -> Iterator[h5py.File]:
-    """Give an empty HDF5 file to fill, and put it in place when the ``with`` ends without an error.
+    """Yield an empty HDF5 file to fill, and move it into place when the ``with`` ends without an error.
 
     Parameters
     ----------
     path, overwrite
         As in :func:`whole_file`.
     libver : tuple of str, optional
-        Oldest and newest file format, as h5py names them.
+        Oldest and newest file format, by their names in h5py.
 
     Yields
     ------
@@ -136,7 +136,7 @@ def whole_h5(
     Raises
     ------
     RunExists, WriteFailed
-        As in :func:`whole_file`. Errors of the body pass through: :func:`writing_h5` turns those of HDF5 into
+        As in :func:`whole_file`. Errors of the body pass through; :func:`writing_h5` converts errors of HDF5 to
         :class:`WriteFailed`.
     """
     import h5py
@@ -150,7 +150,7 @@ def whole_h5(
         try:
             yield file
         except BaseException:
-            # Closing writes too and may fail for the same reason: report the first error.
+            # Closing also writes and may fail for the same reason, so report the first error.
             with contextlib.suppress(*HDF5_ERRORS):
                 file.close()
             if sink.error is None:
@@ -164,7 +164,7 @@ def whole_h5(
 
 @contextlib.contextmanager
 def writing(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Raise :class:`WriteFailed` for an OSError while a file or folder is written."""
+    """Convert an OSError during the writing of a file or folder to :class:`WriteFailed`."""
     try:
         yield
     except OSError as error:
@@ -173,7 +173,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def writing_h5(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Raise :class:`WriteFailed` for what HDF5 raises on a full disk or a value that it cannot store."""
+    """Convert the errors that HDF5 raises on a full disk or an unstorable value to :class:`WriteFailed`."""
     try:
         yield
     except HDF5_ERRORS as error:
@@ -183,10 +183,10 @@ def writing_h5(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 class _ErrorKeepingFile:
-    """A file for HDF5 that never fails a write: it keeps the disk's first error and ignores later writes.
+    """A file for HDF5 whose writes never fail: it keeps the first error of the disk and ignores later writes.
 
     The HDF5 library crashes the process when the disk is full: closing fails, and the library closes the file once
-    more at exit. So HDF5 sees no error here, and the caller raises the kept error after closing.
+    more at exit. This class therefore hides the error from HDF5, and the caller raises it after closing.
     """
 
     def __init__(self, raw: io.FileIO) -> None:
@@ -197,7 +197,7 @@ class _ErrorKeepingFile:
         pending = memoryview(data).cast("B")
         size = len(pending)
         with self._recording_error():
-            while len(pending) and self.error is None:  # a nearly full disk writes only a part
+            while len(pending) and self.error is None:  # a nearly full disk writes only a part of the data
                 pending = pending[self._raw.write(pending) :]
         return size
 
@@ -207,7 +207,7 @@ class _ErrorKeepingFile:
     def readinto(self, buffer: memoryview) -> int:
         room = memoryview(buffer).cast("B")
         got = self._raw.readinto(room)
-        room[got:] = bytes(len(room) - got)  # zeros for what a full disk did not write
+        room[got:] = bytes(len(room) - got)  # zeros for the bytes that a full disk did not write
         return len(room)
 
     def truncate(self, size: int) -> int:
@@ -236,9 +236,9 @@ _LEFTOVER = re.compile(r"\..{1,32}\.[0-9a-f]{8}\.part", re.DOTALL)
 
 
 def remove_leftovers(folder: Path) -> tuple[Path, ...]:
-    """Remove the temporary files of killed writers and return their paths; those of running writers stay.
+    """Remove the temporary files of killed writers, but not those of running writers; return the removed paths.
 
-    A writer holds a lock on its temporary file, and the system releases it when the writer ends. Without file locks
+    A writer locks its temporary file, and the system releases the lock when the writer ends. Without file locks
     (Windows, some network disks) nothing is removed.
     """
     if sys.platform == "win32":
@@ -262,9 +262,9 @@ def _abandoned(leftover: Path) -> bool:
 
 
 def _reserve(target: Path) -> tuple[Path, int | None]:
-    """Make and lock an empty hidden file next to the target, with the permissions of any new file."""
+    """Create and lock an empty hidden file next to the target, with the default permissions of a new file."""
     while True:
-        # The name is truncated, so that the temporary name of a long target is not too long.
+        # Truncate the name, so that the temporary name of a target with a long name is not too long.
         temporary = target.with_name(f".{target.name[:32]}.{secrets.token_hex(4)}.part")
         with writing(target):
             descriptor = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
@@ -279,7 +279,7 @@ def _reserve(target: Path) -> tuple[Path, int | None]:
 
 
 def _sync(file: Path) -> None:
-    # Windows syncs only what was opened for writing.
+    # Windows syncs only files that were opened for writing.
     descriptor = os.open(file, os.O_RDWR)
     try:
         os.fsync(descriptor)
@@ -291,7 +291,7 @@ def _place(temporary: Path, target: Path, *, overwrite: bool) -> None:
     if overwrite:
         os.replace(temporary, target)
         return
-    # A hard link fails if the name exists and a rename does not, so there is no gap between check and placement.
+    # Unlike a rename, a hard link fails if the name exists, so no other file can appear between check and placement.
     try:
         os.link(temporary, target)
     except FileExistsError as error:
@@ -303,7 +303,7 @@ def _place(temporary: Path, target: Path, *, overwrite: bool) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Sync the names in a folder to the disk, if its file system can do that. Raises OSError."""
+    """Sync the file names of a folder to the disk if its file system supports this. Raises OSError."""
     try:
         descriptor = os.open(folder, os.O_RDONLY)
     except OSError as error:

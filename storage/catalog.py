@@ -1,4 +1,4 @@
-"""Search rows by an SQLite expression in memory. It can read nothing but these rows, and its time is limited."""
+"""Search rows in memory by an SQLite expression that can read only these rows and whose run time is limited."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from storage.errors import QueryRefused
 
 __all__ = ["search_rows"]
 
-_NUMBER = "number of the row"  # no column of a course has blanks in its name
+_NUMBER = "number of the row"  # cannot collide, because no column name of a course contains blanks
 _ALLOWED = {sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_FUNCTION}
 _DENIED = ("load_extension", "readfile", "writefile", "printf", "format")
 """Functions that read or write files, or that may run for a long time within one instruction."""
-STEPS = 100_000  # instructions of SQLite's machine between two calls of the progress handler
-MOST_CALLS = 10_000  # of the progress handler: 15 to 30 s, at 1.4 to 2.9 ms a call for sums over joined tables
-LONGEST = 1_000_000  # bytes of a value or a row, because one instruction may make a text of any length
-LONGEST_PATTERN = 100  # bytes of a LIKE or GLOB pattern, because each asterisk multiplies the time of one instruction
+STEPS = 100_000  # number of SQLite's virtual machine instructions between two calls of the progress handler
+# Maximum number of calls of the progress handler: 15 to 30 s, at 1.4 to 2.9 ms a call for sums over joined tables.
+MOST_CALLS = 10_000
+LONGEST = 1_000_000  # maximum size of a value or row, bytes; otherwise one instruction could make a text of any length
+LONGEST_PATTERN = 100  # maximum size of a LIKE or GLOB pattern, bytes; each asterisk multiplies an instruction's time
 
 
 def search_rows(
@@ -42,14 +43,14 @@ def search_rows(
     shown : sequence of str, optional
         The columns to return; all by default.
     sort : str, optional
-        A column; prefix it with - for descending order. By default the order of the rows.
+        A column; prefix it with - for descending order. By default the rows keep their order.
     limit : int, optional
-        Largest number of rows.
+        Maximum number of rows to return.
 
     Raises
     ------
     QueryRefused
-        If a column does not exist, the expression is not valid or takes too long, or it would do anything but read.
+        If a column does not exist, or the expression is invalid, takes too long or would do anything but read.
 
     Examples
     --------
@@ -75,7 +76,7 @@ def search_rows(
         base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST)
         base.setlimit(sqlite3.SQLITE_LIMIT_LIKE_PATTERN_LENGTH, LONGEST_PATTERN)
         base.set_progress_handler(exhausted, STEPS)
-        # A word in double quotes that names no column is an error, not a text.
+        # A word in double quotes that is not a column name must be an error, not a text.
         if hasattr(base, "setconfig"):
             base.setconfig(sqlite3.SQLITE_DBCONFIG_DQS_DML, False)  # type: ignore[attr-defined,unused-ignore]
         try:
@@ -90,7 +91,7 @@ def search_rows(
 
 
 def _fill(base: sqlite3.Connection, columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> int:
-    """Make the table of the rows; return how many there are."""
+    """Create the table of the rows; return the number of rows."""
     names = "".join(f", {_quoted(name)}" for name in columns)
     base.execute(f"CREATE TABLE runs ({_quoted(_NUMBER)} INTEGER PRIMARY KEY{names})")
     values = ", ".join("?" * (len(columns) + 1))
@@ -99,7 +100,7 @@ def _fill(base: sqlite3.Connection, columns: Sequence[str], rows: Iterable[Mappi
 
 
 def _command(where: str, wanted: Sequence[str], by: str, sort: str | None, limit: int | None) -> str:
-    # The expression gets separate lines, so that a comment at its end does not hide the closing bracket.
+    # Put the expression on separate lines, so that a comment at its end does not hide the closing bracket.
     condition = f" WHERE (\n{where}\n)" if where.strip() else ""
     direction = "DESC" if (sort or "").startswith("-") else "ASC"
     order = f"{_quoted(by)} {direction}, " if by else ""

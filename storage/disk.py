@@ -23,12 +23,12 @@ def check_disk(path: str | os.PathLike[str], needed_bytes: int) -> int:
     path : str or PathLike
         The file; its folder must exist.
     needed_bytes : int
-        How many bytes the run will write.
+        Number of bytes that the run will write.
 
     Raises
     ------
     DiskNearlyFull
-        If less is free.
+        If less space is free.
     WriteFailed
         If the folder does not exist.
     """

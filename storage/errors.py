@@ -5,7 +5,7 @@
     StorageError
     |-- NotARun        no file, not HDF5, or HDF5 of another layout           springmass exits with 3
     |-- RunDamaged     a run file that is damaged or was edited               springmass exits with 3
-    |-- RunClosed      a run used outside its ``with``
+    |-- RunClosed      a run that is used outside its ``with``
     |-- QueryRefused   an invalid search of a catalog, or one that would change it
     |-- NotALog        no file, or no wire log                                springmass exits with 3
     |-- LogGrowing     a log that a recording still writes                    springmass exits with 3
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 HDF5_ERRORS = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
-"""What h5py raises on a wrong checksum, a missing object, a full disk or a value that HDF5 cannot hold."""
+"""Errors that h5py raises on a wrong checksum, a missing object, a full disk or a value that HDF5 cannot store."""
 
 _NO_MEMORY = re.compile("memory alloc|alloc[a-z]* memory|out of memory|cannot allocate", re.IGNORECASE)
 
@@ -69,10 +69,10 @@ class StorageError(Exception):
     ----------
     path : str or PathLike
         The file.
-    demand : str
-        What is wrong, with the value that was found.
+    problem : str
+        Description of the problem, with the actual value.
     remedy : str
-        What the user can do.
+        Advice to the user.
     """
 
     def __init__(self, path: str | os.PathLike[str], problem: str, remedy: str) -> None:
@@ -80,7 +80,7 @@ class StorageError(Exception):
         super().__init__(f"{self.path}: {problem}; {remedy}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how to recreate the error in another process."""
+        """Return the class and arguments that recreate the error in another process."""
         return type(self), (self.path, self.problem, self.remedy)
 
 
@@ -93,7 +93,7 @@ class RunDamaged(StorageError):
 
 
 class QueryRefused(StorageError):
-    """A search that is invalid, names an unknown column, or would do anything but read."""
+    """A search that is invalid, takes too long, names an unknown column, or would do anything but read."""
 
 
 class RunClosed(StorageError):
@@ -120,7 +120,7 @@ def damaged(path: str | os.PathLike[str], what: str, how: str) -> RunDamaged:
 
 @contextlib.contextmanager
 def reading(path: str | os.PathLike[str], what: str) -> Iterator[None]:
-    """Raise :class:`RunDamaged` for the errors that HDF5 raises on damaged bytes."""
+    """Convert the errors that HDF5 raises on damaged bytes to :class:`RunDamaged`."""
     try:
         yield
     except StorageError:
@@ -131,7 +131,7 @@ def reading(path: str | os.PathLike[str], what: str) -> Iterator[None]:
 
 
 def raise_if_out_of_memory(path: str | os.PathLike[str], error: BaseException) -> None:
-    """Raise :class:`OutOfMemory` if an error is a lack of memory and not a fault of the file.
+    """Raise :class:`OutOfMemory` if an error comes from a lack of memory and not from the file.
 
     Examples
     --------

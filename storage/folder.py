@@ -1,7 +1,7 @@
 """Replace a folder of results as a whole: build it under a temporary name and rename it, so old and new never mix.
 
-After a kill either the old folder or the new one is in place. The next build of the same folder removes what the killed
-one left, and restores the old folder if the kill came between the two renames.
+If a build is killed, either the old or the new folder is in place, unless the kill came between the two renames. In
+that case the next build of the same folder restores the old one. It also removes the leftovers of killed builds.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from storage.errors import WriteFailed, one_line
 
 try:
     import fcntl
-except ImportError:  # Windows: leftovers stay, because nothing distinguishes them from a build that is running
+except ImportError:  # Windows: leftovers are kept, because nothing distinguishes them from a running build
     fcntl = None  # type: ignore[assignment]
 
 __all__ = ["whole_folder"]
@@ -30,16 +30,16 @@ _LOCKS = bool(fcntl)
 
 @contextlib.contextmanager
 def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str) -> Iterator[Path]:
-    """Give an empty folder to fill, and put it in place when the ``with`` ends without an error.
+    """Yield an empty folder to fill, and move it into place when the ``with`` ends without an error.
 
     Parameters
     ----------
     path : str or PathLike
-        The folder to be made or replaced.
+        The folder to create or replace.
     names : collection of str
-        All files that may be made in it, as relative paths with slashes. If the folder holds other files, or is the
-        working directory, its files are replaced one by one: ``last`` is removed first and written last. Files of
-        these names that were not made this time are removed.
+        All files that the folder may contain, as relative paths with slashes. If it contains other files, or is the
+        working directory, its files are replaced one by one: ``last`` is removed first and written last. Old files
+        with one of these names and no replacement are removed.
     last : str
         The file whose presence shows that the folder is complete.
 
@@ -51,7 +51,7 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
     Raises
     ------
     WriteFailed
-        If it cannot be made or put in place. After an error of the body the old folder is unchanged.
+        If the folder cannot be created or moved into place. After an error of the body the old folder is unchanged.
     """
     target = Path(path).resolve()
     with _writing_folder(path):
@@ -103,12 +103,12 @@ def _beside(target: Path, kind: str) -> Path:
 
 
 def _prefix(target: Path) -> str:
-    # Truncated, because names have a maximal length; the digest distinguishes names with the same beginning.
+    # Truncated, because names have a maximum length; the digest distinguishes names with the same beginning.
     return f".{target.name[:32]}.{hashlib.sha256(os.fsencode(target.name)).hexdigest()[:8]}."
 
 
 def _clean_up(target: Path) -> None:
-    """Restore or remove what a killed build left."""
+    """Restore or remove the folders that killed builds left behind."""
     if not _LOCKS:
         return
     for leftover in [each for each in target.parent.iterdir() if each.name.startswith(_prefix(target))]:

@@ -1,8 +1,8 @@
-"""The recorder: it takes records from the reading thread and writes them to the disk.
+"""Take records from the reading thread and write them to the disk.
 
 Three threads share the work. The reading thread only puts the records of all sensors into a queue. The second thread
-takes them out and appends them to the wire log immediately, so that a killed process loses at most the last read. The
-third calls fdatasync once a second. A sync may take long, but neither of the other threads waits for it.
+takes them from the queue and immediately appends them to the wire log, so that a killed process loses at most the last
+read. The third calls fdatasync once a second. A sync may take long, but neither of the other threads waits for it.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from storage.wire_log.scanning import LogContents, read_log
 __all__ = ["Recorder", "RecorderStatus"]
 
 QUEUE_BYTES = 16 << 20
-"""Half an hour of one sensor at 100 Hz, or two minutes of 16 sensors."""
+"""Size of the queue, bytes: half an hour of one sensor at 100 Hz, or two minutes of 16 sensors."""
 
 MAX_NOTES = 10_000
-"""Largest number of marks and events that are kept while the queue is full; nobody makes so many while a disk hangs."""
+"""Maximum number of marks and events kept while the queue is full; nobody makes this many while a disk hangs."""
 GIVE_UP_S = 1.0
-"""How long :meth:`Recorder.give_up` waits for the disk, s; a user who gives up does not want to wait."""
+"""Maximum time that :meth:`Recorder.give_up` waits for the disk, s; a user who gives up does not want to wait."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,19 +43,18 @@ class RecorderStatus:
     Parameters
     ----------
     records, bytes : int
-        In the log. They survive a killed process.
+        Amount written to the log. It survives a killed process.
     synced_records, synced_bytes : int
-        On the disk. They survive a power cut: record numbers below ``synced_records`` are safe.
+        Amount synced to the disk. It survives a power cut: records with numbers below ``synced_records`` are safe.
     queued_records, queued_bytes : int
-        In the queue.
+        Amount that waits in the queue.
     dropped_records, dropped_bytes : int
-        Received but not recorded, because the queue was full or the recording had stopped.
+        Amount received but not recorded, because the queue was full or the recording had stopped.
     error : str
-        Why the recording stopped, one line; empty if there is no error.
+        The error that stopped the recording, one line; empty if there is none.
     closed : bool
     astray : str
-        Whether the log was first deleted, renamed or replaced during the recording; empty if its name still leads to
-        it.
+        Says that the log was deleted, renamed or replaced during the recording; empty if its path still leads to it.
     """
 
     records: int
@@ -73,7 +72,7 @@ class RecorderStatus:
 
 @dataclass(slots=True)
 class _Overflow:
-    """What one channel has lost since the queue became full."""
+    """The reads that one channel has lost since the queue became full."""
 
     first_ns: int
     last_ns: int
@@ -96,21 +95,21 @@ class Recorder:
     Parameters
     ----------
     path : str or PathLike
-        The log to make; its folder must exist.
+        The log to create; its folder must exist.
     header : LogHeader
     clock : Clock
-        Times the syncs, and gives marks and events without a time their time.
+        Schedules the syncs, and supplies the time of marks and events that come without one.
     sync_every_s : float
         Time between syncs, s.
     queue_bytes : int
-        Size of the queue. Reads that arrive while it is full are counted and dropped, and an event in the log says so.
+        Size of the queue, bytes. Reads that arrive while it is full are dropped, and an event in the log counts them.
     open_file : callable
-        Makes the log's file; tests replace it.
+        Creates the log's file; tests replace it.
 
     Attributes
     ----------
     path : Path
-        The log, by its first name.
+        The path under which the log was created.
 
     Raises
     ------
@@ -141,7 +140,7 @@ class Recorder:
         self._lock = threading.Lock()
         self._done = threading.Condition(self._lock)
         self._queue: list[Item] = []
-        # Gets an item whenever the queue is filled again. A Condition is written in Python and costs twice as much.
+        # Receives an item whenever the empty queue is filled. A Condition is written in Python and costs twice as much.
         self._wakeup: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._queued_bytes = 0
         self._appending = False
@@ -180,7 +179,7 @@ class Recorder:
             return RecorderStatus(*log, *queue, str(self._error or ""), self._closed, self._astray)
 
     def reads(self, reads: Sequence[Read]) -> None:
-        """Record reads of ports. This never waits for the disk and never raises an error of the disk."""
+        """Record reads of ports. This never waits for the disk and never raises a disk error."""
         self._offer(Kind.DATA, reads)
 
     def put(self, channel: int, host_ns: int, data: bytes) -> None:
@@ -231,19 +230,19 @@ class Recorder:
             raise self._error
 
     def contents(self) -> LogContents:
-        """Return what was recorded, even if the log was renamed or deleted. Call it after :meth:`close`.
+        """Return the recorded log, even if it was renamed or deleted. Call this after :meth:`close`.
 
         Raises
         ------
         NotALog
-            If it cannot be read.
+            If the log cannot be read.
         """
         return read_log(self.path) if self._held is None else self._held.contents()
 
     def give_up(self) -> bool:
-        """End immediately: count what is not in the log, and write the counts despite a write that hangs.
+        """End immediately: count the reads that are not in the log, and write the counts even if another write hangs.
 
-        Queued marks and events are written with the counts. Use it when the user no longer waits for :meth:`close`.
+        Queued marks and events are written with the counts. Use this when the user no longer waits for :meth:`close`.
 
         Returns
         -------
@@ -260,7 +259,7 @@ class Recorder:
                 lost.setdefault(channel, _Overflow(mono_ns, mono_ns)).add(mono_ns, len(payload))
             self._dropped_records += sum(each.records for each in lost.values())
             self._dropped_bytes += sum(each.bytes for each in lost.values())
-            # What overflowed is younger than the queue and has been counted already.
+            # Overflowed records are newer than the queued ones and have already been counted.
             items = [item for item in pending if item[0] is not Kind.DATA]
             items += [each.event(channel) for channel, each in (*lost.items(), *self._overflows.items())]
             items += self._notes
@@ -289,7 +288,7 @@ class Recorder:
             was_waiting = self._waiting
             for channel, mono_ns, payload in records:
                 size = HEAD_BYTES + len(payload)
-                # After an overflow its event must come first: records around a loss must not look consecutive.
+                # After an overflow, queue its event first, so that the records around the loss do not look consecutive.
                 if accepting and not (self._overflows or self._notes) and self._queued_bytes + size <= self._limit:
                     self._queue.append((kind, channel, mono_ns, payload))
                     self._queued_bytes += size
@@ -313,16 +312,16 @@ class Recorder:
         while items := self._take_queued():
             try:
                 self._log.extend(items)
-            except Exception as error:  # a defect must stop the recording too, and not go unnoticed
+            except Exception as error:  # a defect must also stop the recording and not go unnoticed
                 if self._gave_up:  # give_up has counted the rest
                     return
                 self._stop(self._one_line(error), items[self._log.extended :])
                 return
 
     def _take_queued(self) -> list[Item]:
-        """Wait for records and return all of them; an empty list if the recording is closing and all are in the log.
+        """Wait for records and return all of them; return an empty list if the recording is closing and none are left.
 
-        Overflow events go after the queued records and before all later ones, which is where the lost reads belong.
+        Overflow events follow the queued records and precede all later ones, because the lost reads belong there.
         """
         while True:
             with self._lock:
@@ -344,7 +343,7 @@ class Recorder:
         return WriteFailed(self.path, f"a record could not be appended ({one_line(error)})", "report this defect")
 
     def _stop(self, error: WriteFailed, pending: list[Item]) -> None:
-        """Stop recording; what was appended can still be synced."""
+        """Stop recording; records that were already appended can still be synced."""
         with self._lock:
             self._error = self._error or error
             pending += self._queue
@@ -357,7 +356,7 @@ class Recorder:
 
     def _sync_often(self) -> None:
         due = self._clock.now_ns() + self._sync_every_ns
-        # Wait on the event and not on the clock, so that closing does not wait for the next sync.
+        # Wait for the event and not for the clock, so that closing does not wait for the next sync.
         while not self._stop_sync.wait(max(0, due - self._clock.now_ns()) * 1e-9):
             due = max(due, self._clock.now_ns()) + self._sync_every_ns
             if self._look_for_name():
@@ -366,7 +365,7 @@ class Recorder:
                 self._sync()
 
     def _look_for_name(self) -> bool:
-        """Check whether the log was deleted, renamed or replaced; return whether this call is the first to find so.
+        """Check whether the log was deleted, renamed or replaced; return whether this call is the first to detect it.
 
         The check may wait for the disk, so the reading thread never calls it.
         """
@@ -386,7 +385,7 @@ class Recorder:
         return json.dumps(counts | {"dropped_bytes": self._dropped_bytes}).encode("ascii")
 
     def _guarded(self, step: Callable[[], object]) -> None:
-        """Do a step and keep its error, if it is the first, for :meth:`close` to raise."""
+        """Run a step and keep the first error, which :meth:`close` raises."""
         try:
             step()
         except WriteFailed as error:

@@ -1,9 +1,9 @@
-"""Tools to declare the content of a file's header or event once, and to read JSON by that declaration.
+"""Validate the JSON of headers and events against declarations of their content.
 
 A correct checksum shows that a header is unchanged, not that its values make sense. So the keys with their types and
 ranges are declared as ``msgspec`` structs: :class:`storage.run_file.header.Header` and
-:class:`storage.wire_log.log_header.LogHeader`. What :func:`decoded` returns has the types, ranges, sizes and depth that
-later code relies on.
+:class:`storage.wire_log.log_header.LogHeader`. The result of :func:`decoded` has the types, ranges, sizes and depth
+that later code relies on.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ Count = Annotated[int, Meta(ge=0, le=2**53)]
 
 _T = TypeVar("_T")
 _SHOWN = 60
-_GREATEST = sys.float_info.max  # no float equals a larger integer, and any comparison with NaN is false
+_GREATEST = sys.float_info.max  # larger integers have no finite float, and any comparison with NaN is false
 _AT = re.compile(r" - at `(?:key` in `)?\$(.*)`$", re.DOTALL)
 _STEP = re.compile(r"\.(\w+)|\[([0-9]+)\]")
 _ANY_KEY = "[...]"
-"""How a path of msgspec names a value in a table with arbitrary keys; then the message shows the whole table."""
+"""Notation of msgspec for a value in a table with arbitrary keys; the message then shows the whole table."""
 
 
 class ValueRefused(ValueError):
@@ -55,7 +55,7 @@ class ValueRefused(ValueError):
     key : str
         Dotted path of the key.
     reason : str
-        What is expected, and the value.
+        The expected value and the actual one.
     """
 
     def __init__(self, key: str, reason: str) -> None:
@@ -93,7 +93,7 @@ def parsed(text: bytes, key: str) -> Any:
     Raises
     ------
     ValueRefused
-        If the text is not JSON, or is nested too deep for Python's JSON reader.
+        If the text is not JSON, or is nested too deeply for Python's JSON reader.
     """
     try:
         return json.loads(text)
@@ -102,23 +102,23 @@ def parsed(text: bytes, key: str) -> Any:
 
 
 def decoded(content: object, kind: type[_T], key: str, deepest: int) -> _T:
-    """Return the content of a header or event as its struct.
+    """Convert the content of a header or event to its struct.
 
     Parameters
     ----------
     content : object
-        As :func:`parsed` returns it.
+        The content, as returned by :func:`parsed`.
     kind : type
         The struct.
     key : str
-        Name of the content in messages; keys inside are appended after dots.
+        Name of the content in messages; inner keys are appended after dots.
     deepest : int
-        Largest depth of nested tables and lists.
+        Maximum depth of nested tables and lists.
 
     Raises
     ------
     ValueRefused
-        For the first value that the struct does not allow, that is nested too deep, or that is not finite.
+        For the first value that the struct does not allow, that is nested too deeply, or that is not finite.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def decoded(content: object, kind: type[_T], key: str, deepest: int) -> _T:
 
 
 def converted(content: object, kind: type[_T], key: str) -> _T:
-    """Return plain content as a type. Unlike :func:`decoded` this does not check untyped tables."""
+    """Convert plain content to a type. Unlike :func:`decoded`, this does not check untyped tables."""
     try:
         return msgspec.convert(content, kind)
     except msgspec.ValidationError as error:
@@ -156,7 +156,7 @@ def converted(content: object, kind: type[_T], key: str) -> _T:
 
 
 def _refused(error: msgspec.ValidationError, content: object, key: str) -> ValueRefused:
-    """Return the error with the value that it is about; msgspec gives only the path of the value."""
+    """Return an error that shows the refused value; msgspec gives only its path."""
     message = str(error)
     at = _AT.search(message)
     path, reason = (at[1], message[: at.start()]) if at else ("", message)
@@ -171,7 +171,7 @@ def _refused(error: msgspec.ValidationError, content: object, key: str) -> Value
 
 
 def shown(value: object) -> str:
-    """Return the beginning of a value in visible ASCII, because a text from a file may hold terminal commands."""
+    """Return the beginning of a value in visible ASCII, because a text from a file may contain terminal commands."""
     if isinstance(value, Mapping):
         names = [shown(name) for name in list(value)[:4]]
         return f"a table of {', '.join(names)}{', ...' if len(value) > 4 else ''}" if names else "an empty table"
@@ -186,7 +186,7 @@ def shown(value: object) -> str:
 
 
 def _visible(message: str) -> str:
-    """Return a message in visible ASCII and at most a line long; it may quote a name from a file."""
+    """Return at most 200 characters of a message in visible ASCII, because it may quote a name from a file."""
     return ascii(message[:200])[1:-1]
 
 

@@ -1,4 +1,4 @@
-"""Find a number in a line of text, by its column or after a name."""
+"""Find a number in a line of text, by its column or by the name before it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from acquisition.errors import SensorError
 
 __all__ = ["Column", "as_column", "as_separator", "split"]
 
-# float() accepts "nan", "inf" and "1_0" as numbers.
+# float() alone would also accept "nan", "inf" and "1_0".
 _NUMBER = rb"[+-]?(?:[0-9]{1,15}(?:\.[0-9]{0,12})?|\.[0-9]{1,12})(?:[eE][+-]?[0-9]{1,2})?"
 _NAME = re.compile(r"[A-Za-z_][\w .-]{0,31}", re.ASCII)
 _ANY = re.compile(rb"[\s,;]+")
@@ -22,11 +22,11 @@ class Column:
     Parameters
     ----------
     index : int or None
-        Column from 0; None for a column that is found by name.
+        Number of the column, from 0; None for a column that is found by name.
     name : bytes
-        Empty for a column that is found by index.
+        Name of the column; empty for a column that is found by index.
     form : re.Pattern
-        Pattern of the whole cell, or of name and number.
+        Pattern of the whole cell, or of the name and its number.
     """
 
     index: int | None
@@ -34,7 +34,7 @@ class Column:
     form: re.Pattern[bytes]
 
     def number(self, line: bytes, cells: list[bytes]) -> float | None:
-        """Return the number in a line that was split into cells; None if there is none."""
+        """Return the number of this column in a line that was split into cells, or None if there is no number."""
         if self.index is None:
             match = self.form.search(line)
         elif self.index < len(cells):
@@ -47,12 +47,12 @@ class Column:
 def as_column(option: str, where: int | str, unit: str = "") -> Column:
     """Return the column that an option names.
 
-    The number may be followed by this unit but by no other: a line with "12.3 cm" is refused if the unit is mm.
+    Only the given unit may follow the number: a line with "12.3 cm" is refused if the unit is mm.
 
     Raises
     ------
     SensorError
-        If it is neither a number from 0 nor a name.
+        If the option is neither a number from 0 to 63 nor a name.
     """
     text = str(where).strip()
     tail = rb"(?:[ ]?" + re.escape(unit.encode()) + rb")?" if unit else b""
@@ -66,12 +66,12 @@ def as_column(option: str, where: int | str, unit: str = "") -> Column:
 
 
 def as_separator(text: str | None) -> bytes:
-    """Return a separator as bytes; empty if blanks, commas and semicolons all separate.
+    """Return a separator as bytes; it is empty if blanks, commas and semicolons are all separators.
 
     Raises
     ------
     SensorError
-        If it is longer than one character.
+        If the separator is not one ASCII character, or belongs to a number or a line end.
     """
     named = {"tab": "\t", "space": " ", "comma": ",", "semicolon": ";", None: "", "any": ""}
     plain = named.get(text, text or "")
@@ -81,5 +81,5 @@ def as_separator(text: str | None) -> bytes:
 
 
 def split(line: bytes, separator: bytes) -> list[bytes]:
-    """Return the cells of a line."""
+    """Split a line into its cells."""
     return line.split(separator) if separator else _ANY.split(line)

@@ -1,4 +1,4 @@
-"""Choose the next request to a polled sensor that has a separate request for the temperature."""
+"""Choose the next request to a polled sensor that needs separate requests for distance and temperature."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from acquisition.errors import SensorError
 __all__ = ["OPTIONS", "Cycle", "PolledEncoder"]
 
 OPTIONS = {"temperature_every": "number of distances between two temperatures; 0: no temperatures"}
-"""The options of a family with such a sensor."""
+"""The decoder options of a family whose sensors need separate requests for the temperature."""
 
 
 class Cycle:
-    """A cycle of some distances and one temperature; a lost reply restarts it with a distance.
+    """A cycle of several distance requests and one temperature request; a lost reply restarts it with a distance.
 
-    Only replies and flushes advance it, so that replayed bytes give the same cycle.
+    Only replies and flushes change its state, so replayed bytes give the same cycle as in the recording.
 
     Parameters
     ----------
     ask_distance, ask_temperature : bytes
-        The requests.
+        Bytes of the two requests.
     temperature_every : int
         Number of distances between two temperatures; 0 for no temperatures.
 
     Raises
     ------
     SensorError
-        If this is not a whole number from 0.
+        If ``temperature_every`` is not a whole number of at least 0.
     """
 
     def __init__(self, ask_distance: bytes, ask_temperature: bytes, temperature_every: int) -> None:
@@ -54,19 +54,19 @@ class Cycle:
         self._distances = 0 if temperature else self._distances + 1
 
     def restart(self) -> None:
-        """Restart with distances, because a sensor without temperatures still sends those."""
+        """Restart the cycle with distances, because a sensor that sends no temperatures still sends distances."""
         self._distances = 0
 
 
 class PolledEncoder:
-    """Writes the replies of such a sensor.
+    """Encodes the replies of a polled sensor with separate requests for the temperature.
 
     Parameters
     ----------
     cycle : Cycle
-        A cycle like the decoder's.
+        Cycle with the same parameters as that of the decoder.
     distance_reply, temperature_reply : callable
-        Convert m and degC, which may be NaN, to the bytes of a reply.
+        Convert a distance in m and a temperature in degC, either of which may be NaN, to the bytes of a reply.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class PolledEncoder:
         return self.reply(request, distance_m=distance_m, temperature_c=temperature_c)
 
     def reply(self, request: bytes, *, distance_m: float, temperature_c: float) -> bytes:
-        """Return the reply to a request; empty for unknown requests."""
+        """Return the reply to a request; it is empty for an unknown request."""
         if request == self._cycle.ask_distance:
             return self._distance_reply(distance_m)
         return self._temperature_reply(temperature_c) if request == self._cycle.ask_temperature else b""

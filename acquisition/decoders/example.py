@@ -1,21 +1,21 @@
 """A template for a new family of rangefinders: copy it and change the marked lines.
 
-1. Copy this file to ``acquisition/decoders/NAME.py``. The docstring describes a frame, with one real frame and its
+1. Copy this file to ``acquisition/decoders/NAME.py``. In its docstring, describe a frame, with one real frame and its
    value, the codes for no target, and the data sheet.
-2. Frames: :class:`acquisition.decoders.lines.LineSplitter` cuts lines,
-   :class:`acquisition.decoders.sum_frames.SumFrames` cuts frames of a fixed size with a sum at the end. Both give the
-   same frames however the stream is cut into reads, count faults, and hold a limited number of bytes.
-3. Accept frames as strictly as the data sheet allows: fixed digits, range, checksum. A code for "no target" becomes
-   NaN; a number that is not a distance must never be taken for one.
-4. ``reading`` interprets a frame; :class:`acquisition.decoders.framed.FramedDecoder` does the rest. Echo times are
-   passed on as echo times.
+2. Choose how to find frames: :class:`acquisition.decoders.lines.LineSplitter` cuts lines, and
+   :class:`acquisition.decoders.sum_frames.SumFrames` cuts frames of a fixed size with a sum at the end. For both, the
+   boundaries of reads do not affect the frames. Both count faults, and keep a bounded number of bytes.
+3. Check frames as strictly as the data sheet allows: number of digits, range, checksum. Turn a code for "no target"
+   into NaN. Never interpret a number as a distance if it is not one.
+4. Write ``reading``, which interprets a frame; :class:`acquisition.decoders.framed.FramedDecoder` does the rest. Pass
+   echo times on as echo times.
 5. Write the encoder from the data sheet and not from the decoder, so that each checks the other.
 6. Add one line to ``_TABLE`` of ``acquisition/decoders/registry.py``, or, in a separate package, an entry point in the
    group ``springmass.sensors``.
 7. Add one ``Case`` to ``tests/conformance/test_decoders.py``.
 
-The device of this template is invented. It sends ``:dddd,cc`` and a line feed: mm with leading zeros, and the sum of
-the codes of the four digits in hex. ``:0253,CA`` is 253 mm; 0 means no target.
+The device of this template is fictitious. It sends ``:dddd,cc`` and a line feed: the distance in mm with leading zeros,
+and, in hexadecimal, the sum of the ASCII codes of its four digits. ``:0253,CA`` is 253 mm; 0 means no target.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ _FORM = re.compile(rb":([0-9]{4}),([0-9A-F]{2})\r?")  # change
 
 
 class ExampleDecoder(FramedDecoder):
-    """Decodes the example's lines."""
+    """Decodes the lines of the example."""
 
     def __init__(self) -> None:
         super().__init__(LineSplitter(b"\n", _LONGEST, {"garbage_bytes": 0, "bad_frame": 0, "bad_checksum": 0}))
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return the distance of a line; count the fault of a line without one."""
+        """Return the reading of a line, or None; count the fault of an invalid line."""
         match = _FORM.fullmatch(frame)
         if match is not None and sum(match[1]) & 0xFF == int(match[2], 16):
             return Reading(host_ns, distance_m=int(match[1]) / 1000 or NAN)
@@ -50,10 +50,10 @@ class ExampleDecoder(FramedDecoder):
 
 
 class ExampleEncoder:
-    """Writes the example's lines."""
+    """Encodes distances as the lines of the example."""
 
     def encode(self, *, distance_m: float, **_: float) -> bytes:
-        """Return one line; it contains only the distance."""
+        """Return one line, which contains only the distance."""
         mm = 0 if math.isnan(distance_m) else round(distance_m * 1000)
         digits = b"%04d" % (mm if 0 <= mm <= 9999 else 0)
         return b":%s,%02X\n" % (digits, sum(digits) & 0xFF)

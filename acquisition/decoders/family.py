@@ -1,4 +1,4 @@
-"""The description of a family of rangefinders: its decoder, how it is polled, and its limits in numbers."""
+"""The description of a family of rangefinders: its decoder, its polling and its numerical limits."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from acquisition.readings import Readings
 __all__ = ["RESONATOR_PPM", "Decoder", "DeviceStatus", "Encoder", "Family", "Identity", "Poll", "Polled"]
 
 RESONATOR_PPM = 10_000.0
-"""Largest error of a ceramic resonator, ppm: 5000 when new, 3000 by temperature, 3000 by age (Murata P16E)."""
+"""Maximum error of a ceramic resonator, ppm: 5000 when new, 3000 by temperature, 3000 by aging (Murata P16E)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +23,9 @@ class Identity:
     ----------
     model, version : str
     name : str
-        The name that its owner gave it; may be empty.
+        Name that the owner gave the device; may be empty.
     settings : mapping of str to int
-        Its settings, with units in the names.
+        Settings of the device; their names include the units.
     """
 
     model: str
@@ -39,16 +39,16 @@ class Identity:
 
 @dataclass(slots=True)
 class DeviceStatus:
-    """What a device sends besides readings; decoders of such devices have it as their attribute ``status``.
+    """Information that a device sends besides readings; its decoder has it as the attribute ``status``.
 
     Parameters
     ----------
     identity : Identity or None
-        The last identity that it sent.
+        Last identity that the device sent.
     conditions : dict of str to int
-        Counts of readings that measured nothing, by the reason that it gave.
+        Counts of readings without a measured value, by the reason that the device gave.
     complaint : str
-        The fault that it reports now, and what to check; empty if there is none.
+        Fault that the device currently reports, with advice on what to check; empty if it reports none.
     """
 
     identity: Identity | None = None
@@ -57,46 +57,46 @@ class DeviceStatus:
 
     @staticmethod
     def of(decoder: Decoder) -> DeviceStatus:
-        """Return the status of the device behind a decoder; empty if the device sends none."""
+        """Return the status of the device of a decoder; it is empty if the device sends none."""
         status = getattr(decoder, "status", None)
         return status if isinstance(status, DeviceStatus) else DeviceStatus()
 
 
 class Decoder(Protocol):
-    """Turns bytes into readings. It resynchronises within two frames after any garbage and never raises on bytes."""
+    """Turns bytes into readings; it never raises on any bytes and resynchronises within two frames after garbage."""
 
     @property
     def faults(self) -> Mapping[str, int]:
-        """Counts of faults: "garbage_bytes", "bad_checksum", "bad_frame", ...
+        """Counts of faults, by name: "garbage_bytes", "bad_checksum", "bad_frame", ...
 
-        "garbage_bytes" are bytes outside of frames. Their share shows whether a stream belongs to this family.
+        "garbage_bytes" counts the bytes outside of frames. Their fraction shows whether a stream is of this family.
         """
         ...
 
     @property
     def pending(self) -> int:
-        """Bytes of an incomplete frame; their number is limited for any input."""
+        """Number of bytes of an incomplete frame; it is bounded for any input."""
         ...
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Decode the bytes of one read of the port, and return the readings of completed frames (perhaps none)."""
+        """Decode the bytes of one read of the port, and return the readings of the completed frames, if any."""
         ...
 
     def flush(self) -> None:
-        """Discard an incomplete frame: the port was reopened, or a reply timed out."""
+        """Discard an incomplete frame, after the port was reopened or a reply timed out."""
         ...
 
 
 class Polled(Decoder, Protocol):
     """The decoder of a sensor that sends only on request.
 
-    Only replies and flushes determine the next request, so replayed bytes decode as in the recording. If bytes are
-    ``pending`` when a request is due, call ``flush`` first: a late or surplus byte would shift every reply.
+    Only replies and flushes determine the next request, so replayed bytes are decoded as in the recording. If bytes are
+    ``pending`` when a request is due, call ``flush`` first, because a late or surplus byte would shift every reply.
     """
 
     @property
     def request(self) -> bytes:
-        """The next request: usually ``Poll.request``, sometimes the request for a temperature."""
+        """The next request: usually ``Poll.request``, sometimes the request for the temperature."""
         ...
 
 
@@ -107,11 +107,11 @@ class Poll:
     Parameters
     ----------
     request : bytes
-        Sent for each reading.
+        Bytes that request one reading.
     interval_s : float
         Time between requests, s.
     timeout_s : float
-        Longest wait for a reply, s. After it the decoder is flushed and the input discarded.
+        Maximum wait for a reply, s. After it, the decoder is flushed and the input discarded.
     """
 
     request: bytes
@@ -120,7 +120,7 @@ class Poll:
 
 
 class Encoder(Protocol):
-    """Writes readings as bytes of a family, for the simulated sensor; it shares no code with the decoder."""
+    """Encodes readings as bytes of a family for the simulated sensor; it shares no code with the decoder."""
 
     def encode(
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
@@ -138,34 +138,34 @@ class Family:
     name : str
         Name of the family.
     title : str
-        One line for the user, with the devices it covers.
+        One line for the user that lists the devices of the family.
     baud : int
         Default speed of the port (8 data bits, no parity, one stop bit).
     rate_hz : float
-        Readings per second it can give.
+        Readings per second that the sensors of the family can deliver.
     resolution_m : float
-        Smallest step of a distance, m.
+        Resolution of a distance, m.
     range_m : tuple of float
-        Nearest and farthest distance, m.
+        Minimum and maximum distance, m.
     limits : str
-        What a user must know before relying on it, one sentence.
+        One sentence on the limitations that a user must know before relying on the sensor.
     decoder : callable
-        Makes a new decoder; its keyword arguments are those in ``options``.
+        Returns a new decoder; its keyword arguments are the names in ``options``.
     encoder : callable
-        Makes the simulated sensor's encoder, with the same options.
+        Returns a new encoder for the simulated sensor; it takes the same options.
     poll : Poll or None
-        None for a sensor that sends by itself.
+        How to poll the sensor; None for a sensor that sends without requests.
     options : mapping of str to str
-        Options of the decoder by name, with one line each (column, unit, ...).
+        Options of the decoder (column, unit, ...): their names, each with a description of one line.
     has_device_time : bool
-        Whether readings contain the device's clock or counter.
+        Whether readings contain a clock time or a counter of the device.
     clock_ppm : float
-        Largest rate error of the device's clock, including temperature and age, ppm: 200 for a crystal, 10 000 for a
-        ceramic resonator, as on common boards. A larger error found by comparison with the host is not believed.
+        Maximum rate error of the device's clock, including temperature and aging, ppm: 200 for a crystal, 10 000 for a
+        ceramic resonator, as on common boards. A larger error found by comparison with the host's clock is rejected.
     identify : bytes
-        Request on which the device identifies itself; empty if it has none.
+        Request that makes the device identify itself; empty if there is none.
     self_framing : bool
-        Whether a mark or checksum distinguishes a frame from noise. Without one, bytes cannot show the family.
+        Whether a marker or checksum distinguishes a frame from noise. Without one, bytes cannot identify the family.
     source : str
         Data sheet or specification.
     """
@@ -188,12 +188,12 @@ class Family:
     source: str = ""
 
     def demand_options(self, options: Mapping[str, Any]) -> None:
-        """Check that this family has these options.
+        """Check that the family has all the given options.
 
         Raises
         ------
         SensorError
-            With the unknown options and those of the family.
+            If an option is unknown; the message lists the unknown options and the options of the family.
         """
         unknown = sorted(set(options) - set(self.options))
         if unknown:
@@ -201,6 +201,6 @@ class Family:
             raise SensorError(f"sensor {self.name}: expected options among {known}, got {', '.join(unknown)}")
 
     def describe(self) -> dict[str, Any]:
-        """Return the description as plain data, as in the JSON of the sensors."""
+        """Return the description as plain data, for the JSON list of the sensors."""
         shown = (item.name for item in fields(self) if item.name not in ("decoder", "encoder", "poll", "identify"))
         return {name: getattr(self, name) for name in shown} | {"polled": self.poll is not None}

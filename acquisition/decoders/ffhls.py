@@ -1,8 +1,9 @@
-"""FF H L SUM: the waterproof modules of many names that send four bytes by themselves.
+"""FF H L SUM: frames of four bytes that waterproof modules of many names send without requests.
 
-A02YYUW, ME007YS, A01NYUB, DYP-A01/A02/ME007, and the JSN-SR04T in its serial mode: 0xFF, distance in mm as high and
-low byte, sum. ``FF 07 A1 A7`` is 1953 mm. 0 means no target, as do FFFD (none in range) and FFFE (disturbed by another
-sensor) of the newer DYP modules.
+The modules are the A02YYUW, ME007YS, A01NYUB, DYP-A01/A02/ME007, and the JSN-SR04T in its serial mode. A frame consists
+of 0xFF, the high and low byte of the distance in mm, and the sum of these three bytes: ``FF 07 A1 A7`` is 1953 mm. The
+value 0 means no target, as do the codes FFFD (no target in range) and FFFE (disturbed by another sensor) of the newer
+DYP modules.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from acquisition.readings import NAN, Reading
 __all__ = ["FAMILY", "FfhlsDecoder", "FfhlsEncoder"]
 
 FARTHEST_MM = 10_000
-"""Beyond the range of every module of the family. So H is never 0xFF, and the header is unambiguous."""
+"""Maximum distance of a valid frame, mm: beyond the range of every module, but with a high byte other than 0xFF."""
 
 _NO_TARGET = (0, 0xFFFD, 0xFFFE)
 
@@ -37,16 +38,16 @@ class FfhlsDecoder(FramedDecoder):
         super().__init__(SumFrames(4, b"\xff", _plausible))
 
     def reading(self, host_ns: int, frame: bytes) -> Reading:
-        """Return a frame's distance."""
+        """Return the reading of a frame."""
         mm = _value(frame)
         return Reading(host_ns, distance_m=NAN if mm in _NO_TARGET else mm / 1000)
 
 
 class FfhlsEncoder:
-    """Writes FF H L SUM."""
+    """Encodes distances as FF H L SUM."""
 
     def encode(self, *, distance_m: float, **_: float) -> bytes:
-        """Return one frame; it contains only the distance, to 1 mm."""
+        """Return one frame, which contains only the distance, rounded to 1 mm."""
         mm = 0 if math.isnan(distance_m) else round(distance_m * 1000)
         return with_sum(b"\xff" + (mm if 0 <= mm <= FARTHEST_MM else 0).to_bytes(2, "big"))
 

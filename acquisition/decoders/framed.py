@@ -1,4 +1,4 @@
-"""The common base of decoders for lines or summed frames: cut the stream, read each frame, count faults."""
+"""The base class of decoders for lines or checksummed frames; it cuts the stream into frames and counts faults."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["FramedDecoder"]
 
 
 class FramedDecoder(ABC):
-    """A :class:`acquisition.decoders.family.Decoder` of frames; a family defines :meth:`reading`.
+    """A :class:`acquisition.decoders.family.Decoder` of frames; each family implements :meth:`reading`.
 
     Parameters
     ----------
@@ -27,16 +27,16 @@ class FramedDecoder(ABC):
 
     @property
     def faults(self) -> Mapping[str, int]:
-        """Counts of faults."""
+        """Counts of faults, by name."""
         return MappingProxyType(self._frames.faults)
 
     @property
     def pending(self) -> int:
-        """Bytes of an incomplete frame."""
+        """Number of bytes of an incomplete frame."""
         return self._frames.pending
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the readings of the frames that these bytes complete, all with the host time of this read."""
+        """Return the readings of the frames that the bytes complete, each with the host time of this read."""
         readings = [row for frame in self._frames.split(data) if (row := self.reading(host_ns, frame)) is not None]
         return Readings(readings) if readings else NO_READINGS
 
@@ -46,9 +46,9 @@ class FramedDecoder(ABC):
 
     @abstractmethod
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return the reading of a frame; None if it has none. Count its fault with :meth:`_count` if it is one."""
+        """Return the reading of a frame, or None; count the fault of an invalid frame with :meth:`_count`."""
 
     def _count(self, fault: str, garbage_bytes: int) -> None:
-        """Count a fault, and the bytes outside of frames."""
+        """Count one fault, and the number of bytes outside of frames that it caused."""
         self._frames.faults[fault] += 1
         self._frames.faults["garbage_bytes"] += garbage_bytes

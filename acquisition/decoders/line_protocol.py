@@ -1,8 +1,9 @@
 """The line protocol of this project, for a microcontroller that times a transducer at 100 Hz.
 
-``$R1,sequence,device_us,echo_us,temperature,status*CRC`` and a line feed: see docs/reference/line-protocol.md, and
-firmware/springmass_rangefinder for a device that uses it. The device sends the time of the echo and not a distance, so
-the host can apply another speed of sound later. Lines ``$I1,...`` identify the device.
+A reading is ``$R1,sequence,device_us,echo_us,temperature,status*CRC`` and a line feed. The specification is in
+docs/reference/line-protocol.md; firmware/springmass_rangefinder is the firmware of a device that uses the protocol. The
+device sends the echo time and not a distance, so the host can apply another speed of sound later. Lines ``$I1,...``
+identify the device.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from acquisition.readings import NAN, Reading
 __all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "frame"]
 
 LONGEST = 96
-"""Longest line without its line feed, bytes."""
+"""Maximum length of a line without its line feed, bytes."""
 
 SETTINGS = ("rate_hz", "near_us", "far_us", "spread_us", "thermometer")
-"""Settings that a device sends after model, version and name: rate, gate, spread of the pings, thermometer."""
+"""Settings in an identity line, after model, version and name: rate, gate limits, ping spread, thermometer."""
 
 _WRAP = 1 << 32
 _FIELDS = rb"R1,([0-9]{1,10}),([0-9]{1,10}),([0-9]{1,6}\.[0-9]{2})?,(-?[0-9]{1,5})?,([A-Z])"
@@ -42,14 +43,14 @@ CONDITIONS = {
     b"A": "no_answer",
     b"S": "stuck",
 }
-"""Names of the conditions by status letter; an unknown letter of a later version counts as ``other``."""
+"""Names of the conditions, by status letter; an unknown letter of a later version is counted as ``other``."""
 
 COMPLAINTS = {
     b"A": "the transducer does not answer its trigger: check its 5 V and ground, TRIG on D9 and ECHO on D8",
     b"S": "ECHO stays high: check its wire on D8, and switch the transducer off and on",
 }
-"""Statuses caused by the wiring or the transducer, and what to check."""
-_ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable, neither $ nor * within
+"""Advice on what to check, for each status letter that indicates a fault of the wiring or the transducer."""
+_ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable characters except $ and *
 
 
 def checksum(body: bytes) -> int:
@@ -64,7 +65,7 @@ def checksum(body: bytes) -> int:
 
 
 def frame(body: bytes) -> bytes:
-    """Return the line with a body."""
+    """Return the line that contains a body, with its CRC and line feed."""
     return b"$%s*%04X\n" % (body, checksum(body))
 
 
@@ -73,9 +74,9 @@ class LineProtocolDecoder(FramedDecoder):
 
     Notes
     -----
-    The CRC detects every change of one or two bits, every burst of up to 16 bits within the body, and all but one in
-    65536 of other changes. Comment lines (``#``) are counted as ``comment``, commands that the device did not
-    understand as ``refused_command``, and valid lines of a later version as ``unknown_record``.
+    The CRC detects every change of one or two bits, every burst error of up to 16 bits within the body, and all but one
+    in 65536 of the other changes. Comment lines (``#``) are counted as ``comment``, and valid lines of a later version
+    as ``unknown_record``. Reports that the device did not understand a command are counted as ``refused_command``.
     """
 
     def __init__(self) -> None:
@@ -86,26 +87,26 @@ class LineProtocolDecoder(FramedDecoder):
         self.status = DeviceStatus()
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return the reading of a line; count the fault of a line without one."""
+        """Return the reading of a line, or None; count the fault of a line without a reading."""
         row = _reading(host_ns, frame)
         if row is None:
             return self._after_noise(host_ns, frame)
-        if row[3] != row[3]:  # no echo: the status letter gives the reason
+        if row[3] != row[3]:  # there was no echo; the status letter gives the reason
             self._count_no_echo(frame)
         elif self.status.complaint:
             self.status.complaint = ""
         return row
 
     def _count_no_echo(self, frame: bytes) -> None:
-        """Count a reading without an echo, by the reason that the device gives."""
+        """Count a reading without an echo under the reason that the device gives."""
         letter = frame[frame.rindex(b"*") - 1 :][:1]
         name = CONDITIONS.get(letter, "other")
         self.status.conditions[name] = self.status.conditions.get(name, 0) + 1
         self.status.complaint = COMPLAINTS.get(letter, "")
 
     def _after_noise(self, host_ns: int, line: bytes) -> Reading | None:
-        """Return the reading of a line that does not begin correctly, and count its fault."""
-        # Before the last $ there is noise, or a line whose end was lost; the rest may be a whole line.
+        """Return the reading after noise in a line, or None; store an identity, and count the fault of the line."""
+        # The bytes before the last $ are noise, or a line whose end was lost; the rest may be a valid line.
         start = max(line.rfind(b"$"), 0)
         reading = _reading(host_ns, line[start:]) if start else None
         identity = _identity(line, start)
@@ -121,7 +122,7 @@ class LineProtocolDecoder(FramedDecoder):
 
 
 def _reading(host_ns: int, line: bytes) -> Reading | None:
-    """Return the reading of a line without its line feed; None if the line is not valid."""
+    """Return the reading of a line without its line feed, or None if the line is not a valid reading."""
     fields = _LINE.fullmatch(line)
     if fields is None:
         return None
@@ -129,14 +130,14 @@ def _reading(host_ns: int, line: bytes) -> Reading | None:
     count, clock_us = int(sequence), int(device_us)
     if crc_hqx(body, 0xFFFF) != int(crc, 16) or count >= _WRAP or clock_us >= _WRAP:
         return None
-    # Only status E means an echo; with any other letter nothing was measured. An echo time of 0 is impossible.
+    # Only status E means an echo; with any other letter there is no measurement. An echo time of 0 is impossible.
     echo_us = float(echo) if status == b"E" and echo else 0.0
     celsius = int(temperature) / 100 if temperature else NAN
     return Reading(host_ns, count, clock_us, echo_us or NAN, NAN, celsius)
 
 
 def _identity(line: bytes, start: int) -> Identity | None:
-    """Return the identity of the device from a line; None if the line has none."""
+    """Return the identity of the device from the line that begins at ``start``, or None if it gives no identity."""
     envelope = _ENVELOPE.fullmatch(line, start)
     if envelope is None or checksum(envelope[1]) != int(envelope[2], 16):
         return None
@@ -158,12 +159,12 @@ def _fault(line: bytes, start: int) -> str:
 
 
 class LineProtocolEncoder:
-    """Writes the line protocol, with echo times in steps of 0.25 us as in the firmware."""
+    """Encodes readings in the line protocol, with echo times in steps of 0.25 us as in the firmware."""
 
     def encode(
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
     ) -> bytes:
-        """Return one line; a NaN distance or echo means no target."""
+        """Return one line; a NaN distance or echo time means no target."""
         silent = math.isnan(echo_us) or math.isnan(distance_m)
         echo = b"" if silent else b"%.2f" % (round(echo_us * 4) / 4)
         temperature = b"" if math.isnan(temperature_c) else b"%d" % round(temperature_c * 100)

@@ -1,4 +1,4 @@
-"""Cut a stream into lines with limited memory; the lines do not depend on how the stream was cut into reads."""
+"""Cut a stream into lines with bounded memory; the boundaries of reads do not affect the lines."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ __all__ = ["LineSplitter"]
 
 
 class LineSplitter:
-    """Holds an incomplete line and returns complete ones.
+    """Returns complete lines and keeps an incomplete one until its end arrives.
 
     Parameters
     ----------
     end : bytes
         The byte that ends a line.
     limit : int
-        Longest line, bytes without its end. A longer one is dropped and counted as ``bad_frame``.
+        Maximum length of a line without its end, bytes. A longer line is dropped and counted as ``bad_frame``.
     faults : dict of str to int
-        The counts; ``garbage_bytes`` counts the bytes outside of frames.
+        Counts of faults, which this object increases; ``garbage_bytes`` counts the bytes outside of frames.
     skip_first : bool
-        Whether the first line after the start or a flush is dropped and counted as ``partial_line``. Reading may have
-        begun within that line, and half a number looks like a number.
+        Whether the first line after the start or after a flush is dropped and counted as ``partial_line``. Reading may
+        have begun in the middle of that line, and a part of a number looks like a number.
     """
 
     def __init__(self, end: bytes, limit: int, faults: dict[str, int], *, skip_first: bool = False) -> None:
@@ -32,11 +32,11 @@ class LineSplitter:
 
     @property
     def pending(self) -> int:
-        """Bytes of the incomplete line."""
+        """Number of bytes of the incomplete line."""
         return len(self._held)
 
     def split(self, data: bytes) -> list[bytes]:
-        """Return the lines that these bytes complete, without their ends."""
+        """Return the lines that the bytes complete, without their line ends."""
         if self._held:
             data = self._held + data
         lines = data.split(self._end)

@@ -1,8 +1,8 @@
-"""MaxBotix ASCII: ``R``, a fixed number of digits, carriage return, sent by the sensor itself.
+"""MaxBotix ASCII lines, sent without requests: ``R``, a fixed number of digits and a carriage return.
 
-The digits are inches, centimetres or millimetres, depending on the model. The bytes do not show which, so the name of
-the family selects the unit. LV models may add ``Pn`` (proximity), HRUSB models a space before the return. The signal
-has RS-232 polarity at 0 to Vcc: a TTL adapter without an inverter reads noise.
+The digits are inches, centimetres or millimetres, depending on the model. The bytes do not show the unit, so the name
+of the family selects it. Before the carriage return, LV models may add ``Pn`` (proximity) and HRUSB models a space. The
+signal has RS-232 polarity at levels of 0 to Vcc, so a TTL adapter without an inverter reads noise.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from acquisition.readings import NAN, Reading
 
 __all__ = ["FAMILIES", "MaxbotixDecoder", "MaxbotixEncoder", "Variant"]
 
-_LONGEST = 64  # bytes; the lines of the start-up banner are shorter and count as faults like any other text
+_LONGEST = 64  # bytes; the lines of the start-up banner are shorter, and are counted as faults like any other text
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """How a line of models writes a distance.
+    """How a series of models writes a distance.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ class Variant:
     unit_m : float
         Value of the last digit, m.
     no_target : tuple of int
-        Numbers that mean no target, besides 0; the encoder writes the last of them.
+        Numbers that mean no target, in addition to 0; the encoder writes the last of them.
     tail : str
-        Text that the encoder writes between digits and carriage return.
+        Text that the encoder writes between the digits and the carriage return.
     """
 
     digits: int
@@ -53,8 +53,8 @@ class MaxbotixDecoder(FramedDecoder):
 
     Notes
     -----
-    There is no checksum. A reading is a whole ``R`` line of the right length; a flipped bit that gives another digit
-    cannot be detected.
+    There is no checksum. A complete ``R`` line of the right length gives a reading, so a flipped bit that changes one
+    digit to another cannot be detected.
     """
 
     def __init__(self, variant: Variant) -> None:
@@ -64,12 +64,12 @@ class MaxbotixDecoder(FramedDecoder):
         self._form = re.compile(rb"R([0-9]{%d})(?: P[0-9]| )?" % variant.digits)
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return the distance of a line, and count garbage before it or instead of it."""
-        # Before the last R there is noise, or a line whose return was lost; the rest may be a whole line.
+        """Return the reading of a line; count bytes before an ``R`` line, or a line that is invalid, as faults."""
+        # The bytes before the last R are noise, or a line whose carriage return was lost; the rest may be a valid line.
         start = max(frame.rfind(b"R"), 0)
         match = self._form.fullmatch(frame, start)
         garbage = start if match else len(frame) + 1
-        if frame[:garbage] == b"\n":  # adapters that end lines with CR LF
+        if frame[:garbage] == b"\n":  # some adapters end lines with CR LF
             self._frames.faults["garbage_bytes"] += garbage
         elif garbage:
             self._count("bad_frame", garbage)
@@ -80,7 +80,7 @@ class MaxbotixDecoder(FramedDecoder):
 
 
 class MaxbotixEncoder:
-    """Writes ``R`` lines.
+    """Encodes distances as ``R`` lines.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class MaxbotixEncoder:
         self._variant = variant
 
     def encode(self, *, distance_m: float, **_: float) -> bytes:
-        """Return one line; it contains only the distance."""
+        """Return one line, which contains only the distance."""
         form = self._variant
         number = 0 if math.isnan(distance_m) else round(distance_m / form.unit_m)
         if not 0 < number < form.no_target[-1]:
@@ -173,4 +173,4 @@ _EVERY = (
     ),
 )
 FAMILIES = {family.name: family for family in _EVERY}
-"""By name."""
+"""The families, by name."""

@@ -1,7 +1,7 @@
-"""The families of rangefinders, and the recognition of a family by its bytes.
+"""The registry of the families of rangefinders, and the recognition of a family by its bytes.
 
-The table holds only names; the module of a family is imported on demand. Another package adds a family with an entry
-point in the group ``springmass.sensors`` that names a :class:`acquisition.decoders.family.Family`.
+The table contains only names; the module of a family is imported on demand. Another package can add a family with an
+entry point in the group ``springmass.sensors`` that refers to a :class:`acquisition.decoders.family.Family`.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ _TABLE: dict[str, tuple[str, str]] = {
 }
 
 _ENOUGH = 0.5
-"""Smallest share of the bytes in valid frames for a family to be recognised."""
+"""Minimum fraction of bytes in valid frames for a family to be recognised."""
 
 
 def families() -> tuple[Family, ...]:
-    """Return every family, those of this package first.
+    """Return all families, with those of this package first.
 
     Examples
     --------
@@ -53,12 +53,12 @@ def families() -> tuple[Family, ...]:
 
 
 def get_family(name: str) -> Family:
-    """Return the family of that name.
+    """Return the family with a given name.
 
     Raises
     ------
     SensorError
-        If there is none, or the package that provides it cannot be loaded.
+        If there is no such family, or the package that provides it cannot be loaded.
     """
     if name in _TABLE:
         return _built_in(name)
@@ -70,10 +70,10 @@ def get_family(name: str) -> Family:
 
 
 def probe(data: bytes) -> list[str]:
-    """Return the families that recognise bytes from a port, the best first.
+    """Return the names of the families that recognise bytes from a port, best match first.
 
-    A family recognises them if at least half of the bytes are in valid frames. A family without mark or checksum is
-    returned only if there is no other, and all of two or more replies are in range.
+    A family recognises bytes if at least half of them are in valid frames. A family without marker or checksum is
+    returned only if no other family is recognised, and the bytes give at least two replies, all in range.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def probe(data: bytes) -> list[str]:
 
 
 def describe_bytes(data: bytes) -> str:
-    """Return one line for the user that describes bytes from a port.
+    """Return a one-line description of bytes from a port, for the user.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def describe_bytes(data: bytes) -> str:
 
 
 def _share(family: Family, data: bytes) -> float:
-    """Return the share of the bytes in valid frames, without an incomplete frame at the end."""
+    """Return the fraction of bytes in valid frames; an incomplete frame at the end is not counted."""
     decoder = family.decoder()
     readings = decoder.feed(0, data)
     whole = len(data) - decoder.pending
@@ -128,7 +128,7 @@ def _is_text(data: bytes) -> bool:
 
 
 def _sample(data: bytes) -> str:
-    """Return the beginning of the first line that is not empty."""
+    """Return up to 40 characters of the first non-blank line."""
     lines: Iterable[str] = data.decode("ascii", "replace").splitlines()
     return next((line.strip()[:40] for line in lines if line.strip()), "")
 
@@ -139,7 +139,7 @@ def _built_in(name: str) -> Family:
 
 
 def _checked(name: str, loaded: Any) -> Family:
-    """Return a loaded family, or the one of that name from a table of several."""
+    """Return the loaded family, or the family of the given name if a table of families was loaded."""
     family = loaded.get(name) if isinstance(loaded, dict) else loaded
     if not isinstance(family, Family):
         raise SensorError(f"sensor {name!r}: expected a Family, got {type(family).__name__}; repair the package")

@@ -1,4 +1,4 @@
-"""Polled sensors that reply in summed frames of one size, such as the URM37 and the SEN0149."""
+"""Polled sensors that reply in checksummed frames of fixed size, such as the URM37 and the SEN0149."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ __all__ = ["ReplyDecoder", "ReplyForm"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplyForm:
-    """The replies of one family: head, two bytes of value (high byte first), sum.
+    """The form of the replies of a family: a head, a value of two bytes (high byte first) and a sum.
 
     Parameters
     ----------
     distance_head, temperature_head : bytes
-        The bytes before the value, as the encoder writes them; the last one is the command.
+        Bytes before the value, as the encoder writes them; the last byte is the command.
     ask_distance, ask_temperature : bytes
-        The requests.
+        Bytes of the two requests.
     plausible : callable
-        Returns whether a frame with a correct sum is possible.
+        Returns whether the sensor can send a frame whose sum is correct.
     metres, celsius : callable
-        Convert a value to m and degC; NaN for a code without a value.
+        Convert a value to m and degC; a value that means no measurement gives NaN.
     distance_code, temperature_code : callable
-        Convert back, from a number that may be NaN or out of range.
+        Convert m and degC to a value; the argument may be NaN or out of range.
     """
 
     distance_head: bytes
@@ -42,7 +42,7 @@ class ReplyForm:
     temperature_code: Callable[[float], int]
 
     def encoder(self, temperature_every: int = 0) -> PolledEncoder:
-        """Return the simulated sensor's encoder."""
+        """Return an encoder for the simulated sensor."""
         return PolledEncoder(
             Cycle(self.ask_distance, self.ask_temperature, temperature_every),
             lambda distance_m: with_sum(self.distance_head + self.distance_code(distance_m).to_bytes(2, "big")),
@@ -51,7 +51,7 @@ class ReplyForm:
 
 
 class ReplyDecoder(FramedDecoder):
-    """Decodes such replies; a temperature becomes part of the next distance reading.
+    """Decodes the replies of a :class:`ReplyForm`; a temperature is added to the next distance reading.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class ReplyDecoder(FramedDecoder):
         return self._cycle.request
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return a reply's distance; keep a temperature for the next one."""
+        """Return the reading of a distance reply; keep a temperature for the next reading."""
         at = self._command_at
         value = frame[at + 1] << 8 | frame[at + 2]
         is_temperature = frame[at] == self._form.temperature_head[-1]

@@ -1,7 +1,7 @@
-"""DFRobot SEN0149 and SEN0150 (URM06, RS-485 and UART): polled, frames ``55 AA address length command H L SUM``.
+"""DFRobot SEN0149, SEN0150 (URM06, RS-485, UART): polled, frames ``55 AA address length command H L SUM``.
 
-Command 2 asks for the distance: ``55 AA 11 02 02 12 34 5A`` is 4660 mm. Command 3 asks for the temperature, 0.1 degC
-in two's complement. FF FF is out of range in either.
+Command 2 requests the distance in mm: the reply ``55 AA 11 02 02 12 34 5A`` is 4660 mm. Command 3 requests the
+temperature in 0.1 degC, in two's complement. In either reply, FF FF means out of range.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _FARTHEST_MM = 12_000
 
 
 def _plausible(frame: bytes) -> bool:
-    """Return whether a frame can be a reply, from any address."""
+    """Return whether a frame can be a reply of the sensor, whose address may have any value."""
     value = frame[5] << 8 | frame[6]
     if frame[1] != 0xAA or frame[3] != 2:
         return False

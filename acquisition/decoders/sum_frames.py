@@ -1,4 +1,4 @@
-"""Find frames of one size that begin with a known byte and end with the sum of the bytes before."""
+"""Find frames of fixed size that begin with a known byte and end with the sum of all preceding bytes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["SumFrames", "with_sum"]
 
 
 def with_sum(body: bytes) -> bytes:
-    """Return a frame: the body and the low eight bits of its sum.
+    """Return a frame that consists of the body and the low eight bits of its sum.
 
     Examples
     --------
@@ -19,22 +19,22 @@ def with_sum(body: bytes) -> bytes:
 
 
 class SumFrames:
-    """Cuts a stream into frames, byte by byte from the left, so that it does not matter how reads cut the stream.
+    """Cuts a stream into frames, byte by byte from the left; the boundaries of reads do not affect the frames.
 
     Parameters
     ----------
     size : int
         Size of a frame, bytes.
     starts : bytes
-        Possible first bytes.
+        Possible first bytes of a frame.
     plausible : callable
-        Returns whether a frame with a correct sum is possible. One wrong frame in 256 has a correct eight-bit sum, and
-        a steady distance can repeat it for ever. Values that no sensor sends must not keep the decoder out of step.
+        Returns whether the sensor can send a frame whose sum is correct. One wrong frame in 256 has a correct eight-bit
+        sum, and a constant distance can repeat it forever. This check keeps the decoder from staying misaligned.
 
     Notes
     -----
-    After an invalid frame the search continues at its second byte. So an incomplete frame costs itself and at most the
-    next one.
+    After an invalid frame the search continues at its second byte. So an incomplete frame causes the loss of itself and
+    of at most the next frame.
     """
 
     def __init__(self, size: int, starts: bytes, plausible: Callable[[bytes], bool]) -> None:
@@ -46,11 +46,11 @@ class SumFrames:
 
     @property
     def pending(self) -> int:
-        """Bytes of an incomplete frame."""
+        """Number of bytes of an incomplete frame."""
         return len(self._held)
 
     def split(self, data: bytes) -> list[bytes]:
-        """Return the whole frames."""
+        """Return the frames that the bytes complete."""
         data = self._held + data
         size, starts, plausible = self._size, self._starts, self._plausible
         frames: list[bytes] = []

@@ -1,8 +1,9 @@
-r"""Lines of text from a microcontroller's sketch: a number in a column, or after a name.
+r"""Text lines from a microcontroller's sketch, with the reading as a number in a column or after a name.
 
-``12.34``, ``512;12.34``, ``t=512 d=12.34 cm``: options state column, unit and separator, because the lines do not. The
-port may be opened in the middle of a line, and the last digits of a number look like a whole number. So the first
-line is dropped and counted as ``partial_line``. A line without the expected number is counted as ``bad_frame``.
+Examples are ``12.34``, ``512;12.34`` and ``t=512 d=12.34 cm``. Options state the column, the unit and the separator,
+because the lines do not. The port may be opened in the middle of a line, and the last digits of a number look like a
+complete number. So the first line is dropped and counted as ``partial_line``. A line without the expected number is
+counted as ``bad_frame``.
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from acquisition.readings import NAN, Reading
 __all__ = ["FAMILY", "TextLinesDecoder", "TextLinesEncoder"]
 
 LONGEST = 256
-"""Longest line, bytes."""
+"""Maximum length of a line, bytes."""
 
 LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}
 
-_FARTHEST_M = 20.0  # no rangefinder in air receives an echo from there
-_LATEST_US = 38_000.0  # an HC-SR04 sends this value if there was no echo
+_FARTHEST_M = 20.0  # no rangefinder in air receives an echo from this distance
+_LATEST_US = 38_000.0  # an HC-SR04 reports this value if there was no echo
 
 _OPTIONS = {
     "column": "of the reading: a number from 0, or a name as in d=12.3 (default 0)",
@@ -41,18 +42,18 @@ _OPTIONS = {
 
 
 class _Form:
-    """The columns of a line; the parameters are the family's options.
+    """The columns of a line; the parameters are the options of the family.
 
     Parameters
     ----------
     column, sequence, time, temperature : int or str, optional
-        Number from 0 or name of a column.
+        Number (from 0) or name of each column.
     unit : str
-        m, cm, mm, in, or us for an echo time there and back.
+        Unit of the reading: m, cm, mm, in, or us for a round-trip echo time.
     separator : str, optional
-        One character; by default blanks, commas and semicolons separate.
+        One character; by default blanks, commas and semicolons are separators.
     time_unit : str
-        us, ms or s.
+        Unit of the time: us, ms or s.
 
     Raises
     ------
@@ -95,9 +96,9 @@ class TextLinesDecoder(FramedDecoder):
 
     Notes
     -----
-    There is no checksum. A reading is a number in a line that was received completely; a flipped bit that gives another
-    digit cannot be detected. Zero, negative numbers, echo times of 38 ms or more and distances of 20 m or more are
-    missing samples.
+    There is no checksum. A number in a completely received line gives a reading, so a flipped bit that changes a digit
+    to another digit cannot be detected. Zero, negative numbers, echo times of 38 ms or more and distances of 20 m or
+    more are missing samples.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -106,7 +107,7 @@ class TextLinesDecoder(FramedDecoder):
         super().__init__(LineSplitter(b"\n", LONGEST, faults, skip_first=True))
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
-        """Return the reading of a line; count the fault of a line without one."""
+        """Return the reading of a line, or None; count the fault of a line without a reading."""
         text = frame.strip(b"\r ")
         if not text:
             self._count("blank_line", 0)
@@ -126,7 +127,7 @@ class TextLinesDecoder(FramedDecoder):
 
 
 def _whole(column: Column | None, text: bytes, cells: list[bytes], scale: float) -> int | None:
-    """Return the whole number in a column: -1 if the column is not used, None if there is no number from 0."""
+    """Return the scaled whole number in a column; -1 without a column, None without a valid number of at least 0."""
     if column is None:
         return -1
     value = column.number(text, cells)
@@ -140,7 +141,7 @@ def _factor(option: str, unit: str, known: Mapping[str, float], *more: str) -> f
 
 
 class TextLinesEncoder:
-    """Writes text lines for a decoder with the same options."""
+    """Encodes readings as text lines for a decoder with the same options."""
 
     def __init__(self, **options: Any) -> None:
         self._form = form = _Form(**options)
@@ -150,7 +151,7 @@ class TextLinesEncoder:
     def encode(
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
     ) -> bytes:
-        """Return one line; 0 for no target."""
+        """Return one line; the value 0 means no target."""
         form = self._form
         value = echo_us if form.is_echo else distance_m / form.scale
         numbers = {

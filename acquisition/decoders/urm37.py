@@ -1,7 +1,8 @@
-"""DFRobot URM37 (SEN0001): polled, frames of command, two data bytes, sum.
+"""DFRobot URM37 (SEN0001): a polled sensor with frames of a command, two data bytes and a sum.
 
-``22 00 00 22`` requests the distance (reply ``22 H L SUM``, cm), ``11 00 00 11`` the temperature (reply
-``11 H L SUM``, 0.1 degC: twelve bits, the upper four all 1 below zero). FF FF is invalid in both.
+The request ``22 00 00 22`` returns the distance in cm (reply ``22 H L SUM``). The request ``11 00 00 11`` returns the
+temperature in 0.1 degC (reply ``11 H L SUM``): twelve bits, with the upper four bits all 1 below zero. In both, the
+value FF FF is invalid.
 """
 
 from __future__ import annotations
@@ -30,14 +31,15 @@ def _plausible(frame: bytes) -> bool:
 
 
 def _metres(value: int) -> float:
-    # 0 is nearer than the transducer can measure, so it means no target like FF FF.
+    # The transducer cannot measure a distance of 0, so the value 0 means no target, like FF FF.
     return NAN if value in (0, _INVALID) else value / 100
 
 
 def _celsius(value: int) -> float:
-    """Return degC. Below zero it is sign and magnitude as in the manual, or two's complement as some firmware sends.
+    """Return the temperature of a value, degC; NaN if it is invalid.
 
-    No code is valid in both forms: the range of one is an impossible temperature in the other.
+    Below zero, the value is in sign and magnitude as in the manual, or in two's complement as in some firmware. No
+    value is valid in both forms: a possible temperature in one form is impossible in the other.
     """
     if value == _INVALID:
         return NAN

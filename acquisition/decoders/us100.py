@@ -1,14 +1,14 @@
-"""US-100: polled, replies without header and checksum.
+"""US-100: a polled sensor whose replies have neither a header nor a checksum.
 
-0x55 requests the distance (reply H L, mm), 0x50 the temperature (reply one byte, T + 45 degC). Only the request shows
-what the bytes mean, so a surplus or missing byte shifts every later reply: a temperature of -44 degC was seen that way.
-Three rules keep the decoder in step:
+The request 0x55 returns the distance in mm (high byte, low byte), the request 0x50 the temperature (one byte, the
+temperature in degC plus 45). Only the request determines what the bytes mean, so a surplus or missing byte shifts every
+later reply: in one case this gave a temperature of -44 degC. Three rules keep the decoder synchronised:
 
 - The reader flushes after a time-out, and before a request if bytes are ``pending``.
-- A distance outside 20 to 4500 mm is a missing sample. Out of step, the low byte takes the place of the high byte, and
-  14 of 15 readings are out of that range.
-- If two consecutive readings are out of range, but give a distance in range when read one byte later, one byte is
-  skipped and counted as ``resynchronised``.
+- A distance outside 20 to 4500 mm is a missing sample. When the decoder is shifted by one byte, the low byte takes the
+  place of the high byte, and 14 of 15 readings are outside that range.
+- Two consecutive readings may be out of range but give a distance in range if they are read one byte later. Then one
+  byte is skipped and counted as ``resynchronised``.
 """
 
 from __future__ import annotations
@@ -33,12 +33,13 @@ def _in_range(high: int, low: int) -> bool:
 
 
 class Us100Decoder:
-    """Decodes US-100 replies; a temperature becomes part of the next distance reading.
+    """Decodes US-100 replies; a temperature is added to the next distance reading.
 
     Parameters
     ----------
     temperature_every : int
-        Number of distances between two temperatures; 0 for no temperatures. It needs a reader that sends ``request``.
+        Number of distances between two temperatures; 0 for no temperatures. Temperatures need a reader that sends
+        the bytes of :attr:`request`.
     """
 
     def __init__(self, temperature_every: int = 0) -> None:
@@ -46,16 +47,16 @@ class Us100Decoder:
         self._faults = {"garbage_bytes": 0, "bad_temperature": 0, "resynchronised": 0}
         self._held = b""
         self._celsius = NAN
-        self._odd_low: int | None = None  # low byte of the last reply, if its distance was out of range
+        self._odd_low: int | None = None  # low byte of the last reply if its distance was out of range, else None
 
     @property
     def faults(self) -> Mapping[str, int]:
-        """Counts of faults; a distance out of range is a missing sample instead."""
+        """Counts of faults, by name; a distance out of range is not a fault but a missing sample."""
         return MappingProxyType(self._faults)
 
     @property
     def pending(self) -> int:
-        """Bytes of an incomplete reply; should be 0 when a request is due."""
+        """Number of bytes of an incomplete reply; it should be 0 when a request is due."""
         return len(self._held)
 
     @property
@@ -64,7 +65,7 @@ class Us100Decoder:
         return self._cycle.request
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Return the readings of the replies that these bytes complete."""
+        """Return the readings of the replies that the bytes complete."""
         data = self._held + data
         readings: list[Reading] = []
         at, size = 0, len(data)
@@ -103,7 +104,7 @@ class Us100Decoder:
         return (high << 8 | low) / 1000 if _in_range(high, low) else NAN
 
     def _slips(self, high: int, low: int) -> int:
-        """Return 1 if the last low byte must be the high byte of the next reply, else 0."""
+        """Return 1 if this low byte must be the high byte of the next reply, else 0."""
         before = self._odd_low
         self._odd_low = None if _in_range(high, low) else low
         if before is None or self._odd_low is None or not _in_range(before, high):

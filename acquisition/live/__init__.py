@@ -1,7 +1,7 @@
 """Read ports and turn their bytes into samples.
 
-In: bytes from serial and network ports, each read with its host time. Out: these reads, unchanged, to a sink; and
-through a sensor's chain (decoder, timebase, calibration) a :class:`~acquisition.block.Block` of samples.
-``serial_port`` opens and names ports, ``calibration`` calibrates a sensor. ``timebase`` and ``decoding`` also rebuild
-every recorded run from its log, so their results must stay the same bit for bit.
+The input is bytes from serial and network ports, with a host time for each read. The reads are passed unchanged to a
+sink. The chain of a sensor (decoder, timebase, calibration) turns them into a :class:`~acquisition.block.Block` of
+samples. ``serial_port`` lists and opens ports, and ``calibration`` calibrates a sensor. ``timebase`` and ``decoding``
+also reconstruct every recorded run from its log, so future versions must give bit-identical results.
 """

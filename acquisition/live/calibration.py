@@ -1,4 +1,4 @@
-"""Calibration: convert echo times and stated distances to metres. The numbers used are stored with the result."""
+"""Calibration: convert echo times and stated distances to metres; its numbers are stored with the result."""
 
 from __future__ import annotations
 
@@ -22,20 +22,21 @@ MAD_TO_SIGMA = 1.482602218505602
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """How readings become distances.
+    """The conversion of readings to distances.
 
-    :math:`d = s\\,c\\,\\tau/2 + d_0` for an echo time, :math:`d = s\\,d_r + d_0` for a distance that the device states.
+    An echo time gives :math:`d = s\\,c\\,\\tau/2 + d_0`; a distance stated by the device gives
+    :math:`d = s\\,d_r + d_0`.
 
     Parameters
     ----------
     speed_of_sound_m_per_s : float
-        Used for echo times. The recording holds echo times, so another speed can be applied later.
+        Speed of sound for echo times. The recording contains echo times, so another speed can be applied later.
     scale : float
-        Factor of the distances, from known ones.
+        Scale factor of the distances, determined from known distances.
     offset_m : float
-        Added to the distances, m, because the transducer's face is not the zero of the scale.
+        Offset added to the distances, m, because the face of the transducer is not the zero of the scale.
     u_scale, u_offset_m : float
-        Standard uncertainties.
+        Standard uncertainties of ``scale`` and of ``offset_m`` in m.
     """
 
     speed_of_sound_m_per_s: float = SPEED_OF_SOUND_M_PER_S
@@ -57,23 +58,23 @@ class Calibration:
                 )
 
     def distance(self, echo_us: ArrayLike, distance_m: ArrayLike) -> F8:
-        """Return distances, m, from echo times, us, or from stated distances, m, without an echo time; else NaN."""
+        """Return the distances in m from echo times in us or, if an echo time is NaN, from the stated distance in m."""
         raw = np.where(np.isfinite(echo_us), 0.5e-6 * self.speed_of_sound_m_per_s * np.asarray(echo_us), distance_m)
         return np.asarray(self.scale * raw + self.offset_m)
 
     def restated(self, point: StillPoint, before: Calibration) -> StillPoint:
-        """Convert a rest position that was measured with the calibration ``before`` to this calibration."""
+        """Convert a rest position measured with the calibration ``before`` to this calibration."""
         ratio = self.scale / before.scale
         rest_m = (point.rest_m - before.offset_m) * ratio + self.offset_m
         return StillPoint(rest_m, point.u_rest_m * ratio, point.noise_m * ratio, point.samples)
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the numbers by name, for the log and the run file."""
+        """Return the numbers of the calibration by name, for the log and the run file."""
         return asdict(self)
 
     @classmethod
     def from_mapping(cls, numbers: Mapping[str, Any]) -> Calibration:
-        """Return the calibration that :meth:`to_mapping` wrote; unknown names are refused."""
+        """Return the calibration from a result of :meth:`to_mapping`; unknown names raise a CalibrationError."""
         try:
             return cls(**{name: float(value) for name, value in numbers.items()})
         except (TypeError, ValueError) as error:
@@ -102,12 +103,13 @@ class StillPoint:
 
 
 def from_still(distance: F8) -> StillPoint:
-    """Return rest position and noise from distances (n,) in m taken while the bob hangs still.
+    """Return the rest position and the noise from (n,) distances in m, measured while the bob hangs still.
 
     Raises
     ------
     CalibrationError
-        If there are fewer than ten distances, or the bob moves: its slow motion exceeds five times the noise.
+        If there are fewer than ten distances, or the bob moves: the distances scatter by more than five times the
+        noise and by more than 0.5 mm.
     """
     known = distance[np.isfinite(distance)]
     if known.size < 10:
@@ -117,7 +119,7 @@ def from_still(distance: F8) -> StillPoint:
         )
     rest_m = float(np.median(known))
     total = MAD_TO_SIGMA * float(np.median(np.abs(known - rest_m)))
-    # First differences contain the noise and hardly any slow motion.
+    # First differences contain the noise, but almost no slow motion.
     steps = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(known)))) / math.sqrt(2.0)
     floor = max(steps, 1e-6)
     if total > 5.0 * floor and total > 5e-4:
@@ -137,17 +139,20 @@ def against_ruler(
     Parameters
     ----------
     measured : tuple of StillPoint
-        Taken with ``base``.
+        Rest positions measured with the calibration ``base``.
     known_m : tuple of float
-        Distances by the ruler, m. One gives the offset; two or more that differ by a tenth also give the scale.
+        Distances by the ruler, m. One distance gives the offset. Two or more also give the scale, if their range is at
+        least a tenth of the largest distance.
     u_known_m : float
         Standard uncertainty of one ruler reading, m.
     base : Calibration, optional
+        Calibration of the measurements; by default ``Calibration()``.
 
     Raises
     ------
     CalibrationError
-        If the numbers of distances differ, or the scale differs from 1 by more than a tenth, as with a wrong unit.
+        If there are no measurements, or not one for each ruler distance, or if the scale differs from 1 by more than a
+        tenth, for example because of a wrong unit.
     """
     base = base or Calibration()
     if not measured or len(measured) != len(known_m):

@@ -1,8 +1,8 @@
-"""Compare the device's clock with the host's: its rate error, without the readings that a stall delayed.
+"""Estimate the rate error of the device's clock relative to the host's, without readings that a stall delayed.
 
-A host time is late because of transport and scheduling, usually by a few milliseconds. A network or bridge that stalls
-delays readings by seconds and then delivers all of them together. These readings are recognised by their host times
-and left out.
+Transport and scheduling delay a host time, usually by a few milliseconds. A network or bridge that stalls delays
+readings by seconds and then delivers all of them together. These readings are recognised by their host times and
+excluded.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from acquisition.block import F8, I8
 __all__ = ["COUNTER_PPM", "ClockFit", "ClockSamples", "fit_clock"]
 
 COUNTER_PPM = 100_000.0
-"""Largest error of a program's rate, ppm: a loop that waits 10 ms also needs the time of the ping."""
+"""Maximum rate error of a counter, ppm: a program that waits 10 ms in a loop also needs the time of the ping."""
 
 STALL_S = 0.25
-"""Smallest delay of a stall, s; jitter is shorter."""
+"""Minimum delay of a stall, s; delays by jitter are shorter."""
 SILENCE_S = 0.05
-"""Smallest step of the delays that counts as a silence, s."""
+"""Minimum step in the delays that indicates a silence, s."""
 STEP_S = 0.02
-"""Smallest step of the least delay that is a clock jump, s: a USB bridge holds bytes for 16 ms (FTDI AN232B-04)."""
+"""Minimum step in the minimum delay that indicates a clock jump, s: USB bridges delay by 16 ms (FTDI AN232B-04)."""
 MIN_SAMPLES = 24
 MAX_SAMPLES = 1 << 19
-"""Largest number of samples of a run that are used for the fit; they are evenly spread."""
+"""Maximum number of samples in a fit, spread evenly over the run."""
 NANO = 1e-9
 
 
@@ -39,24 +39,26 @@ class ClockFit:
     Parameters
     ----------
     rate_error_ppm : float
-        How much faster the sensor's clock runs than the host's, ppm; NaN if the host times do not determine it.
+        Relative rate by which the sensor's clock runs faster than the host's, ppm; NaN if the host times do not
+        determine it.
     u_rate_error_ppm : float
-        Its standard uncertainty from the scatter of the host times; the error of the host's crystal is not included.
+        Standard uncertainty of the rate error from the scatter of the host times, ppm; the error of the host's crystal
+        is not included.
     jitter_s : float
-        Standard deviation of the host times about the line, s.
+        Standard deviation of the host times about the fitted line, s.
     readings : int
-        Number of all readings, including those left out.
+        Number of readings given to the fit, including the excluded ones.
     held : int
-        Readings that were delayed by a stall and left out.
+        Number of readings that were delayed by a stall and excluded.
     stalls : int
-        Number of stalls; the readings of each came as a burst after a silence.
+        Number of stalls; the delayed readings of each stall came as a burst.
     longest_stall_s : float
-        Longest delay by a stall, s.
+        Maximum delay by a stall, s.
     steps : int
-        Number of permanent jumps of one clock relative to the other: the host slept, or the device paused or restarted
-        its counter. The two sides of a jump are fitted with separate offsets.
+        Number of permanent jumps of one clock relative to the other, because the host slept, or the device paused or
+        restarted its counter. The readings before and after a jump are fitted with separate offsets.
     span_s : float
-        Longest time without a jump, s.
+        Longest duration without a jump, s.
     """
 
     rate_error_ppm: float
@@ -71,7 +73,7 @@ class ClockFit:
 
 
 class ClockSamples:
-    """Collects the times of both clocks for samples that are spread evenly over a run of any length."""
+    """Collects the times of both clocks for a bounded number of samples, spread evenly over a run of any length."""
 
     def __init__(self) -> None:
         self._step = 1
@@ -79,11 +81,11 @@ class ClockSamples:
         self._count = 0
 
     def take(self, first: int, t: F8, host_ns: I8) -> None:
-        """Add the next samples: the index of the first, sensor times in s, host times in ns."""
+        """Add the next samples, with the index of the first, their sensor times in s and their host times in ns."""
         chosen = slice(-first % self._step, None, self._step)
         t, host_ns = t[chosen], host_ns[chosen]
         before, self._count = self._count, self._count + t.size
-        if self._count > self._t.size:  # doubling the arrays is ten times faster than one array per read
+        if self._count > self._t.size:  # doubling the size is ten times faster than extending the arrays at each read
             room = max(self._count, 2 * self._t.size) - before
             self._t = np.concatenate([self._t[:before], np.empty(room)])
             self._host_ns = np.concatenate([self._host_ns[:before], np.empty(room, np.int64)])
@@ -95,35 +97,37 @@ class ClockSamples:
             self._count = self._t.size
 
     def columns(self) -> tuple[F8, I8]:
-        """Return sensor times in s and host times in ns."""
+        """Return the sensor times in s and the host times in ns."""
         return self._t[: self._count], self._host_ns[: self._count]
 
 
 def fit_clock(t: F8, host_ns: I8) -> ClockFit:
-    """Regress the host clock on sensor time.
+    """Fit a line to the host times as a function of the sensor times, and return the comparison of the clocks.
 
     Parameters
     ----------
     t : (n,) float64, s
-        Sensor times of the pings, if the device sends them. The times of the reflections would vary with the position
-        of the bob.
+        Sensor times of the readings: the ping times, if the device sends a clock time. Reflection times are unsuitable,
+        because they vary with the position of the bob.
     host_ns : (n,) int64, ns
         Host times of the same readings.
 
     Notes
     -----
-    A host time is never early, because transport and scheduling only delay it. The least delays in a dozen stretches
-    therefore lie on a line whose slope is the rate error. This determines the slope far better than least squares
-    through all host times [1]_. If the host times scatter to both sides (a bridge with its own clock, a virtual
-    machine), the minima scatter more than the mean. So both lines are fitted, and the one with the smaller uncertainty
-    is returned.
+    A host time is never early, because transport and scheduling can only delay it. The run is divided into twelve
+    stretches; the minimum delays of the stretches lie on a line whose slope gives the rate error. This determines the
+    slope far better than least squares through all host times [1]_. The host times may scatter to both sides (a bridge
+    with its own clock, a virtual machine); then the minima scatter more than the mean. So both lines are fitted, and
+    the line with the smaller uncertainty is used.
 
-    Readings that a stall delayed come in a burst: going back in time, their delays grow by one second per second,
-    which no clock does. With delays :math:`d_i` at times :math:`t_i`, reading i belongs to a burst if
-    :math:`d_i > d_j + (t_j - t_i)/2` for a later reading j. Its delay is twice the difference, and it is left out.
+    Readings that a stall delayed come in a burst: their delays decrease by one second per second, which no clock error
+    can cause. With delays :math:`d_i` at times :math:`t_i`, reading i belongs to a burst if
+    :math:`d_i > d_j + (t_j - t_i)/2` for a later reading j. Twice the maximum difference between the two sides is the
+    lateness of the reading. A burst is excluded as a stall if its maximum lateness is at least 0.25 s, and it includes
+    a silence or its readings arrive together.
 
-    If the least delay jumps permanently, the lines on either side have the same slope but different offsets. LSL's
-    importers treat streams that restarted in the same way [2]_.
+    If the minimum delay jumps permanently, the lines before and after the jump have the same slope but different
+    offsets. The importers of LSL (lab streaming layer) treat restarted streams in the same way [2]_.
 
     References
     ----------
@@ -136,11 +140,11 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     no_fit = ClockFit(math.nan, math.inf, math.nan, n)
     if n < MIN_SAMPLES or not np.isfinite(t).all() or t[-1] <= t[0]:
         return no_fit
-    # Host times so far apart come from no clock, and their difference would overflow.
+    # No clock gives host times so far apart, and their difference would overflow.
     if int(host_ns.max()) - int(host_ns.min()) >= 1 << 62:
         return no_fit
     if not (ahead := np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])).all():
-        t, host_ns = t[ahead], host_ns[ahead]  # without repeated times and times that run backward
+        t, host_ns = t[ahead], host_ns[ahead]  # exclude repeated times and times that run backward
         if t.size < MIN_SAMPLES:
             return no_fit
     x = t - 0.5 * (t[0] + t[-1])
@@ -162,7 +166,7 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     if not (math.isfinite(u_slope) and slope > -1.0):
         return ClockFit(math.nan, math.inf, math.nan, n, *stall_facts, len(steps))
     return ClockFit(
-        # Not simply -slope: at 50 ppm the quadratic term is many times the uncertainty of a long run.
+        # The result is not simply -slope: at 50 ppm the quadratic term is many times the uncertainty of a long run.
         -slope / (1.0 + slope) * 1e6,
         u_slope * 1e6,
         float(np.std(_within(delay - slope * x, part))),
@@ -174,16 +178,16 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
 
 
 def _lateness(x: F8, delay: F8) -> F8:
-    """Return the delay of each reading, s, if it belongs to a burst, because a later reading came sooner; else 0."""
+    """Return the lateness of each reading, s; it is positive if a later reading had a much shorter delay, else 0."""
     sooner = np.minimum.accumulate((delay + 0.5 * x)[::-1])[::-1] - 0.5 * x
     return np.asarray(2.0 * (delay - sooner))
 
 
 def _stalls(x: F8, delay: F8, late: F8) -> list[tuple[int, int]]:
-    """Return the first row of each stall and the row after its last.
+    """Return the first row of each stall, and the row after its last row.
 
-    A counter whose nominal rate is wrong by a factor also looks late everywhere. But its host times are evenly spread,
-    while a stall has a silence or delivers its readings together.
+    If the nominal rate of a counter is wrong by a factor, all readings may seem late. But their host times are evenly
+    spread, while a stall includes a silence or delivers its readings together.
     """
     change = np.diff(delay)
     silence = np.concatenate([[False], change > max(SILENCE_S, 5.0 * float(np.median(np.abs(change))))])
@@ -198,7 +202,7 @@ def _stalls(x: F8, delay: F8, late: F8) -> list[tuple[int, int]]:
 
 
 def _steps(x: F8, delay: F8, stretches: int = 48) -> I8:
-    """Return the readings at which one clock jumped relative to the other: the least delay has a step there."""
+    """Return the rows at which one clock jumped relative to the other, found by steps in the minimum delay."""
     parts = [part for part in _parts(x, stretches) if part.size]
     if len(parts) < stretches // 4:
         return np.empty(0, np.int64)
@@ -211,7 +215,7 @@ def _steps(x: F8, delay: F8, stretches: int = 48) -> I8:
 
 
 def _parts(x: F8, stretches: int) -> list[I8]:
-    """Return the rows of the readings in stretches of equal duration."""
+    """Divide the readings into stretches of equal duration, and return the rows of each stretch."""
     edges = np.linspace(x[0], x[-1], stretches + 1)
     return np.split(np.arange(x.size), np.searchsorted(x, edges[1:-1]))
 
@@ -219,9 +223,9 @@ def _parts(x: F8, stretches: int) -> list[I8]:
 def _through_minima(x: F8, delay: F8, part: NDArray[np.int64], stretches: int = 12) -> tuple[float, float]:
     slope, line_u = 0.0, math.inf
     parts = [rows for rows in _parts(x, stretches) if rows.size]
-    if len(parts) < stretches // 2:  # a few points are always close to a line
+    if len(parts) < stretches // 2:  # too few points are always close to a line
         return 0.0, math.inf
-    # The minima are taken relative to the current line, because with a steep line they would lie at the ends.
+    # The minima are taken relative to the current line; otherwise a steep line would move them to the stretch ends.
     for _ in range(3):
         offset = delay - slope * x
         lowest = np.array([rows[np.argmin(offset[rows])] for rows in parts])
@@ -245,7 +249,7 @@ def _through_all(x: F8, delay: F8, part: NDArray[np.int64]) -> tuple[float, floa
 
 
 def _within(y: F8, part: NDArray[np.int64]) -> F8:
-    """Return values minus the mean of their part."""
+    """Return the values minus the mean of their part."""
     if part[0] == part[-1]:
         return np.asarray(y - y.mean())
     number = np.unique(part, return_inverse=True)[1]
@@ -253,14 +257,14 @@ def _within(y: F8, part: NDArray[np.int64]) -> F8:
 
 
 def _line(x: F8, y: F8, part: NDArray[np.int64]) -> tuple[float, float]:
-    """Return the common slope of least-squares lines with an offset for each part, and its u from the residuals.
+    """Fit lines with a common slope and an offset for each part; return the slope and its standard uncertainty.
 
-    The scatter of a few points is itself uncertain, so u is the standard deviation of Student's distribution and not
-    its scale.
+    The uncertainty comes from the residuals. The scatter of a few points is itself uncertain, so the uncertainty is the
+    standard deviation of Student's t distribution and not its scale parameter.
     """
     centred = _within(x, part)
     power = float(centred @ centred)
-    if power == 0.0:  # one point in each part
+    if power == 0.0:  # there is one point in each part
         return 0.0, math.inf
     slope = float(centred @ y) / power
     residual = _within(y, part) - slope * centred

@@ -1,6 +1,6 @@
-"""Turn the bytes of one port into blocks: decoder, timebase and calibration in a row.
+"""Turn the bytes of one port into blocks, through a decoder, a timebase and a calibration.
 
-Live view, recording, recovery and replay from wire bytes all use this chain, so their samples are the same.
+Live view, recording, recovery and replay from wire bytes all use this chain, so they give identical samples.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from acquisition.source import SourceInfo
 __all__ = ["SensorChain"]
 
 CLOCKS_PPM = (0.0, 1e6)
-"""Allowed limits of a clock's rate error, ppm."""
+"""Allowed range of ``clock_ppm``, the maximum rate error of a clock, ppm."""
 JOIN_NS = 1_000_000_000
-"""Duration of the readings on either side of a lost port that align the clocks, ns; a burst after it is shorter."""
+"""Duration of the readings, before and after a port loss, that align the clocks, ns; a burst is shorter."""
 MAX_HELD = 1 << 15
-"""Largest number of readings held for that, because the host times of a damaged log may stand still."""
+"""Maximum number of readings held for the alignment, because host times in a damaged log may not advance."""
 RATE_READINGS = 1 << 16
-"""Readings for the fit of the clock's rate, eleven minutes at 100 Hz; more would delay the reading thread."""
+"""Maximum number of samples in a fit of the clock rate, 11 min at 100 Hz; more would delay the reading thread."""
 AGREE_S = 0.01
-"""A counter has continued if it differs by less from the host's clock, besides the uncertainty of its rate, s."""
+"""Maximum deviation from the host's clock, beyond the rate uncertainty, of a clock that has continued, s."""
 MISSING, GAP_BEFORE = np.uint8(Flag.MISSING), np.uint8(Flag.GAP_BEFORE)
 
 
@@ -44,15 +44,15 @@ class SensorChain:
     options : mapping, optional
         Options of the family's decoder.
     rate_hz : float, optional
-        Readings per second that this sensor is set to; by default the family's rate.
+        Readings per second to which the sensor is set; by default the rate of the family.
     calibration : Calibration, optional
     clock_ppm : float, optional
-        Largest rate error of its clock, ppm; by default the family's, or 100 000 for a counter.
+        Maximum rate error of the sensor's clock, ppm; by default that of the family, or 100 000 for a counter.
 
     Raises
     ------
     SensorError
-        If the family does not have an option, or the rate or the clock error is out of range.
+        If the family does not have an option, or if ``rate_hz`` or ``clock_ppm`` is out of range.
     """
 
     def __init__(
@@ -74,53 +74,54 @@ class SensorChain:
         self._clock_ppm = clock_ppm
         self.last: Readings = NO_READINGS
         self._next = 0
-        self._travel_s = 0.0  # of the last ping, from the sensor to its reflection
+        self._travel_s = 0.0  # one-way travel time of the last ping, from the sensor to the bob
         self._clock = ClockSamples()
         self._at_reflection = False
         self._held: list[Reading] = []
-        self._breaks: list[int] = []  # indices of held readings after an interruption
-        self._returns: list[int] = []  # those of them after a port came back
+        self._breaks: list[int] = []  # indices of the held readings that follow an interruption
+        self._returns: list[int] = []  # the subset of these indices that follow the return of a port
 
     def __len__(self) -> int:
         """Return the number of held readings."""
         return len(self._held)
 
     def feed(self, host_ns: int, data: bytes) -> Block:
-        """Decode the bytes of one read and return the completed samples (perhaps none)."""
+        """Decode the bytes of one read and return the completed samples, if any."""
         self.take(host_ns, data)
         return self.block()
 
     def take(self, host_ns: int, data: bytes) -> None:
-        """Decode the bytes of one read, and hold the completed readings until :meth:`block`.
+        """Decode the bytes of one read, and hold the completed readings until :meth:`block` is called.
 
         Notes
         -----
-        :meth:`block` computes times and distances for many readings together, which takes a third of the time.
+        :meth:`block` computes times and distances for many readings together, in a third of the time that the same
+        computation for single readings takes.
         """
         self.last = readings = self.decoder.feed(host_ns, data)
         self._held += readings
 
     def take_all(self, reads: Iterable[tuple[int, bytes]]) -> None:
-        """Decode the bytes of many reads, each with its host time; see :meth:`take`."""
+        """Decode the bytes of several reads, given as pairs of host time and bytes; see :meth:`take`."""
         for host_ns, data in reads:
             self.take(host_ns, data)
 
     def block(self, *, final: bool = False) -> Block:
-        """Return the samples of the held readings, with the next indices of the run.
+        """Return the samples of the held readings, with the next sample indices of the run.
 
-        Readings after a port came back are held until they span a second, because all of them are needed to find their
-        times.
+        After a port came back, readings are held until they span a second, because their times are determined from all
+        of them together.
 
         Parameters
         ----------
         final : bool
-            Whether there are no further readings; then none is held back.
+            Whether no further readings will come; if so, no reading is held back.
 
         Notes
         -----
-        The device reads its clock when the ping leaves. The distance is measured when the sound meets the bob, half
-        the time of flight later, and this is the time of the sample. With the time of the ping instead, a bob with an
-        amplitude of 50 mm and a period of 0.76 s would show a second harmonic of 31 um.
+        The device reads its clock when the ping is sent. The distance refers to the moment when the sound is reflected
+        by the bob, half the time of flight later; this moment is the time of the sample. With the time of the ping
+        instead, a bob with an amplitude of 50 mm and a period of 0.76 s would show a second harmonic of 31 um.
         """
         held, edges = self._released(final)
         stamps, t, flags = held.host_ns, np.empty(len(held)), np.zeros(len(held), np.uint8)
@@ -144,7 +145,7 @@ class SensorChain:
         return Block(first, t, distance, flags, stamps)
 
     def _released(self, final: bool) -> tuple[Readings, Iterator[tuple[slice, bool]]]:
-        """Return the readings to release, and the rows of each stretch with whether a port came back before it."""
+        """Return the readings to release, and for each stretch its rows and whether a port came back before it."""
         held, returns = self._held, self._returns
         if returns and not final:
             back = held[returns[-1] :]
@@ -156,13 +157,14 @@ class SensorChain:
         return Readings(held), ((slice(start, stop), start in returns) for start, stop in pairwise(edges))
 
     def _align_clocks(self, readings: Sequence[Reading], host_ns: I8) -> None:
-        """Time the readings after a port came back by the host's clock, if the device's clock did not continue.
+        """Set the time after a port came back by the host's clock, unless the device's clock has continued.
 
         Notes
         -----
-        A host time may be late but never early. So the least difference of host time and device time, among the
-        readings of a second on either side, gives the offset of the clocks. In between they drift apart by the rate
-        error known so far. A counter that agrees with the host's clock within its error has continued and is kept.
+        A host time may be late but never early. So the minimum difference between host time and device time, among the
+        readings of one second before and after the interruption, gives the offset between the clocks. During the
+        interruption the clocks drift apart by the rate error estimated so far. A device clock that agrees with the
+        host's clock within its error has continued and is kept.
         """
         t = self.timebase.continued_times(readings)
         before_t, before_ns = self._clock.columns()
@@ -170,8 +172,8 @@ class SensorChain:
             return
         clock = fit_clock(before_t[-RATE_READINGS:], before_ns[-RATE_READINGS:])
         u_ppm = min(clock.u_rate_error_ppm, self.clock_ppm)
-        # A rate error of less than three standard uncertainties is ignored: it would add mostly noise over the gap,
-        # for example 19 ms for one of 2.2 u, measured within a second on a busy computer.
+        # A rate error of less than three standard uncertainties u is ignored, because it would add mostly noise over
+        # the gap: for example 19 ms with a rate error of 2.2 u, measured within a second on a busy computer.
         known = 3.0 * u_ppm < abs(clock.rate_error_ppm) <= self.clock_ppm
         pace = 1.0 / (1.0 + 1e-6 * clock.rate_error_ppm) if known else 1.0
         zero_t, zero_ns = before_t[-1], before_ns[-1]
@@ -188,38 +190,38 @@ class SensorChain:
             self.timebase.join(float(t[0]) + late_s / pace)
 
     def _travel_times(self, travel_s: F8) -> F8:
-        """Return the time from ping to reflection of each reading (n,), s; without an echo that of the one before.
+        """Return the (n,) times from ping to reflection, s; without an echo, the time of the previous reading is used.
 
-        An echo that takes longer than a period belongs to an earlier ping.
+        An echo that takes longer than a period belongs to an earlier ping and is ignored here.
         """
         travel_s = carried(travel_s, travel_s < 0.5 / self.timebase.rate_hz, self._travel_s)
         self._travel_s = float(travel_s[-1]) if travel_s.size else self._travel_s
         return travel_s
 
     def lost(self) -> None:
-        """Note that the port was lost: drop an incomplete frame and flag the next sample."""
+        """Handle the loss of the port: drop an incomplete frame, and flag the next sample."""
         self.decoder.flush()
         self._breaks.append(len(self._held))
 
     def returned(self) -> None:
-        """Note that the port came back: as :meth:`lost`, and the device's clock may be another one."""
+        """Handle the return of the port like its loss; the next block checks whether the device clock continued."""
         self.lost()
         self._returns.append(len(self._held))
 
     @property
     def clock_ppm(self) -> float:
-        """Largest rate error of the sensor's clock, ppm; final after the first reading."""
+        """Maximum rate error of the sensor's clock, ppm; it is final after the first reading."""
         if self._clock_ppm is not None:
             return self._clock_ppm
         return COUNTER_PPM if self.timebase.counts else self.family.clock_ppm
 
     @property
     def status(self) -> DeviceStatus:
-        """What the device sent besides its readings."""
+        """The information that the device sent besides its readings."""
         return DeviceStatus.of(self.decoder)
 
     def info(self, name: str, kind: str = "live") -> SourceInfo:
-        """Return the description of the source; the kind of clock is known after the first reading."""
+        """Return the description of the source; its kind of clock is determined by the first reading."""
         if kind not in ("live", "simulated", "replay"):
             raise ValueError(f"kind must be live, simulated or replay, got {kind!r}")
         return SourceInfo(
@@ -231,7 +233,7 @@ class SensorChain:
         )
 
     def report(self) -> dict[str, Any]:
-        """Return faults, gaps and the clock's rate error as plain numbers, for the run's provenance."""
+        """Return faults, gaps and the clock comparison as plain data, for the provenance of the run."""
         clock, status = fit_clock(*self._clock.columns()), self.status
         known, left_out = np.isfinite(clock.rate_error_ppm), self.timebase.gaps_left_out
         return {

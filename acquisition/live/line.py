@@ -1,4 +1,4 @@
-"""The interfaces of the reader of ports: the port, the receiver of its bytes, and how to poll its sensor."""
+"""Interfaces used by the port reader: the port, the receiver of its bytes, and the polling of its sensor."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ class Transport(Protocol):
 
     @property
     def name(self) -> str:
-        """Name for messages."""
+        """Name of the port in messages."""
         ...
 
     def fileno(self) -> int:
-        """Return a descriptor to wait on and to read without blocking; -1 if there is none."""
+        """Return a file descriptor that can be waited on and read without blocking, or -1 if there is none."""
         ...
 
     def read(self, wait_s: float) -> bytes:
-        """Return the bytes that are there or arrive within that time; only for a transport without a descriptor.
+        """Return available bytes, or wait up to ``wait_s`` for some; only for a transport without a descriptor.
 
         Raises
         ------
         PortError
-            If the port is gone.
+            If the port was lost.
         """
         ...
 
@@ -40,7 +40,7 @@ class Transport(Protocol):
         Raises
         ------
         PortError
-            If the port is gone.
+            If the port was lost.
         """
         ...
 
@@ -54,48 +54,48 @@ class Transport(Protocol):
         ...
 
     def reopen(self) -> None:
-        """Open again after the port was lost.
+        """Open the port again after it was lost.
 
         Raises
         ------
         PortError
-            If it is still gone.
+            If the port is still unavailable.
         """
         ...
 
     def close(self) -> None:
-        """Close. Further calls do nothing."""
+        """Close the port. Further calls do nothing."""
         ...
 
 
 class Proof(Protocol):
-    """Checks whether the device on a port that came back is the sensor that was lost."""
+    """Checks whether the device on a reopened port is the sensor that was lost."""
 
     @property
     def facts(self) -> Mapping[str, Any]:
-        """Further facts for the event "reopened", after the check."""
+        """Additional facts for the event "reopened", available after the check."""
         ...
 
     def feed(self, host_ns: int, data: bytes) -> bool | None:
-        """Check the bytes of one read; return whether it is the sensor, or None while this is undecided."""
+        """Check the bytes of one read; return whether the device is the sensor, or None while this is undecided."""
         ...
 
 
 class Sink(Protocol):
-    """The receiver of the bytes. It is called on the I/O thread, so it must not block."""
+    """The receiver of the bytes; it is called on the I/O threads, so it must not block."""
 
     def reads(self, reads: Sequence[Read]) -> None:
-        """Receive the reads of one wake-up, one for each port. Several threads may call this if lines block."""
+        """Receive reads that were made together; if some lines may block, several threads may call this method."""
         ...
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Receive "lost", "reopened" (with gap_s), "refused" (another device came back) or "timeout"."""
+        """Receive the event "lost", "reopened" (with gap_s), "refused" (another device was found) or "timeout"."""
         ...
 
 
 @dataclass(slots=True)
 class Line:
-    """One port and how to poll its sensor.
+    """A port and the polling of its sensor.
 
     Parameters
     ----------
@@ -103,13 +103,15 @@ class Line:
     channel : int
         Number of the sensor within the run.
     poll : Poll or None
+        How to poll the sensor; None for a sensor that sends without requests.
     decoder : callable or None
-        Returns the decoder of a polled sensor, if the sink feeds it within ``reads`` and flushes it at "timeout". The
-        decoder then chooses the next request, and an incomplete reply counts as timed out before that request.
+        Returns the decoder of a polled sensor; only allowed if the sink feeds the decoder within ``reads`` and flushes
+        it at "timeout". The decoder then chooses the next request. A reply that is incomplete when that request is
+        due counts as timed out.
     proof : callable or None
-        Returns the check that a port must pass after it came back; None for no check.
+        Returns the check that a reopened port must pass, or None for no check.
     greeting : bytes
-        Sent to a port that came back; makes the device identify itself.
+        Bytes sent to a reopened port, so that the device identifies itself.
     """
 
     transport: Transport
@@ -119,7 +121,7 @@ class Line:
     proof: Callable[[], Proof | None] | None = None
     greeting: bytes = b""
     _lost_ns: int | None = field(default=None, init=False)
-    """Host time at which it was lost."""
+    """Host time at which the port was lost, ns; None if it is not lost."""
     _closed: bool = field(default=False, init=False)
     _proving: Proof | None = field(default=None, init=False)
     _unproven: list[Read] = field(default_factory=list, init=False)

@@ -1,7 +1,7 @@
-"""Read ports: one I/O thread for all of them, which passes the bytes on unchanged.
+"""Read ports on I/O threads that pass the bytes on unchanged.
 
-Every read has the host time of the wake-up that read it. A port that is lost is reported with its time and reopened
-when it comes back; the run goes on.
+One thread serves all ports that cannot block. Every read has the host time of the wake-up of its thread. The loss of a
+port is reported with its time; the run continues, and the port is reopened when it comes back.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ POLLED_WAIT_S = 0.01
 
 
 class PortReader:
-    """Reads all lines on one thread with ``selectors``; a line that may block gets a separate thread.
+    """Reads all lines on one thread with ``selectors``, except that each line that may block gets its own thread.
 
-    Such lines are those without a descriptor (Windows, RFC 2217) and those at a network address, which may take
-    seconds to reopen.
+    A line may block if it has no descriptor (Windows, RFC 2217), or if it has a network address, because reopening it
+    may take seconds.
 
     Parameters
     ----------
     lines : sequence of Line
-        They must be open.
+        Lines to read; their ports must be open.
     sink : Sink
     clock : Clock
-        The system clock, because real ports run in real time.
+        The clock of the host times; use the system clock, because real ports run in real time.
     """
 
     def __init__(self, lines: Sequence[Line], sink: Sink, clock: Clock) -> None:
@@ -49,11 +49,11 @@ class PortReader:
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
         self._failure: BaseException | None = None
-        # The pipe only ends a wait and is never read, so it may block; Windows can change that only from Python 3.12.
+        # The pipe only ends a wait and is never read, so it may be blocking; Windows can change this only since 3.12.
         self._wake_read, self._wake_write = os.pipe()
 
     def start(self) -> None:
-        """Start reading."""
+        """Start the reading threads."""
         shared = [line for line in self._lines if not _may_block(line)]
         loops = [(self._select_loop, shared)] if shared else []
         for line in filter(_may_block, self._lines):
@@ -64,7 +64,7 @@ class PortReader:
             thread.start()
 
     def stop(self) -> None:
-        """Stop reading, close the ports, and raise the error of a thread, if any. Further calls do nothing."""
+        """Stop reading, close the ports and raise the last error of a thread, if any; further calls do nothing."""
         if self._stop.is_set():
             return
         self._stop.set()
@@ -80,14 +80,14 @@ class PortReader:
 
     @property
     def failure(self) -> BaseException | None:
-        """The last error of a reading thread, if any: a defect, or an error of the sink."""
+        """The last error of a reading thread, or None; it is a defect of the program or an error of the sink."""
         return self._failure
 
     def _guarded(self, loop: Any, lines: list[Line]) -> None:
         while not self._stop.is_set():
             try:
                 loop(lines)
-            except Exception as error:  # stop() raises it on the caller's thread; the reading goes on
+            except Exception as error:  # stop() raises the error in the caller's thread; reading continues
                 self._failure = error
                 for line in lines:
                     if not line._closed and line.transport.fileno() < 0 and loop == self._select_loop:
@@ -121,13 +121,13 @@ class PortReader:
             if line.poll is not None and not self._ask(line, line.poll):
                 line.transport.close()
                 continue
-            # Do not wait so long for a reply that the next request is late.
+            # Wait only a short time for a reply, so that the next request is not late.
             wait_s = BLOCKING_WAIT_S if line.poll is None else POLLED_WAIT_S
             if not self._wait_for(line, wait_s):
                 line.transport.close()
 
     def _wait_s(self, lines: list[Line]) -> float:
-        """Return the time until the next reopening or request may be due, s."""
+        """Return the time until the next reopening or request may be due, s, limited to IDLE_WAIT_S."""
         now = self._clock.now_ns()
         wait = IDLE_WAIT_S
         for line in lines:
@@ -138,7 +138,7 @@ class PortReader:
         return max(wait, 0.0)
 
     def _read(self, ready: Sequence[Line], now_ns: int) -> list[Line]:
-        """Read the ports with data and pass it on; return the ports that are lost."""
+        """Read the ports that are ready and pass their bytes on; return the lines whose port was lost."""
         reads: list[Read] = []
         gone: list[tuple[Line, str]] = []
         for line in ready:
@@ -165,7 +165,7 @@ class PortReader:
         return [line for line, _ in gone]
 
     def _prove(self, line: Line, proof: Proof, now_ns: int, data: bytes) -> list[Read] | None:
-        """Return the reads of a port that came back, after the sensor is confirmed; None if it is another device."""
+        """Return all reads of a reopened port once its sensor is confirmed, before that []; None for another device."""
         verdict = proof.feed(now_ns, data)
         line._unproven.append((line.channel, now_ns, data))
         if verdict is None:
@@ -180,7 +180,7 @@ class PortReader:
         return proven
 
     def _wait_for(self, line: Line, wait_s: float) -> bool:
-        """Pass on the bytes that arrive within that time; return False if the port is lost."""
+        """Pass on the bytes that arrive within ``wait_s``; return False if the port was lost."""
         try:
             data = line.transport.read(wait_s)
         except PortError as error:
@@ -198,7 +198,7 @@ class PortReader:
         return True
 
     def _ask(self, line: Line, poll: Poll) -> bool:
-        """Send the request if it is due, after discarding a late reply; return False if the port is lost."""
+        """If a request is due, discard a late reply and send the request; return False if the port was lost."""
         now = self._clock.now_ns()
         if now < line._ask_ns:
             return True
@@ -206,7 +206,7 @@ class PortReader:
             decoder = None if line.decoder is None else line.decoder()
             short = decoder is not None and line._answer_by_ns is None and decoder.pending > 0
             if short or (line._answer_by_ns is not None and now >= line._answer_by_ns):
-                # Without header and checksum the end of a late reply would be read as the next reply.
+                # Without a header and a checksum, the end of a late reply would be read as the next reply.
                 line.transport.discard_input()
                 self._sink.event(line.channel, now, "timeout", {"after_s": poll.timeout_s})
                 line._answer_by_ns = None
@@ -217,7 +217,7 @@ class PortReader:
             self._gone(line, str(error))
             return False
         step = int(poll.interval_s * 1e9)
-        # The schedule is absolute, so a late wake-up does not delay later requests.
+        # The schedule is absolute, so a late wake-up does not delay subsequent requests.
         line._ask_ns = max(line._ask_ns + step, now) if line._ask_ns else now + step
         return True
 
@@ -226,7 +226,7 @@ class PortReader:
         line._closed, line._retry_ns = True, now + REOPEN_EVERY_NS
         line._answer_by_ns = line._proving = None
         line._unproven = []
-        if line._lost_ns is None:  # a port that came back without the sensor is still lost
+        if line._lost_ns is None:  # a port that came back with another device is still lost
             line._lost_ns = now
             self._sink.event(line.channel, now, "lost", {"port": line.transport.name, "why": why})
 
@@ -249,7 +249,7 @@ class PortReader:
         return True
 
     def _came_back(self, line: Line, now_ns: int, more: Mapping[str, Any]) -> None:
-        """Report that the sensor is there again."""
+        """Report that the sensor is available again."""
         gap_s = 0.0 if line._lost_ns is None else (now_ns - line._lost_ns) * 1e-9
         line._lost_ns = None
         facts = {"port": line.transport.name, "gap_s": gap_s, **more}
@@ -261,6 +261,6 @@ def _may_block(line: Line) -> bool:
 
 
 def _leave(selector: selectors.BaseSelector, line: Line) -> None:
-    """Stop waiting on a lost port and close it."""
+    """Stop waiting on a lost port, and close it."""
     selector.unregister(line.transport.fileno())
     line.transport.close()

@@ -1,4 +1,4 @@
-"""Serial ports: opened and configured by pyserial, and read by descriptor if there is one."""
+"""Serial ports: pyserial opens and configures them; they are read by file descriptor if they have one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ try:
     import termios
 
     _TERMIOS_ERRORS: tuple[type[Exception], ...] = (termios.error,)
-except ImportError:  # Windows, where a port is exclusive anyway
+except ImportError:  # on Windows, where the use of a port is always exclusive
     termios = None  # type: ignore[assignment]
     _TERMIOS_ERRORS = ()
 
@@ -26,7 +26,7 @@ __all__ = ["READ_BYTES", "PortFacts", "SerialPort", "list_ports"]
 
 READ_BYTES = 65536
 KEEPALIVE_S = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
-"""A connection that vanished silently is closed after five seconds without data and three probes."""
+"""A silently lost connection is closed after five seconds without data and three probes, two seconds apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +36,9 @@ class PortFacts:
     Parameters
     ----------
     device : str
-        Its address.
+        Address of the port.
     description : str
-        Its name in the operating system.
+        Name of the port in the operating system.
     """
 
     device: str
@@ -46,7 +46,7 @@ class PortFacts:
 
 
 def list_ports() -> tuple[PortFacts, ...]:
-    """Return the serial ports of this computer, sorted by name."""
+    """Return the serial ports of this computer, sorted by address."""
     from serial.tools.list_ports import comports
 
     ports = (PortFacts(p.device, p.description or "") for p in comports())
@@ -54,18 +54,19 @@ def list_ports() -> tuple[PortFacts, ...]:
 
 
 class SerialPort:
-    """A port that reads without blocking.
+    """A port that is read without blocking.
 
     Parameters
     ----------
     address : str
-        A device (``/dev/ttyUSB0``, ``COM3``) or another address of pyserial (``socket://host:port``, ``rfc2217://...``).
+        A device (``/dev/ttyUSB0``, ``COM3``) or a pyserial address (``socket://host:port``, ``rfc2217://...``).
     baud : int
 
     Raises
     ------
     PortError
-        If the port is absent (the message lists the ports that exist), not permitted (it names the group) or busy.
+        If the port is absent (the message lists the existing ports), busy, or not permitted (the message names the
+        group that may use it).
     """
 
     def __init__(self, address: str, baud: int) -> None:
@@ -80,9 +81,9 @@ class SerialPort:
         self._device = _devices().get(os.path.realpath(address))
 
     def reopen(self) -> None:
-        """Open the same device again after a loss, even under another name, but no other device under its name.
+        """Reopen the same device after a loss, even under another name, but never another device under its name.
 
-        The error has no explanation of the cause, because a reader may try this twice a second.
+        The error does not explain the cause, because a reader may call this method twice a second.
         """
         self.close()
         if self._device is None and "://" not in self.name:
@@ -93,11 +94,11 @@ class SerialPort:
 
     @property
     def identified(self) -> bool:
-        """Whether the port belongs to a USB device with a serial number, so that no other can be mistaken for it."""
+        """Whether the port belongs to a USB device whose serial number distinguishes it from all other devices."""
         return self._device is not None and bool(self._device.serial_number)
 
     def _current_name(self, device: _Device) -> str:
-        """Return the current name of a USB device: the old one, or that of its serial number."""
+        """Return the current port name of a USB device: the old name, or the port with its serial number."""
         there = _devices()
         if there.get(os.path.realpath(self.name)) == device:
             return self.name
@@ -110,7 +111,7 @@ class SerialPort:
         import serial
 
         try:
-            # pyserial's network ports have no write timeout (RFC 2217 refuses one) and no exclusive use.
+            # The network ports of pyserial support neither a write timeout (RFC 2217 refuses it) nor exclusive use.
             options: dict[str, Any] = {} if "://" in address else {"exclusive": True, "write_timeout": 1.0}
             port = serial.serial_for_url(address, baudrate=self._baud, timeout=0, **options)
         except (serial.SerialException, OSError, ValueError, NotImplementedError) as error:
@@ -121,14 +122,14 @@ class SerialPort:
         _keep_alive(port)
 
     def fileno(self) -> int:
-        """Return the descriptor to wait on; -1 if the address has none (RFC 2217, Windows)."""
+        """Return the file descriptor to wait on, or -1 if there is none (RFC 2217, Windows)."""
         return self._descriptor
 
     def read(self, wait_s: float) -> bytes:
-        """Return the bytes that are there, or arrive within that time; for an address without a descriptor."""
+        """Return available bytes, or wait up to ``wait_s`` for some; for an address without a descriptor."""
         with self._as_port_error("the port was disconnected"):
             try:
-                if self._port.timeout != wait_s:  # setting it makes RFC 2217 negotiate the whole port again
+                if self._port.timeout != wait_s:  # setting the timeout makes RFC 2217 renegotiate all port settings
                     self._port.timeout = wait_s
                 data = self._port.read(1)
                 return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
@@ -152,11 +153,11 @@ class SerialPort:
         try:
             yield
         except (serial.SerialException, OSError, TypeError, AttributeError, ValueError, *_TERMIOS_ERRORS) as error:
-            # If the cable is pulled during a call, pyserial accesses members that it has already closed.
+            # If the cable is unplugged during a call, pyserial accesses attributes that it has already cleared.
             raise PortError(f"{self.name}: {what} ({error})") from error
 
     def close(self) -> None:
-        """Close. Further calls do nothing."""
+        """Close the port. Further calls do nothing."""
         port, descriptor = self._port, self._descriptor
         self._port, self._descriptor = None, -1
         if port is not None:
@@ -164,13 +165,13 @@ class SerialPort:
             try:
                 port.close()
             except OSError:
-                # The device is disconnected already, so there is nothing to release.
+                # The device is already disconnected, so there is nothing to release.
                 return
 
 
 @dataclass(frozen=True, slots=True)
 class _Device:
-    """Identity of a USB adapter; those of one make without serial numbers are all equal."""
+    """Identity of a USB adapter; adapters of the same model without serial numbers are equal."""
 
     vendor: int
     product: int
@@ -182,7 +183,7 @@ class _Device:
 
 
 def _devices() -> dict[str, _Device]:
-    """Return the USB devices among the ports, by their names with links resolved."""
+    """Return the USB devices among the ports, by port name with symbolic links resolved."""
     from serial.tools.list_ports import comports
 
     return {
@@ -193,14 +194,14 @@ def _devices() -> dict[str, _Device]:
 
 
 def _claim(descriptor: int, *, release: bool = False) -> None:
-    """Keep other programs from opening a terminal device; pyserial's lock stops only programs that check for it."""
+    """Keep other programs from opening a terminal device; the lock of pyserial stops only programs that check it."""
     if termios is not None and descriptor >= 0:
-        with contextlib.suppress(OSError):  # a socket, or a disconnected device
+        with contextlib.suppress(OSError):  # the descriptor is a socket, or the device is disconnected
             fcntl.ioctl(descriptor, termios.TIOCNXCL if release else termios.TIOCEXCL)
 
 
 def _keep_alive(port: Any) -> None:
-    """Let the system detect a network connection whose other side vanished."""
+    """Let the system detect that the other end of a network connection has disappeared."""
     connection = getattr(port, "_socket", None)
     if isinstance(connection, socket.socket):
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -221,7 +222,7 @@ def _descriptor(port: Any) -> int:
 
 
 def _explain(address: str, error: BaseException) -> str:
-    """Return one line from an error of pyserial or the system."""
+    """Return a one-line message for an error of pyserial or of the system."""
     code = getattr(error, "errno", None)
     text = str(error)
     if code == errno.ENOENT or "FileNotFoundError" in text:
@@ -235,7 +236,7 @@ def _explain(address: str, error: BaseException) -> str:
 
 
 def _group(address: str) -> str:
-    """Return which group may use the port and how to join it, unless that group would give further rights."""
+    """Return how to get access through the group of the port, or through the administrator if that is unsafe."""
     try:
         import grp
 

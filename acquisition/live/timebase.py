@@ -1,7 +1,8 @@
-"""Timebase: sensor time from the device's clock or counter.
+"""The timebase: it derives sensor times from the clock or the counter of the device.
 
-Host times are too coarse for 100 Hz: under load a 10 ms stream shows steps of 23 to 77 ms. So the sensor's clock is
-used whenever it is sent, and :mod:`acquisition.live.clock_fit` finds its rate error from the host times.
+Host times are too imprecise for 100 Hz: under load, readings sent every 10 ms arrive in steps of 23 to 77 ms. So the
+clock of the sensor is used if it is sent, and :mod:`acquisition.live.clock_fit` estimates its rate error from the host
+times.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from acquisition.source import ClockKind
 __all__ = ["KEPT_GAPS", "RATES_HZ", "Gap", "Timebase", "demand_within"]
 
 RATES_HZ = (1e-6, 1e9)
-"""Smallest and largest allowed number of readings per second, far beyond any bench."""
+"""Minimum and maximum allowed number of readings per second, far beyond any real experiment."""
 
 KEPT_GAPS = 10_000
-"""Gaps that are listed one by one in the header of a run file; later ones are only counted."""
+"""Maximum number of gaps listed individually in the header of a run file; later gaps are only counted."""
 
 WRAP_US = 1 << 32
 WRAP_S = WRAP_US * 1e-6
@@ -31,16 +32,16 @@ NANO = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A stretch without readings.
+    """An interval without readings.
 
     Parameters
     ----------
     index : int
-        Index of the first reading after it.
+        Index of the first reading after the gap.
     length_s : float
-        Time between the readings on either side, s.
+        Time between the last reading before the gap and the first after it, s.
     lost : int
-        Number of readings that should have come in between.
+        Number of readings that are missing in the gap.
     """
 
     index: int
@@ -54,37 +55,40 @@ def demand_within(what: str, value: object, low: float, high: float) -> None:
     Raises
     ------
     SensorError
-        With the range and the value.
+        If it is not; the message states the range and the value.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
         raise SensorError(f"{what} of a sensor must be a number from {low:g} to {high:g}, got {value!r}")
 
 
 class Timebase:
-    """Gives every reading its sensor time; one timebase serves one run.
+    """Assigns a sensor time to each reading; each run needs a separate timebase.
 
     Parameters
     ----------
     rate_hz : float
-        Nominal readings per second, Hz. It converts a counter to time, and gaps to numbers of lost readings.
+        Nominal rate of the readings, Hz. It converts a counter to time, and a gap to a number of lost readings.
 
     Raises
     ------
     SensorError
-        If the rate is not in :data:`RATES_HZ`.
+        If the rate is outside :data:`RATES_HZ`.
 
     Notes
     -----
-    With a device clock, time is the device's microseconds since the first reading, unwrapped at 2^32. With only a
-    counter it is the counter divided by the nominal rate, with neither it is the host time.
+    With a device clock, the sensor time is the clock's microseconds since the first reading, unwrapped at 2^32. With
+    only a counter, it is the count since the first reading divided by the nominal rate. With neither, it is the host
+    time since the first reading.
 
-    A device has restarted if its clock runs backward by more than a wrap explains, or shows less time than the silence
-    before it. Its time is then continued by the host's clock, and its first reading is flagged. A device that continues
-    where it stopped has not restarted, however long the silence: the link stalled and delivers what it held. After a
-    port came back, the caller, who sees the readings on both sides, sets the time of the first one by :meth:`join`.
+    A device has restarted if its clock runs backward in a way that no wrap explains, or shows less time than the
+    preceding silence lasted. The sensor time then continues by the host's clock, and the first reading is flagged. A
+    device whose clock continues from its last value has not restarted, even after a long silence: the link stalled and
+    now delivers the delayed readings. After a port came back, the caller has the readings before and after the
+    interruption, and sets the time of the first reading with :meth:`join`.
 
-    If there are only host times, the readings that a stalled link delivers together have no known time. They follow
-    each other within half a period after a silence, and are flagged as duplicates until two readings come in time.
+    If there are only host times, the true times of readings that a stalled link delivers together are unknown. After a
+    silence, readings that follow each other within half a period are flagged as duplicates, until two consecutive
+    readings arrive on time.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -92,36 +96,36 @@ class Timebase:
         self.rate_hz = rate_hz
         self._period_s = 1.0 / rate_hz
         self._jitter_s = max(0.25, 3.0 / rate_hz)
-        self._longest_s = 1.5 / rate_hz  # in a longer step readings are missing
+        self._longest_s = 1.5 / rate_hz  # a longer step means that readings are missing
         self.gaps: list[Gap] = []
-        self.gaps_left_out = {"count": 0, "lost": 0, "longest_s": 0.0}  # gaps after the first KEPT_GAPS
+        self.gaps_left_out = {"count": 0, "lost": 0, "longest_s": 0.0}  # summary of the gaps after the first KEPT_GAPS
         self.restarts = 0
         self.joins = 0  # restarts after a port came back
         self._join_s: float | None = None
         self._count = 0
         self._last_raw: int | None = None
         self._last_host_ns = 0
-        # Time is a whole number of ticks after an anchor, so that it does not depend on how reads cut the bytes.
+        # The time is a whole number of ticks after an anchor, so that the boundaries of reads do not affect it.
         self._anchor_s = 0.0
         self._ticks = 0
         self._latest_s = 0.0
-        self._held = False  # whether readings may still belong to a burst after a silence
+        self._held = False  # whether the next readings may belong to a burst after a silence
         self._in_time = 0
         self._clock: ClockKind | None = None
         self._counts = False
 
     @property
     def clock(self) -> ClockKind:
-        """Origin of the times; known after the first reading."""
+        """Origin of the times; it is determined by the first reading."""
         return self._clock or "host"
 
     @property
     def counts(self) -> bool:
-        """Whether times are a counter divided by the nominal rate; known after the first reading."""
+        """Whether times are a counter divided by the nominal rate; this is determined by the first reading."""
         return self._counts
 
     def push(self, reading: Reading) -> tuple[float, int]:
-        """Return a reading's sensor time, s, and its time flag: a gap before it, a repeated time or a step back."""
+        """Return the sensor time of a reading, s, and its flag: 0, a gap before it, a repeated time or a step back."""
         raw, unit_s = self._ticks_of(reading)
         if self._clock is None:
             self._clock = "host" if unit_s == NANO else "device"
@@ -138,7 +142,7 @@ class Timebase:
             flag = int(Flag.NON_MONOTONIC_TIME)
         elif restarted or (step_s > self._longest_s and not self._only_jitter(unit_s, step_s)):
             flag = int(Flag.GAP_BEFORE)
-            # After a port came back with another counter, the number of lost readings is unknown.
+            # After a port came back with a new counter or clock, the number of lost readings is unknown.
             lost = 0 if joined else max(round(step_s * self.rate_hz) - 1, 0)
             self._note_gap(Gap(self._count, step_s, lost))
             self._held, self._in_time = unit_s == NANO, 0
@@ -149,10 +153,10 @@ class Timebase:
         return t, flag
 
     def continued_times(self, readings: Sequence[Reading]) -> F8 | None:
-        """Return the times (m,), m <= n, s, of the next n readings if the device's clock continues.
+        """Return the (m,) times, s, of the next n readings, with m <= n, under the assumption that the clock continues.
 
-        There are fewer than n times if the clock runs backward among them, or a reading has no device clock. The result
-        is None if the first reading has none, or there was no reading before.
+        There are fewer than n times if the clock or counter runs backward among these readings, or if a reading lacks
+        it. The result is None if the first reading lacks it, or if there was no earlier reading.
         """
         _, unit_s = self._ticks_of(readings[0])
         if self._last_raw is None or unit_s == NANO:
@@ -166,11 +170,11 @@ class Timebase:
         return np.asarray(self._anchor_s + (self._ticks + np.array(raws, np.int64) - self._last_raw) * unit_s)
 
     def join(self, t: float) -> None:
-        """Set the time of the next reading, s, because its device's clock does not continue the one before."""
+        """Set the time of the next reading, s, because the device clock does not continue from its last value."""
         self._join_s, self._held = t, True
 
     def _ticks_of(self, reading: Reading) -> tuple[int, float]:
-        """Return the time of a reading in ticks, and the length of a tick, s."""
+        """Return the raw time of a reading in ticks, and the length of a tick in s."""
         if reading.device_us >= 0:
             return reading.device_us, 1e-6
         if reading.sequence >= 0:
@@ -186,18 +190,18 @@ class Timebase:
         left_out["longest_s"] = max(left_out["longest_s"], gap.length_s)
 
     def _burst_flag(self, step: float) -> int:
-        """Return the flag of a reading that may belong to a burst, whose host times are not times of measurement."""
+        """Return the flag of a reading that may belong to a burst, in which host times are not measurement times."""
         late = step < 0.5 * self._period_s
         self._in_time = 0 if late else self._in_time + 1
         self._held = self._in_time < 2
         return int(Flag.DUPLICATE_TIME) if late else 0
 
     def _only_jitter(self, unit_s: float, step: float) -> bool:
-        """Return whether a step of host times is jitter; only a silence longer than that counts as a gap."""
+        """Return whether a step of host times is short enough to be jitter; only a longer step is a gap."""
         return unit_s == NANO and step < self._jitter_s
 
     def _advance(self, raw: int, unit_s: float, host_ns: int) -> bool:
-        """Advance to a reading; return whether the device restarted and the host's clock bridges the gap."""
+        """Advance to a reading; return whether the clock of the device restarted, so that the time was set anew."""
         if self._last_raw is None:
             return False
         if self._join_s is not None:
@@ -210,7 +214,7 @@ class Timebase:
         if unit_s != NANO and not 0.0 <= step <= self._longest_s:
             elapsed = (host_ns - self._last_host_ns) * NANO
             wraps = round((elapsed - step) / WRAP_S) if unit_s == 1e-6 else 0
-            # After a wrap the time continues smoothly; otherwise the device restarted.
+            # If the clock wrapped, the unwrapped step agrees with the host time; else the device may have restarted.
             if wraps > 0 and abs(step + wraps * WRAP_S - elapsed) < 2.0 + 0.01 * elapsed:
                 difference += wraps * WRAP_US
             elif step < -1.0 or (step > self._jitter_s and raw * unit_s < elapsed - 2.0):

@@ -19,10 +19,10 @@ from acquisition.regular_file import open_regular
 __all__ = ["HEAD_BYTES", "Format", "PairFormat", "SurveyFormat", "dialect_folder", "read_bytes", "read_head"]
 
 HEAD_BYTES = 8192
-"""Bytes of a file that a format sees to recognise it."""
+"""Number of bytes at the start of a file from which a format recognises it."""
 
 _LONGEST_LINE = 1 << 20
-_MARKUP = b"\xef\xbb\xbf \t\r\n"  # may come before XML, which may be a single line
+_MARKUP = b"\xef\xbb\xbf \t\r\n"  # bytes that may precede XML, which may be a single long line
 
 
 class Format(Protocol):
@@ -39,7 +39,10 @@ class Format(Protocol):
         ...
 
     def recognises(self, head: bytes) -> bool:
-        """Return whether a file belongs to this family, from its first :data:`HEAD_BYTES`; fast, never raises."""
+        """Return whether the first :data:`HEAD_BYTES` of a file show that it belongs to this family.
+
+        This must be fast and never raise.
+        """
         ...
 
     def read(
@@ -69,24 +72,25 @@ class Format(Protocol):
         unit : str, optional
             The unit of the channel if the file does not state it.
         run : str, optional
-            The run, if the file holds several. This and the next two are passed only if they are given.
+            The run to read if the file contains several. ``run``, ``time`` and ``time_unit`` are passed only if they
+            are given.
         time, time_unit : str, optional
-            The column of the times and their unit if the file does not state them.
+            The column that contains the times, and their unit, if the file does not state them.
 
         Raises
         ------
         FormatError
-            For any fault of the content; one line for the user.
+            If the content is faulty; the message is one line for the user.
         """
         ...
 
 
 @runtime_checkable
 class SurveyFormat(Protocol):
-    """A family that states why it recognises a file, and lists what the file holds."""
+    """A family that states why it recognises a file and lists the channels of the file."""
 
     def evidence(self, head: bytes) -> str:
-        """Return in a few words why a file belongs to this family; empty if it does not."""
+        """Return a few words on why a file belongs to this family, or an empty text if it does not."""
         ...
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
@@ -100,14 +104,14 @@ class PairFormat(Format, Protocol):
     def read_pair(
         self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
     ) -> Recording:
-        """Read two files, each a path and its content, and join them by time."""
+        """Read two files, each given as its path and content, and join them by time."""
         ...
 
 
 def dialect_folder() -> Path:
-    """Return the folder of a user's dialects, in the system's place for settings.
+    """Return the folder of a user's dialects inside the system's folder for settings.
 
-    Version 0.1 used ``XDG_CONFIG_HOME`` on every system; a folder of that version is still used.
+    Version 0.1 used ``XDG_CONFIG_HOME`` on every system; a folder that it created is still used.
     """
     if (base := os.environ.get("XDG_CONFIG_HOME")) and (earlier := Path(base, "springmass", "dialects")).is_dir():
         return earlier
@@ -120,18 +124,19 @@ def read_head(path: str | os.PathLike[str]) -> bytes:
     Raises
     ------
     FormatError
-        If it is absent, empty, unreadable or not a regular file.
+        If the file is absent, empty, unreadable or not a regular file.
     """
     return _read(path, HEAD_BYTES)
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return the content of a file; stop reading a text at the first MiB without a line end.
+    """Return the content of a file; refuse a text with a very long line before reading it into memory.
 
     Raises
     ------
     FormatError
-        If it is absent, empty, unreadable, not a regular file, or a text with a line of more than 1 MiB.
+        If the file is absent, empty, unreadable or not a regular file, or if it is text other than XML that has a whole
+        1 MiB block without a line end.
     """
     return _read(path, None)
 
@@ -154,12 +159,12 @@ def _read(path: str | os.PathLike[str], limit: int | None) -> bytes:
         raise FormatError(
             name, f"cannot be opened ({error.strerror or error})", "check its name and permissions"
         ) from error
-    except ValueError as error:  # a NUL in the name
+    except ValueError as error:  # the name contains a NUL character
         raise FormatError(repr(name), f"not a valid file name ({error})", "check the name") from error
 
 
 def _demand_lines(name: str, file: FileIO) -> None:
-    """Raise at the first MiB without a line end, before the file is read into memory."""
+    """Raise an error if any 1 MiB block of the file has no line end, before the file is read into memory."""
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
         for start in range(0, len(text) - _LONGEST_LINE + 1, _LONGEST_LINE):
             stop = start + _LONGEST_LINE

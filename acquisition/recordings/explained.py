@@ -19,7 +19,7 @@ _FIRST_ROWS = 4
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column: its name, its unit, how it is interpreted, and the text of its first cells."""
+    """One column: its name, its unit, its interpretation, and the text of its first cells."""
 
     name: str
     unit: str
@@ -34,11 +34,11 @@ class Layout:
     Parameters
     ----------
     runs : tuple of str
-        Its runs; a run without a name is an empty text.
+        Names of the runs in the table; the name of an unnamed run is an empty text.
     above : tuple of (int, str)
-        Number and text of the lines above its rows: preamble, names, units.
+        Line number and text of each line above the rows: preamble, names, units.
     first_line : int or None
-        Line of its first row; None for a file that is not text.
+        Line number of the first row; None for a file that is not text.
     columns : tuple of Column
     """
 
@@ -54,7 +54,7 @@ def explain(path: str | os.PathLike[str]) -> tuple[str, str, tuple[Layout, ...]]
     Raises
     ------
     FormatError
-        If it cannot be read, or its family has no columns.
+        If the file cannot be read, or its family has no columns.
     """
     name = os.fspath(path)
     family = sniff(path)

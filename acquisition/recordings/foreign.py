@@ -1,4 +1,4 @@
-"""Known files that cannot be read here, and what the user can do with each."""
+"""Known kinds of files that cannot be read here, and a remedy for each."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LIST = re.compile(rb"^[ \t]*[^\W\d][\w.]*\s*=\s*(?:(?:np\.)?array\(\s*)?\[(?:\s
 _TUPLES = re.compile(rb"^\((?:[-+.\deE]+, *)+[-+.\deE]*\),?[ \t]*\r?$", re.MULTILINE)
 _BARS = re.compile(rb"^[ \t]*\|.*\|[ \t]*\r?\n[ \t]*\|[-:| \t]+\|[ \t]*\r?$", re.MULTILINE)
 _OF_TEXT = 0.3
-"""Smallest share of lists in a text that counts as lists; a program may contain a few lists too."""
+"""Minimum share of lists in a text that is refused as lists; a program may also contain a few lists."""
 
 
 def _is_json(head: bytes) -> bool:
@@ -31,7 +31,7 @@ def _is_json(head: bytes) -> bool:
 
 
 def _is_lists(head: bytes) -> bool:
-    """Return whether a text is Python tuples, one per line, or mostly named lists."""
+    """Return whether a text has a line that is a Python tuple, or consists to a large part of named lists."""
     listed = sum(len(line) for line in head.split(b"\n") if _LIST.match(line))
     return bool(_TUPLES.search(head)) or listed >= max(1, _OF_TEXT * len(head))
 
@@ -41,7 +41,7 @@ def _is_hdf5(head: bytes) -> bool:
 
 
 def _is_yaml(head: bytes) -> bool:
-    """Return whether a text is mostly YAML lists: numbers after hyphens below a key, or a list after the key."""
+    """Return whether a text is largely YAML lists: numbers after hyphens below a key, or a list after the key."""
     listed = sum(len(line) for line in head.split(b"\n") if _YAML_LINE.match(line))
     return bool(_YAML.search(head)) and listed >= max(1, _OF_TEXT * len(head))
 
@@ -85,7 +85,7 @@ _PROGRAMS = {
     ".mat": ("a MATLAB file", 'in MATLAB writematrix([t x], "run.csv")'),
     ".pkl": ("a pickle of Python", "save the numbers as CSV where they were made"),
 }
-"""Files of programs that cannot be identified by their first bytes, by suffix."""
+"""Kind and remedy, by suffix, of program files that cannot be identified by their first bytes."""
 
 
 def foreign_format(path: str, head: bytes) -> UnknownFormat | None:
@@ -118,7 +118,7 @@ def unknown_format(path: str, head: bytes, names: tuple[str, ...]) -> FormatErro
     Returns
     -------
     UnknownFormat
-        With the kind of file, if it is known.
+        It names the kind of file, if that is known.
     """
     if (known := foreign_format(path, head)) is not None:
         return known

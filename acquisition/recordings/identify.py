@@ -1,8 +1,8 @@
 """The formats of recordings, and the identification of a file's format.
 
-The table holds only names; the module of a format is imported on demand. Another package adds a format with an entry
-point in the group ``springmass.formats`` that names an object like :class:`acquisition.recordings.base.Format`. A user
-can declare one without code (:mod:`acquisition.recordings.families.declared`).
+The table contains only names; the module of a format is imported on demand. Another package adds a format with an
+entry point in the group ``springmass.formats`` that names an object like :class:`acquisition.recordings.base.Format`.
+A user can declare a format without code (:mod:`acquisition.recordings.families.declared`).
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ _TABLE = {
     "bare": "bare",
     "table": "any_table",
 }
-"""The module in ``families`` for each name."""
+"""The module in ``families`` for each name of a format."""
 _LAST = "table"  # accepts any rows of numbers, so all other formats are tried first
 
 
 def formats() -> tuple[Format, ...]:
-    """Return all formats: those that the user declares, those of this package, those of other packages.
+    """Return all formats, from the user's declarations, this package and other packages.
 
     Examples
     --------
@@ -67,12 +67,12 @@ def formats() -> tuple[Format, ...]:
 
 
 def get_format(name: str) -> Format:
-    """Return the format of that name.
+    """Return the format with a given name.
 
     Raises
     ------
     UnknownFormat
-        If there is none.
+        If no format has this name.
     """
     if name in _TABLE:
         return _built_in(name)
@@ -87,12 +87,12 @@ def get_format(name: str) -> Format:
 
 
 def sniff(path: str | os.PathLike[str]) -> str:
-    """Return the name of a file's format, from its first bytes.
+    """Return the name of a file's format, identified by its first bytes.
 
     Raises
     ------
     FormatError
-        If it cannot be opened, or no format recognises it.
+        If the file cannot be opened, or no format recognises it.
     """
     return _recognise(os.fspath(path), read_head(path)).name
 
@@ -117,9 +117,9 @@ def open_recording(
     format : str, optional
         Name of the format; by default it is identified by content.
     channel, rate_hz, unit, run, time, time_unit : optional
-        What the file does not state or leaves open; see :meth:`acquisition.recordings.base.Format.read`.
+        Information that the file does not state or leaves open; see :meth:`acquisition.recordings.base.Format.read`.
     velocity_path : path, optional
-        The velocity file of a position file; they are joined by time.
+        The velocity file that belongs to the position file; the two are joined by time.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def open_recording(
     Raises
     ------
     FormatError
-        For any fault of the file; one line for the user.
+        If the file is faulty; the message is one line for the user.
     """
     name = os.fspath(path)
     reader = get_format(format) if format else _recognise(name, read_head(path))
@@ -150,7 +150,7 @@ def inspect(path: str | os.PathLike[str]) -> Inspection:
     Raises
     ------
     FormatError
-        If it cannot be opened, no format recognises it, or its content cannot be read.
+        If the file cannot be opened, no format recognises it, or its content cannot be read.
     """
     name = os.fspath(path)
     head = read_head(path)
@@ -170,7 +170,10 @@ def _recognise(path: str, head: bytes) -> Format:
 
 
 def _every() -> Iterator[Format]:
-    """Yield the formats, those that the user declares first, and entry points only after those of this package."""
+    """Yield all formats in the order in which they are tried.
+
+    The user's declarations come first, then the formats of this package, then entry points; ``table`` comes last.
+    """
     yield from _declared()
     for name in _TABLE:
         if name != _LAST:
@@ -182,7 +185,7 @@ def _every() -> Iterator[Format]:
 
 
 def _declared() -> Iterator[Format]:
-    """Yield the dialects of the user; their reader is imported only if there are any."""
+    """Yield the user's dialects; their reader is imported only if the folder of dialects exists."""
     if not dialect_folder().is_dir():
         return
     for each in import_module("acquisition.recordings.families.declared").dialects():

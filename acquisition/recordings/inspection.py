@@ -19,10 +19,10 @@ class Survey:
         Empty if the file does not state them.
     samples : int
     rate_hz : float or None
-        None if the user must give it.
+        Sampling rate, Hz; None if it cannot be determined, for example because the user must give it.
     traps : tuple of Trap
     span_s : float or None
-        From the first time to the last; None if the user must give the rate.
+        Duration from the earliest to the latest sample, s; None if it is not known.
     """
 
     run: str
@@ -41,7 +41,7 @@ class Inspection:
     Parameters
     ----------
     format, title : str
-        Name of the family, and one line about it.
+        Name of the family, and its description in one line.
     why : str
         The evidence for the family.
     surveys : tuple of Survey

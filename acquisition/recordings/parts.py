@@ -23,29 +23,29 @@ from acquisition.recordings.tables.sheet import ColumnFormat
 __all__ = ["MOST_BYTES", "contents_of_parts", "members"]
 
 MOST_BYTES = 1 << 28
-"""Largest unpacked size of all parts of a file; an hour of a phone's sensors needs a tenth."""
+"""Maximum unpacked size of all parts of a file, bytes; one hour of a phone's sensor data takes a tenth of it."""
 _MOST_MEMBERS = 2000
 _CONTAINERS = ("workbook", "zip")
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError)
-"""What zipfile raises for damaged, encrypted and unknown compressed files."""
+"""Exceptions that zipfile raises for damaged or encrypted files and for unknown kinds of compression."""
 
 
 def contents_of_parts(path: str, parts: Iterable[tuple[str, bytes]], what: str) -> Contents:
-    """Return the content of the parts of a file: the only recording among them, or each recording as a run.
+    """Return the joint content of the parts of a file: each recording is a run, unless there is only one.
 
     Parameters
     ----------
     path : str
         For messages.
     parts : iterable of (str, bytes)
-        Name and content of each.
+        Name and content of each part.
     what : str
         Name of a part in messages, for example "sheet".
 
     Raises
     ------
     FormatError
-        If no part holds a recording.
+        If no part contains a recording.
     """
     families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in _CONTAINERS]
     recordings: list[tuple[str, Contents]] = []
@@ -63,7 +63,7 @@ def contents_of_parts(path: str, parts: Iterable[tuple[str, bytes]], what: str) 
         listed = ", ".join(f'"{name}"' for name in unread[:8]) or "none"
         problem = f"expected a {what} with rows of numbers, got {listed}"
         raise foreign_format(path, b"") or FormatError(path, problem, "check that the recording was saved in it")
-    if any(_is_timed(contents) for _, contents in recordings):  # then a part without times is not a recording
+    if any(_is_timed(contents) for _, contents in recordings):  # then no part without times is a recording
         unread += [name for name, contents in recordings if not _is_timed(contents)]
         recordings = [(name, contents) for name, contents in recordings if _is_timed(contents)]
     traps: tuple[Trap, ...] = ()
@@ -90,7 +90,7 @@ def _is_timed(contents: Contents) -> bool:
 
 
 def members(path: str, data: bytes, most_bytes: int = MOST_BYTES, head_bytes: int = -1) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of every file in a zip archive, in order, without files that operating systems add.
+    """Yield the name and content of each file in a zip archive, except files that operating systems add.
 
     Parameters
     ----------
@@ -99,14 +99,14 @@ def members(path: str, data: bytes, most_bytes: int = MOST_BYTES, head_bytes: in
     data : bytes
         The archive.
     most_bytes : int
-        Largest unpacked size of all files.
+        Maximum unpacked size of all files together.
     head_bytes : int, optional
-        Largest number of bytes to unpack from each file; all by default.
+        Maximum number of bytes to unpack from each file; all by default.
 
     Raises
     ------
     FormatError
-        If it is damaged or encrypted, or the unpacked size is too large.
+        If the archive is damaged or encrypted, has too many files, or is too large when unpacked.
     """
     remedy = "unpack it, and name a file inside"
     try:
@@ -121,7 +121,7 @@ def members(path: str, data: bytes, most_bytes: int = MOST_BYTES, head_bytes: in
                 raise FormatError(path, problem, remedy)
             for each in listed:
                 with archive.open(each) as file:
-                    # zipfile stops at the stated size, and raises if there is more.
+                    # zipfile stops at the stated size, and raises an error if the file is longer.
                     yield each.filename, file.read(head_bytes)
     except _DAMAGE as error:
         if isinstance(error, FormatError):

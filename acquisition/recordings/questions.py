@@ -1,8 +1,9 @@
-"""Questions of a reader to the user, as data.
+"""Questions that a reader asks the user, represented as data.
 
-A file may lack what must not be guessed: a unit, a rate, the choice of a channel. The reader then raises
-:class:`acquisition.errors.NeedsAnswer` with a :class:`Question`. It holds all possible answers, so that a program can
-choose without parsing text. A command and a script need different answers, so the caller words how to answer.
+A file may lack information that must not be guessed: a unit, a rate, the choice of a channel. The reader then raises
+:class:`acquisition.errors.NeedsAnswer` with a :class:`Question`. The question contains all possible answers, so that a
+program can choose without parsing text. A command line and a script give answers in different ways, so the caller
+writes the instructions for answering.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class Missing(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class MissingItem:
-    """One thing that is missing.
+    """One missing item of information.
 
     Parameters
     ----------
@@ -34,13 +35,13 @@ class MissingItem:
     choices : tuple of str
         All choices: runs, possible channels, or units. Empty for a rate, which may be any positive number.
     example : str or float
-        One of the choices; for a rate a round number in Hz, which does not come from the file.
+        One of the choices. For a rate, it is a round number in Hz that does not come from the file.
     of : str
         The column whose unit is missing; empty if the file does not name it.
     stated : str
         The unknown unit that the file states; empty if it states none.
     instead : MissingItem or None
-        Another item that can be given instead, such as the column of times instead of a rate.
+        Another item that can be given in its place, such as the column of times in place of a rate.
     """
 
     what: Missing
@@ -81,7 +82,7 @@ class Times:
     name : str
     first, last : float
     step : float
-        The median of the first steps.
+        Median of the first time steps.
     """
 
     name: str
@@ -102,13 +103,13 @@ class Question:
     path : str
         The file.
     needs : tuple of MissingItem
-        At least one, in the order of their dependence: run, channel, rate or time unit, unit. All examples together
-        answer the question. To choose something else than the first example, answer only that item and read again,
-        because the later items refer to the run and the channel of the examples.
+        At least one missing item. The order is run, channel, rate or time unit, unit, because each item may depend on
+        the items before it. All examples together answer the question. To choose another answer than the first example,
+        answer only that item and read again, because the later items refer to the run and channel of the examples.
     columns : tuple of str
         The columns of the run, with their units.
     times : Times or str
-        The range of the times, or only their name; empty if there are none.
+        The range of the times, or only their name; an empty text if there are no times.
     reason : str
         The reason for the question, if the columns do not show it, for example an answer that does not fit.
 
@@ -130,12 +131,12 @@ class Question:
 
     @property
     def missing(self) -> tuple[Missing, ...]:
-        """What is missing."""
+        """The kinds of the missing items."""
         return tuple(need.what for need in self.needs)
 
     @property
     def examples(self) -> dict[str, str | float]:
-        """Keyword arguments of ``open_recording`` that answer everything."""
+        """Keyword arguments of ``open_recording`` that answer the whole question."""
         return {need.what.value: need.example for need in self.needs}
 
     @property
@@ -150,7 +151,7 @@ class Question:
 
     @property
     def remedy(self) -> str:
-        """What to do, in words that do not depend on the interface."""
+        """The instruction to the user, in words that do not depend on the interface."""
         return f"state {', and '.join(_stated(need) for need in self.needs)}"
 
 

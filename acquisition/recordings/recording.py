@@ -1,4 +1,4 @@
-"""A recording as its format read it: samples, remarks of the reader, and the bytes of the file."""
+"""A recording read by its format: its samples, the reader's remarks, and the bytes of the file."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Original:
     @property
     def sha256(self) -> str:
         """Hexadecimal SHA-256 of the bytes."""
-        import hashlib  # imported here, because it takes a twentieth of the start-up time
+        import hashlib  # imported only here, because the import takes a twentieth of the start-up time
 
         return hashlib.sha256(self.data).hexdigest()
 
@@ -45,9 +45,9 @@ class Trap:
     message : str
         One sentence that states the peculiarity and how it was treated.
     count : int
-        Number of rows or samples that it concerns.
+        Number of rows or samples that are affected.
     line : int, optional
-        One-based line of the first of them.
+        One-based line number of the first affected row or sample.
     """
 
     code: str
@@ -69,13 +69,14 @@ class Recording:
     info : SourceInfo
         Rate, quantum, clock; ``kind`` is "replay" unless the file states that it was simulated.
     channel : str
-        The quantity or column that is read as distance.
+        The quantity or column whose values are the samples.
     samples : Block
         All samples, ``first`` = 0. Every row of data is a sample; samples that could not be read are flagged.
     traps : tuple of Trap
-        Remarks of the reader.
+        Remarks by the reader.
     malformed_rows : int
-        Rows that were not samples (text in the middle, a truncated last row).
+        Number of rows that could not be read (text between rows, a truncated last row), including those that are kept
+        as missing samples.
     originals : tuple of Original
         The bytes of the file, or of the two files of a position and velocity pair.
     title : str
@@ -83,7 +84,7 @@ class Recording:
     run : str
         Name of the run inside the file; empty for a single run without a name.
     start_time : str
-        ISO 8601, if the file states it; else empty.
+        Start time in ISO 8601 if the file states it; else empty.
     """
 
     format: str

@@ -1,4 +1,4 @@
-"""Units in files: their quantities, and their conversion to SI."""
+"""Units that occur in files, their quantities, and their conversion to SI."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ __all__ = [
 ]
 
 LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
-"""Units of length, with the power of ten that converts them to metres."""
+"""Units of length, each with the power of ten that converts it to metres."""
 TIMES = {"s": 0, "ms": -3, "us": -6, "ns": -9, "min": 0, "h": 0}
-"""Units of time, with the power of ten that converts them to seconds, apart from :func:`time_factor`."""
+"""Units of time, each with the power of ten that, together with :func:`time_factor`, converts it to seconds."""
 _TIME_FACTORS = {"min": 60.0, "h": 3600.0}
 
 _OTHERS = {
@@ -95,7 +95,7 @@ MEASURES = {
 
 
 def unit_words(unit: str) -> str:
-    """Return the symbol of a unit that is spelled out; other units unchanged.
+    """Return the symbol of a spelled-out unit; return other units unchanged.
 
     Examples
     --------
@@ -128,10 +128,10 @@ def measure_of(unit: str) -> Measure | None:
 
 
 def time_power(unit: str) -> int | None:
-    """Return the power of ten that converts a time to seconds; None for other units."""
+    """Return the power of ten that converts a time to seconds; None if the unit is not a unit of time."""
     return TIMES.get(unit_words(unit))
 
 
 def time_factor(unit: str) -> float:
-    """Return the factor besides a power of ten that converts a time to seconds, for example 60 for minutes."""
+    """Return the factor, besides the power of ten, that converts a time to seconds; for example 60 for minutes."""
     return _TIME_FACTORS.get(unit_words(unit), 1.0)

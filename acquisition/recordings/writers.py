@@ -1,6 +1,6 @@
 """Write recordings in the formats of other programs: MotionSensor.vi, LVM, and CSV with units.
 
-Each format stores less than a run file. Whatever it cannot store is reported.
+Each format stores less than a run file. Everything that it cannot store is reported.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from acquisition.source import SourceInfo
 __all__ = ["WRITERS", "Written", "write_csv", "write_lvm", "write_motion_sensor"]
 
 _TITLE = "Motion Sensor Data File"
-_SHOWN = np.uint8(Flag.MISSING)  # a NaN shows it
+_SHOWN = np.uint8(Flag.MISSING)  # this flag is not lost, because a NaN represents it
 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """Files made of one recording.
+    """The files written for one recording.
 
     Parameters
     ----------
     files : tuple of (str, bytes)
-        Suffix to the name that the user gave, and content; the suffix is empty for the file of that name.
+        Suffix that is added to the user's file name, and content. The suffix is empty for the file with that name.
     lost : tuple of str
-        What the format cannot store, one sentence each.
+        One sentence for each kind of information that the format cannot store.
     """
 
     files: tuple[tuple[str, bytes], ...]
@@ -48,22 +48,22 @@ def write_motion_sensor(path: str, samples: Block, info: SourceInfo, title: str 
     samples : Block
     info : SourceInfo
     title, start_time : str
-        As the recording has them; either may be empty.
+        Taken from the recording; either may be empty.
 
     Returns
     -------
     Written
-        The position under the given name, the velocity with the suffix ``_velocity``.
+        The position under the given name, and the velocity with the suffix ``_velocity``.
 
     Raises
     ------
     FormatError
-        If two samples would get the same time, because the format prints milliseconds.
+        If two samples would get the same time, because the format prints times in whole milliseconds.
 
     Notes
     -----
-    If the recording states no velocity, it is the backward difference over one sample, as in the instrument; after a
-    gap and next to a missing sample it is NaN.
+    If the recording has no velocity, the backward difference of the position over one sample is written, as in the
+    instrument. It is NaN after a gap and next to a missing sample.
     """
     _demand_times(path, samples.t, 3, "MotionSensor.vi prints times to 1 ms")
     head = title if title.lower().startswith(_TITLE.lower()) else f"{_TITLE} {title or start_time}".strip()
@@ -125,7 +125,7 @@ def write_lvm(path: str, samples: Block, info: SourceInfo, title: str = "", star
 def write_csv(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
     """Write columns under headings with units; see :func:`write_motion_sensor`.
 
-    The heading marks simulated data, because the format has no other place for that.
+    The heading marks simulated data, because the format has no other place for this information.
     """
     _demand_times(path, samples.t, 9, "CSV is written with times to 1 ns")
     name = "Simulated distance (m)" if info.kind == "simulated" else "Distance (m)"
@@ -142,7 +142,7 @@ WRITERS: dict[str, Callable[[str, Block, SourceInfo, str, str], Written]] = {
     ".lvm": write_lvm,
     ".csv": write_csv,
 }
-"""The writer for each suffix."""
+"""The writer for each file suffix."""
 
 
 def _rows(lines: list[str], mark: str, t: F8, columns: list[F8]) -> bytes:
@@ -191,7 +191,7 @@ def _titles(title: str, start_time: str) -> list[str]:
 
 
 def _losses(samples: Block, rounding_m: float) -> tuple[str, ...]:
-    """Return what rows of numbers cannot store."""
+    """Return one sentence for each kind of information that rows of numbers cannot store."""
     lost = []
     flagged = int(np.count_nonzero(samples.flags & ~_SHOWN))
     if flagged:

@@ -1,6 +1,6 @@
 """The simulated rangefinder on a pseudo-terminal, which the real serial code reads like a sensor.
 
-POSIX only. A pseudo-terminal ignores the baud rate, so the simulated device waits for the clock.
+It works on POSIX only. A pseudo-terminal ignores the baud rate, so the clock determines when bytes are sent.
 """
 
 from __future__ import annotations
@@ -26,20 +26,21 @@ __all__ = ["Faults", "VirtualPort"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Faults:
-    """The faults of a line, at random or at given seconds of the run.
+    """The faults of a line, at random times or at given times of the run.
 
     Parameters
     ----------
     noise_rate, drop_rate, flip_rate : float
-        Probability per frame of bytes inserted, a byte dropped, a bit flipped (which breaks a checksum).
+        Probability, per frame, that random bytes are inserted before it, that one of its bytes is dropped, and that
+        one of its bits is flipped (which makes a checksum wrong).
     stall : tuple of float
-        (start, duration), s: silence, and then all bytes together.
+        (start, duration) of a stall, s: silence, and then all delayed bytes together.
     unplug : tuple of float
-        (start, duration), s: the port vanishes and comes back; readings in between are lost.
+        (start, duration) of an unplugging, s: the port disappears and comes back; readings in between are lost.
     flood : tuple of float
-        (start, s, number of bytes): random bytes in one piece.
+        (start in s, number of bytes) of a flood: random bytes that are sent together.
     wrong_baud : bool
-        Every byte is garbled, as with a wrong speed of the port.
+        Whether each frame is replaced by random bytes, as if the baud rate of the port were wrong.
     """
 
     noise_rate: float = 0.0
@@ -52,21 +53,21 @@ class Faults:
 
 
 class VirtualPort:
-    """A simulated sensor behind a port's path.
+    """A simulated sensor that is available as a port, at ``path``.
 
     Parameters
     ----------
     family : Family
-        Family of the simulated sensor. A polled family answers requests, the others send by themselves.
+        Family of the simulated sensor. A sensor of a polled family answers requests; others send without requests.
     rangefinder : VirtualRangefinder
     clock : Clock
     seconds : float
-        Time after which it stops sending.
+        Time after which the sensor stops sending, s.
     faults : Faults, optional
     rng : numpy.random.Generator, optional
-        Random numbers of the faults.
+        Generator of the random numbers of the faults.
     options : mapping, optional
-        Options of the family's encoder.
+        Options of the encoder of the family.
     """
 
     def __init__(
@@ -160,7 +161,7 @@ class VirtualPort:
         self.sent += len(held)
 
     def _plugged(self, t: float) -> bool:
-        """Plug or unplug according to the faults at this time; return whether the cable is plugged."""
+        """Plug or unplug the port according to the faults at time ``t``; return whether it is plugged in."""
         out = self._within(self._faults.unplug, t)
         if out and self._master >= 0:
             self._pull()
@@ -176,7 +177,7 @@ class VirtualPort:
             yield shot, self._frame(shot)
 
     def _answers(self, start_ns: int) -> Iterator[tuple[Shot, bytes]]:
-        """Yield one shot for each request, taken when the request arrives."""
+        """Yield one shot and its reply for each request, taken when the request arrives."""
         assert self._family.poll is not None
         waiting = b""
         sequence = 0
@@ -201,12 +202,12 @@ class VirtualPort:
         except BlockingIOError:
             return b""
         except OSError as error:
-            if error.errno == errno.EIO:  # the other end is not open
+            if error.errno == errno.EIO:  # no program has the other end open
                 return b""
             raise
 
     def _answer(self, request: bytes, shot: Shot) -> bytes:
-        # Some encoders answer requests for the temperature.
+        # Some encoders distinguish requests for the distance from requests for the temperature.
         reply = getattr(self._encoder, "reply", None)
         if reply is None:
             return self._frame(shot)
@@ -235,7 +236,7 @@ class VirtualPort:
         return bytes(data)
 
     def _send(self, data: bytes) -> None:
-        """Write all bytes. With a slow reader a real sensor would lose bytes; the simulated one waits."""
+        """Write all bytes; wait for a slow reader, with which a real sensor would lose bytes."""
         remaining = memoryview(data)
         while remaining and not self._stop.is_set():
             try:

@@ -1,4 +1,4 @@
-"""The simulated rangefinder: it turns a position function into readings with the errors of a real sensor."""
+"""The simulated rangefinder, which turns a position function into readings with the errors of a real sensor."""
 
 from __future__ import annotations
 
@@ -18,32 +18,33 @@ __all__ = ["Shot", "VirtualRangefinder", "VirtualSensor"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VirtualSensor:
-    """The quality of the simulated rangefinder.
+    """The properties and errors of a simulated rangefinder.
 
     Parameters
     ----------
     rate_hz : float
-        Nominal readings per second of the sensor's clock, Hz.
+        Readings per second by the sensor's own clock, Hz.
     tick_s : float
-        Resolution of an echo time, s; 0.25 us is 43 um.
+        Resolution of an echo time, s; 0.25 us corresponds to a distance of 43 um.
     noise_m : float
-        Standard deviation of a distance, m.
+        Standard deviation of the noise of a distance, m.
     false_echo_rate_hz : float
-        Clusters of false echoes per second, at the turning points nearest to the sensor.
+        Clusters of false echoes per second, if the bob has one turning point nearest to the sensor per second; each
+        cluster follows such a turning point.
     false_echo_m : float
-        Distance of the false echoes beyond the bob, m.
+        Mean distance of the false echoes beyond the bob, m.
     far_limit_m : float
-        Distance of a fixed object behind the bob, m; no reading is larger.
+        Distance of a fixed object behind the bob, m; it limits all readings.
     dead_time_s : float
-        Shortest time of flight, s; an earlier echo gives no target.
+        Minimum time of flight, s; an earlier echo gives a reading without a target.
     jitter_s : float
-        Standard deviation of the time of a reading, s; the stated time is the intended one.
+        Standard deviation of the time at which a reading is taken, s; the time stated is the intended time.
     crystal_ppm : float
-        How much faster its clock runs than true time.
+        Relative rate by which the sensor's clock runs faster than true time, ppm.
     speed_of_sound_m_per_s : float
         Speed of sound in the simulated air.
     temperature_c : float
-        Reading of its thermometer.
+        Temperature that the sensor sends, degC.
     """
 
     rate_hz: float = 100.0
@@ -74,14 +75,14 @@ class Shot:
     Parameters
     ----------
     true_s : float
-        True time of the reading since the start, s.
+        Intended time of the reading since the start, without jitter, in true time, s.
     sequence : int
     device_us : int
-        Time by the sensor's clock, which wraps at 2^32.
+        Time by the sensor's clock, us, which wraps at 2^32.
     echo_us : float
-        Time of flight in whole ticks, NaN for no target.
+        Time of flight, us, rounded to whole ticks; NaN for no target.
     distance_m : float
-        The distance that a sensor would state, NaN for no target.
+        Distance that a sensor would calculate from the echo time, m; NaN for no target.
     temperature_c : float
     """
 
@@ -99,10 +100,10 @@ class VirtualRangefinder:
     Parameters
     ----------
     position : callable
-        Distance of the bob from the sensor, m, at a time, s.
+        Function that returns the distance of the bob from the sensor, m, at a time, s.
     sensor : VirtualSensor
     rng : numpy.random.Generator
-        The source of all random numbers.
+        Generator of all random numbers.
     """
 
     def __init__(self, position: Callable[[float], float], sensor: VirtualSensor, rng: np.random.Generator) -> None:
@@ -113,18 +114,18 @@ class VirtualRangefinder:
         self._cluster_m = 0.0
 
     def shots(self) -> Iterator[Shot]:
-        """Yield readings without end."""
+        """Yield consecutive readings, without end."""
         sequence = 0
         while True:
             yield self.shot(sequence)
             sequence += 1
 
     def shot(self, sequence: int) -> Shot:
-        """Take one reading; call with consecutive numbers."""
+        """Take the reading with a given sequence number; the numbers of successive calls must not decrease."""
         sensor = self.sensor
         intended_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
         moment = intended_s + (self._rng.normal(0.0, sensor.jitter_s) if sensor.jitter_s else 0.0)
-        # The sound meets the bob half the time of flight later.
+        # The sound is reflected by the bob half the time of flight later.
         met_s = moment + self._position(moment) / sensor.speed_of_sound_m_per_s
         distance_m = self._position(met_s) + self._false_echo(moment) + self._rng.normal(0.0, sensor.noise_m)
         distance_m = min(distance_m, sensor.far_limit_m)
@@ -137,31 +138,32 @@ class VirtualRangefinder:
         return Shot(intended_s, sequence, device_us, echo_us, distance, sensor.temperature_c)
 
     def block(self, seconds: float) -> Block:
-        """Return the readings of the first ``seconds`` of true time; see :class:`acquisition.replay.Replay`."""
+        """Return the readings of the first ``seconds`` of true time, for :class:`acquisition.replay.Replay`."""
         true_rate_hz = self.sensor.rate_hz * (1.0 + self.sensor.crystal_ppm * 1e-6)
-        # Rounded, so that 0.07 s at 100 Hz give seven samples: the product is 7.000000000000001.
+        # The product is rounded, so that 0.07 s at 100 Hz give seven samples: it is 7.000000000000001.
         shots = [self.shot(sequence) for sequence in range(math.ceil(round(seconds * true_rate_hz, 6)))]
         distance = np.array([shot.distance_m for shot in shots], np.float64)
         flags = np.isnan(distance) * np.uint8(Flag.MISSING)
         host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)
-        # The time at which the sound met the bob, by the sensor's clock; without an echo the last travel time counts.
+        # The time of a sample is that of the reflection, by the sensor's clock. Without an echo, the last travel time
+        # is used.
         ways_s = np.array([0.5e-6 * shot.echo_us for shot in shots], np.float64)
         t = np.arange(len(shots)) / self.sensor.rate_hz + carried(ways_s, np.isfinite(ways_s), 0.0)
         return Block(0, t, distance, flags, host_ns)
 
     def info(self, name: str) -> SourceInfo:
-        """Return its description as a source."""
+        """Return the description of this sensor as a source."""
         quantum_m = 0.5 * self.sensor.tick_s * self.sensor.speed_of_sound_m_per_s
         return SourceInfo("simulated", name, self.sensor.rate_hz, quantum_m=quantum_m, clock="device")
 
     def _false_echo(self, t: float) -> float:
-        """Return the error of this reading, m; a cluster begins when the bob turns nearest to the sensor."""
+        """Return the error of a reading by a false echo, m; a cluster begins after a turning point near the sensor."""
         if self._cluster_remaining > 0:
             self._cluster_remaining -= 1
             return self._cluster_m
         step = 1.0 / self.sensor.rate_hz
         before, now, after = (self._position(t + k * step) for k in (-1, 0, 1))
-        # There is about one such turning point per second, so the rate is the probability at each.
+        # There is about one such turning point per second, so the rate is used as the probability at each.
         if now <= before and now < after and self._rng.random() < self.sensor.false_echo_rate_hz:
             self._cluster_remaining = int(self._rng.integers(3, 18))
             self._cluster_m = self.sensor.false_echo_m * float(self._rng.uniform(0.5, 1.5))

@@ -1,1 +1,1 @@
-"""What the estimates must reach, measured over many seeds."""
+"""Check the required accuracy of the estimates over many seeds."""

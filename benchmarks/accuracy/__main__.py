@@ -1,6 +1,6 @@
-"""What the estimates must reach, measured over many seeds: `python benchmarks/accuracy --seeds 2000`, `make accuracy`.
+"""Check the required accuracy of the estimates: `python benchmarks/accuracy --seeds 2000`, `make accuracy`.
 
-Prints each requirement with its limit and what was measured; ends with exit code 1 where one is not met.
+Prints each requirement with its limit and the measured value; the exit code is 1 if a requirement is not met.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from benchmarks.accuracy.checks import CHECKS, Bench, Line
 
 
 def main() -> int:
-    """Run the checks asked for."""
+    """Run the selected checks; return 1 if a requirement is not met."""
     parser = argparse.ArgumentParser(prog="benchmarks/accuracy", description=__doc__)
     parser.add_argument("--seeds", type=int, default=2000, metavar="N", help="records a case (default 2000)")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes (default 2)")
@@ -32,7 +32,7 @@ def main() -> int:
 
 
 def shown(line: Line) -> str:
-    """Return a line of the table."""
+    """Return a requirement as a line of the table."""
     return f"  {'ok  ' if line.ok else 'FAIL'}  {line.what:<64} {line.measured:<28} {line.limit}"
 
 

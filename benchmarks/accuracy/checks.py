@@ -1,7 +1,8 @@
-"""The requirements, each as a check over seeds that yields lines with a limit, what was measured, and whether it holds.
+"""Check the requirements over seeds: each check yields lines with a limit, the measured value, and the result.
 
-A share or a root mean square over finitely many seeds scatters. A limit counts as broken where the measurement is
-beyond it by more than three standard errors of it: with 2000 seeds 3 % of a share of 68 %, 5 % of an rms error.
+A share or a root mean square over finitely many seeds scatters. A limit counts as exceeded if the measured value is
+beyond it by more than three of its standard errors. With 2000 seeds these are 3 percentage points for a share of 68 %,
+and 5 % of an rms error.
 """
 
 from __future__ import annotations
@@ -43,15 +44,16 @@ class Line:
 
 @dataclass(frozen=True)
 class Bench:
-    """How much is measured, and by what.
+    """The number of records, and the means of evaluating them.
 
     Parameters
     ----------
     seeds : int
-        Records a case.
+        Number of records per case.
     map : callable
-        The built-in one, or a pool's.
+        The built-in ``map``, or the one of a pool.
     jobs : int
+        Number of processes.
     """
 
     seeds: int
@@ -60,7 +62,7 @@ class Bench:
 
     @property
     def short(self) -> bool:
-        """Whether this is the form that runs as a test: the longest records are left out."""
+        """Whether this is the short form that runs as a test, without the longest records."""
         return self.seeds < 100
 
     def run(self, case: Case, tier: str, seeds: int | None = None) -> list[Outcome]:
@@ -71,24 +73,24 @@ class Bench:
 
 
 def share_line(what: str, share: float, count: int, low: float, high: float = 1.0) -> Line:
-    """Return the line of a share that must lie between two."""
+    """Return the line of a share that must lie between two limits."""
     doubt = SIGMAS * math.sqrt(max(share * (1 - share), low * (1 - low), 1.0 / count) / count)
     limit = f">= {low:.0%}" if high == 1.0 else f"<= {high:.0%}" if low == 0.0 else f"{low:.0%} to {high:.0%}"
     return Line(what, f"{share:.1%}", limit, low - doubt <= share <= high + doubt)
 
 
 def rms(values: np.ndarray) -> float:
-    """Return the root mean square."""
+    """Return the root mean square of some values."""
     return float(np.sqrt(np.mean(values**2)))
 
 
 def name_of(case: Case) -> str:
-    """Return length and noise in words."""
+    """Return the duration and noise of a case as text."""
     return f"{case.seconds:g} s, {case.noise_m * 1e3:g} mm"
 
 
 def efficiency(bench: Bench) -> Iterator[Line]:
-    """Errors near the bound, bias far below it, intervals that hold what they state."""
+    """Check that errors are near the bound, bias is far below it, and intervals cover the stated shares."""
     for noise in NOISES_M:
         case = Case(noise_m=noise)
         bound = bounds(case)
@@ -119,7 +121,7 @@ def quantity_lines(what: str, error: np.ndarray, u: np.ndarray, tier: str) -> It
 
 
 def all_found(what: str, outcomes: list[Outcome]) -> Line:
-    """Return the line that nothing was refused."""
+    """Return the line of the requirement that every record gave an estimate."""
     lost = [o.why for o in outcomes if o.why]
     return Line(
         what, f"{len(outcomes) - len(lost)} of {len(outcomes)}" + (f" ({lost[0]})" if lost else ""), "all", not lost
@@ -127,7 +129,7 @@ def all_found(what: str, outcomes: list[Outcome]) -> Line:
 
 
 def stacked(outcomes: list[Outcome]) -> tuple[np.ndarray, np.ndarray]:
-    """Return errors and uncertainties of those that gave an estimate, (n, 4) each."""
+    """Return errors and uncertainties of the outcomes with an estimate, (n, 4) each."""
     found = [o for o in outcomes if not o.why]
     if not found:
         return np.full((1, 4), np.nan), np.full((1, 4), np.nan)
@@ -135,7 +137,7 @@ def stacked(outcomes: list[Outcome]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def damping_bias(bench: Bench) -> Iterator[Line]:
-    """The classic method's damping is off by an eighth; ours by less than a thousandth."""
+    """Check that the bias of the classic method's damping is an eighth, and that of ours less than a thousandth."""
     case = Case(noise_m=2.39e-3)
     gamma = case.truth["gamma"]
     for tier in ("standard", "best"):
@@ -148,13 +150,13 @@ def damping_bias(bench: Bench) -> Iterator[Line]:
 
 
 def laws(bench: Bench) -> Iterator[Line]:
-    """The true law is picked in long records, and among the admissible ones in short ones."""
+    """Check that the true law is selected in long records, and is one of the admissible laws in short records."""
     for noise in NOISES_M:
         for law, truth in synthetic.LAW_TRUTHS.items():
             case = Case(noise_m=noise, truth=truth)
             outcomes = bench.run(case, "standard")
             picked = float(np.mean([o.selected == law for o in outcomes]))
-            # The power 1.5 lies between two laws of the closed form: in coarse noise it need be admissible only.
+            # The power 1.5 lies between two laws of the closed form: in coarse noise it only needs to be admissible.
             if law != "power" or noise < 1e-3:
                 least = 0.95 if law in SINGLE or noise < 1e-3 else 0.70
                 yield share_line(f"{name_of(case)}, {law}: picked", picked, len(outcomes), least)
@@ -171,7 +173,7 @@ def laws(bench: Bench) -> Iterator[Line]:
 
 
 def echoes(bench: Bench) -> Iterator[Line]:
-    """False echoes cost little, alone or in clusters at the turning points; no share up to 40 % is refused."""
+    """Check that single or clustered false echoes cost little accuracy, and that no share up to 40 % is refused."""
     for tier in ("standard", "best"):
         clean = stacked(bench.run(Case(), tier))[0]
         for clustered in (False, True):
@@ -190,7 +192,7 @@ def echoes(bench: Bench) -> Iterator[Line]:
 
 
 def weak(bench: Bench) -> Iterator[Line]:
-    """Down to -10 dB no record is misjudged: the frequency is within five bounds."""
+    """Check that down to -10 dB every frequency error is within five bounds."""
     for decibel in (0.0, -5.0, -10.0):
         noise = 0.05 / math.sqrt(2.0) / 10 ** (decibel / 20.0)
         case = Case(seconds=10.0, noise_m=noise, truth={"gamma": 0.0})
@@ -201,7 +203,7 @@ def weak(bench: Bench) -> Iterator[Line]:
 
 
 def invariance(bench: Bench) -> Iterator[Line]:
-    """Neither the origin of time nor the size of the motion changes an answer by a twentieth of the bound."""
+    """Check that time origin and size of the motion change no estimate by more than a twentieth of the bound."""
     few = min(bench.seeds, 50)
     for tier in ("standard", "best"):
         base = stacked(bench.run(Case(), tier, few))[0]
@@ -219,7 +221,7 @@ def invariance(bench: Bench) -> Iterator[Line]:
 
 
 def ranges(bench: Bench) -> Iterator[Line]:
-    """From 8 samples a period to 10,000, from 1.5 periods to a million: the frequency is within five bounds."""
+    """Check that the frequency is within five bounds for 8 to 10,000 samples per period and 1.6 to 1e6 periods."""
     period = 2 * math.pi / 8.3
     few = min(bench.seeds, 20)
     for samples in (8, 20, 1000, 10_000):
@@ -232,7 +234,7 @@ def ranges(bench: Bench) -> Iterator[Line]:
 
 
 def within(bench: Bench, case: Case, what: str, seeds: int) -> Iterator[Line]:
-    """Yield whether every frequency lies within five bounds."""
+    """Yield whether every record gives an estimate, and whether every frequency is within five bounds."""
     outcomes = bench.run(case, "standard", seeds)
     yield all_found(f"{what}: an estimate", outcomes)
     worst = float(np.max(np.abs(stacked(outcomes)[0][:, 0]))) / bounds(case)[0]

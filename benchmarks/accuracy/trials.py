@@ -1,4 +1,4 @@
-"""One simulated record, evaluated: what the checks count over many seeds."""
+"""Simulate and evaluate one record; the checks count the outcomes over many seeds."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ QUANTITIES = ("frequency", "amplitude", "phase", "gamma")
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A kind of record.
+    """The properties of a simulated record.
 
     Parameters
     ----------
     seconds, rate_hz, noise_m : float
     truth : dict
-        Of ``synthetic.Truth``; the phase is drawn from the seed.
+        Arguments of ``synthetic.Truth``; the phase is drawn at random from the seed.
     echoes : float
         Share of the samples that are false echoes.
     clustered : bool
-        Whether these come in runs of 3 to 18 about the turning points, some millimetres off and moving with the bob, or
-        singly, anywhere up to 2 m.
+        Whether false echoes come in runs of 3 to 18 samples around the turning points, displaced by some millimetres
+        and moving with the bob. Otherwise they are single and lie anywhere up to 2 m.
     origin_s : float
-        Time of the first sample.
+        Time of the first sample, s.
     """
 
     seconds: float = 120.0
@@ -48,16 +48,18 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the analysis made of one record.
+    """The result of analysing one record.
 
     Parameters
     ----------
     why : str
-        Why nothing was estimated; "" where something was.
+        Reason why nothing was estimated; empty if there is an estimate.
     error, u : (4,) float64
-        Of frequency (Hz), amplitude (m), phase (rad) and gamma (1/s), the last three of the exponential; u without the
-        clock, which no simulated noise uses up. Frequency and phase alone where the exponential was not fitted.
+        Errors and uncertainties of frequency (Hz), amplitude (m), phase (rad) and gamma (1/s). Amplitude and gamma are
+        those of the exponential law, and NaN if it was not fitted. The uncertainties exclude that of the clock, because
+        simulated clocks are exact.
     selected : str
+        Name of the selected law.
     admissible, rejected : tuple of str
         Names of laws.
     """
@@ -71,7 +73,7 @@ class Outcome:
 
 
 def evaluate(job: tuple[Case, str, int]) -> Outcome:
-    """Make a record from its seed and analyse it with a tier."""
+    """Simulate a record from its seed and analyse it at an accuracy tier."""
     case, tier, seed = job
     truth, track = record(case, seed)
     nothing = np.full(4, np.nan)
@@ -79,12 +81,12 @@ def evaluate(job: tuple[Case, str, int]) -> Outcome:
         analysis = analyse(track, params=params_for(tier))
     except PipelineError as error:
         return Outcome(str(error), nothing, nothing)
-    except Exception as error:  # a defect: it is counted and named like a refusal, so that the rest is measured
+    except Exception as error:  # count a defect like a refusal, so that the other records are still measured
         return Outcome(f"{type(error).__name__}: {error}", nothing, nothing)
     motion = analysis.motion
     if not isinstance(motion, Oscillation):
         return Outcome(motion.why, nothing, nothing)
-    # Phase and amplitude are those at the first sample used, which a false echo may put off.
+    # Phase and amplitude refer to the first used sample, which is later if the first samples are false echoes.
     start = np.array([motion.damping.t0 - case.origin_s])
     true_phase, true_amplitude = float(truth.phase_at(start)[0]), float(truth.amplitude_at(start)[0])
     period, phase = motion.derived.statistical["period"], analysis.estimates["phase"]
@@ -104,7 +106,7 @@ def evaluate(job: tuple[Case, str, int]) -> Outcome:
 
 
 def record(case: Case, seed: int) -> tuple[Any, Track]:
-    """Return the truth of a seed and its track."""
+    """Return the true motion of a seed, and its track."""
     rng = np.random.default_rng((seed, 1))
     truth = synthetic.Truth(**{"phase": float(rng.uniform(-math.pi, math.pi)), **case.truth})
     t = synthetic.times(case.seconds, case.rate_hz)
@@ -118,7 +120,7 @@ def record(case: Case, seed: int) -> tuple[Any, Track]:
 
 
 def _clusters(truth: Any, t: np.ndarray, y: np.ndarray, share: float, rng: np.random.Generator) -> None:
-    """Shift runs of samples about turning points by 3 to 12 mm, until the share is reached."""
+    """Shift runs of samples around turning points by 3 to 12 mm, until the share is reached."""
     moves = np.diff(truth.position(t))
     turns = np.flatnonzero(moves[:-1] * moves[1:] <= 0) + 1
     done = 0
@@ -132,7 +134,7 @@ def _clusters(truth: Any, t: np.ndarray, y: np.ndarray, share: float, rng: np.ra
 
 
 def bounds(case: Case) -> np.ndarray:
-    """Return the Cramér-Rao bounds of the quantities, (4,), averaged over the phase; false echoes counted out."""
+    """Return the Cramér-Rao bounds of the quantities (4,), averaged over the phase, without the false echoes."""
     t = synthetic.times(case.seconds, case.rate_hz)
     found = []
     for phase in np.linspace(-math.pi, math.pi, 9)[:-1]:

@@ -1,4 +1,4 @@
-"""Added mass: the air that a disc carries along."""
+"""Added mass: the mass of air that a disc carries along."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pipeline.numerics.estimate import Estimate
 
 __all__ = ["ADDED_MASS_SHAPE", "added_mass_kg", "scene_air", "scene_air_density"]
 
-ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc: added mass over rho a^3
+ADDED_MASS_SHAPE = 8.0 / 3.0  # added mass of a thin disc over rho a^3
 
 
 def added_mass_kg(scene: Scene) -> float:
-    """Mass of air that a thin disc carries along broadside on, :math:`(8/3)\\rho a^3`, kg.
+    """Return the mass of air carried along by a thin disc that moves broadside on, :math:`(8/3)\\rho a^3`, kg.
 
     References
     ----------
@@ -24,7 +24,7 @@ def added_mass_kg(scene: Scene) -> float:
 
 
 def scene_air(scene: Scene) -> tuple[Estimate, Estimate, Estimate]:
-    """Return temperature, degC, pressure, Pa, and relative humidity of a scene's air, typical where it is silent."""
+    """Return temperature, degC, pressure, Pa, and relative humidity of a scene's air, or typical values."""
     return (
         scene.air_temperature_c or TYPICAL_TEMPERATURE,
         scene.air_pressure_pa or TYPICAL_PRESSURE,
@@ -33,5 +33,5 @@ def scene_air(scene: Scene) -> tuple[Estimate, Estimate, Estimate]:
 
 
 def scene_air_density(scene: Scene) -> float:
-    """Return the density of a scene's air, kg/m^3; where it says nothing, of air at 20 degC, 101,325 Pa and 50 %."""
+    """Return the density of a scene's air, kg/m^3; unstated values are 20 degC, 101,325 Pa and 50 %."""
     return air_density(*(each.value for each in scene_air(scene)))

@@ -1,8 +1,8 @@
 """Humid air: density, viscosity and speed of sound by the published reference equations.
 
-Density and speed of sound have equations for the air of laboratories alone. Beyond their ranges a mixture of ideal
-gases carries on, multiplied by the equation's ratio to it at the nearest point of the range: no step, and no polynomial
-where nobody fitted it.
+The equations for density and speed of sound apply only to air under laboratory conditions. Beyond their ranges a
+mixture of ideal gases is used, multiplied by the ratio of the equation to the mixture at the nearest point of the
+range. So there is no step, and no polynomial is extrapolated.
 
 References
 ----------
@@ -36,25 +36,25 @@ __all__ = [
     "speed_of_sound",
 ]
 
-# Relative standard uncertainties of the three equations in a laboratory's air.
-U_DENSITY = 2e-4  # the equation 22 ppm [1]_; a lecture room's carbon dioxide, 400 to 1500 ppm, up to 0.04 %
-U_VISCOSITY = 5e-3  # the equation 1 % at k = 2 [3]_; humidity up to 0.3 %, which it does not know
-U_SOUND = 3e-4  # the equation [2]_, carbon dioxide included
+# Relative standard uncertainties of the three equations for a laboratory's air.
+U_DENSITY = 2e-4  # equation: 22 ppm [1]_; carbon dioxide of a lecture room, 400 to 1500 ppm: up to 0.04 %
+U_VISCOSITY = 5e-3  # equation: 1 % at k = 2 [3]_; humidity, which it ignores: up to 0.3 %
+U_SOUND = 3e-4  # equation [2]_, including carbon dioxide
 
-# What a laboratory's air may be where the scene does not say.
+# Typical air of a laboratory, where the scene does not state it.
 TYPICAL_TEMPERATURE = Estimate(20.0, 3.0, "degC")
 TYPICAL_PRESSURE = Estimate(101325.0, 1500.0, "Pa")
 TYPICAL_HUMIDITY = Estimate(0.5, 0.2, "")
 
 GAS_CONSTANT = 8.314462618  # J/(mol K)
-MOLAR_MASS_DRY_KG = 28.96546e-3  # with CARBON_DIOXIDE of it
+MOLAR_MASS_DRY_KG = 28.96546e-3  # kg/mol, with the mole fraction CARBON_DIOXIDE
 MOLAR_MASS_WATER_KG = 18.01528e-3
 CARBON_DIOXIDE = 4e-4  # mole fraction
 ZERO_CELSIUS_K = 273.15
 
 
 def saturation_pressure(temperature_c: float) -> float:
-    """Return the pressure of saturated water vapour, Pa, by Magnus' formula [4]_: what a humidity may be at most."""
+    """Return the pressure of saturated water vapour, Pa, by the Magnus formula [4]_: the maximum of any humidity."""
     return 610.94 * math.exp(17.625 * temperature_c / (temperature_c + 243.04))
 
 
@@ -78,20 +78,20 @@ def _within(x: float, least: float, greatest: float) -> float:
 
 
 def _vapour_fraction(temperature_c: float, pressure_pa: float, relative_humidity: float) -> float:
-    """Mole fraction of water, as both equations take it ([1]_ A1.1 to A1.3).
+    """Return the mole fraction of water, which both equations use ([1]_ A1.1 to A1.3).
 
-    All of it at most: an uncertain humidity may reach beyond what the pressure holds.
+    It is at most 1: an uncertain humidity may exceed what the pressure allows.
     """
     t, kelvin = temperature_c, temperature_c + ZERO_CELSIUS_K
     saturated = math.exp(1.2378847e-5 * kelvin**2 - 1.9121316e-2 * kelvin + 33.93711047 - 6.3431645e3 / kelvin)
     enhancement = 1.00062 + 3.14e-8 * pressure_pa + 5.6e-7 * t**2
-    if pressure_pa <= 0.0:  # an uncertain pressure may reach down to none
+    if pressure_pa <= 0.0:  # an uncertain pressure may reach zero
         return 1.0
     return min(relative_humidity * enhancement * saturated / pressure_pa, 1.0)
 
 
 def _compressibility(t: float, p: float, x: float) -> float:
-    """Z of [1]_ A1.4 at t, degC, p, Pa, and the mole fraction x of water."""
+    """Return Z of [1]_ A1.4 at temperature t, degC, pressure p, Pa, and mole fraction x of water."""
     kelvin = t + ZERO_CELSIUS_K
     first = 1.58123e-6 - 2.9331e-8 * t + 1.1043e-10 * t**2
     first += (5.707e-6 - 2.051e-8 * t) * x + (1.9898e-4 - 2.376e-6 * t) * x**2
@@ -110,7 +110,7 @@ def air_viscosity(temperature_c: float, pressure_pa: float = 101325.0) -> float:
     log = math.log(kelvin / 103.3)
     collision = math.exp(0.431 - 0.4623 * log + 0.08406 * log**2 + 0.005341 * log**3 - 0.00331 * log**4)
     dilute = 0.0266958 * math.sqrt(28.9586 * kelvin) / (0.1296 * collision)
-    # What neighbours add: 0.08 % at one atmosphere; the terms of higher order are those of liquids.
+    # Contribution of the density: 0.08 % at one atmosphere; terms of higher order matter only for liquids.
     tau, delta = 132.6312 / kelvin, pressure_pa / (GAS_CONSTANT * kelvin * 10447.7)
     dense = 10.72 * tau**0.2 * delta - 8.876 * tau**0.6 * delta * math.exp(-delta)
     return float(1e-6 * (dilute + dense))
@@ -132,7 +132,7 @@ def speed_of_sound(temperature_c: float, pressure_pa: float = 101325.0, relative
 
 
 def _cramer(t: float, p: float, x: float) -> float:
-    """The polynomial of [2]_, its table III, at t, degC, p, Pa, and the mole fraction x of water."""
+    """Return the polynomial of [2]_, table III, at t, degC, p, Pa, and the mole fraction x of water."""
     co2 = CARBON_DIOXIDE
     dry = 331.5024 + 0.603055 * t - 0.000528 * t**2
     water = (51.471935 + 0.1495874 * t - 0.000782 * t**2) * x - 2.835149 * x**2
@@ -143,6 +143,6 @@ def _cramer(t: float, p: float, x: float) -> float:
 
 def _ideal_sound(temperature_c: float, fraction: float) -> float:
     molar_kg = MOLAR_MASS_DRY_KG - fraction * (MOLAR_MASS_DRY_KG - MOLAR_MASS_WATER_KG)
-    # Heat capacities of dry air (1.400) and of water vapour (1.33) mix by their degrees of freedom.
+    # Molar heat capacities of dry air (ratio 1.400) and water vapour (1.33) add by mole fraction.
     heat = 3.5 + fraction * (4.03 - 3.5)
     return math.sqrt(heat / (heat - 1.0) * GAS_CONSTANT * (temperature_c + ZERO_CELSIUS_K) / molar_kg)

@@ -1,16 +1,16 @@
-"""Drag derived from disc, bob and air, where a scene states no damping: the literature's coefficients, with theirs.
+"""Drag derived from disc, bob and air where a scene states no damping, with uncertainties from the literature.
 
-Three parts, none of which the scene states: vortices shed by the disc's edge, friction of the air in the Stokes layer
-of the disc, and that of the bob. What the suspension and the spring take is nobody's to derive and is not in it.
+There are three parts: vortices shed by the disc's edge, friction of the air in the Stokes layer of the disc, and
+friction of the air at the bob. Losses in the suspension and the spring cannot be derived and are not included.
 
 References
 ----------
 .. [1] J. M. R. Graham, "The forces on sharp-edged cylinders in oscillatory flow at low Keulegan-Carpenter numbers",
    J. Fluid Mech. 97 (1980) 331: measured coefficients of a flat plate follow 8.0 KC^(-1/3).
 .. [2] P. de Bernardinis, J. M. R. Graham, K. H. Parker, "Oscillatory flow around disks and through orifices",
-   J. Fluid Mech. 102 (1981) 279: the same of each piece of a disc's edge.
-.. [3] H. Lamb, "Hydrodynamics", 6th ed., Cambridge 1932, art. 71 and 108: the flow about plate and disc at their edges.
-.. [4] L. D. Landau, E. M. Lifshitz, "Fluid Mechanics", 2nd ed., Pergamon 1987, paragraph 24: a sphere that oscillates.
+   J. Fluid Mech. 102 (1981) 279: the same law for each piece of a disc's edge.
+.. [3] H. Lamb, "Hydrodynamics", 6th ed., Cambridge 1932, art. 71 and 108: the flow at the edges of plate and disc.
+.. [4] L. D. Landau, E. M. Lifshitz, "Fluid Mechanics", 2nd ed., Pergamon 1987, paragraph 24: an oscillating sphere.
 """
 
 from __future__ import annotations
@@ -32,33 +32,33 @@ from pipeline.track import F8
 __all__ = ["BOB_KG_PER_M3", "STEADY_DISC_DRAG", "DerivedDrag", "derive_drag", "disc_drag_coefficient", "needs_drag"]
 
 STEADY_DISC_DRAG = 1.17  # drag coefficient of a disc broadside on in steady flow, Re > 1000
-PLATE_DRAG = 8.0  # of a plate at KC = 1 [1]_
-EDGE = 2.0 / math.pi  # velocity at a disc's edge over that at a plate's of the same width [3]_
-SHED_POWER = 8.0 / 3.0  # of the edge's velocity: the force of what it sheds [1]_
-EDGES = 2.0  # a disc's length of edge over its area, relative to a plate's
-U_SHED = 0.2  # relative: measured plates about the law, and its transfer to a disc
-U_VISCOUS = 0.5  # relative: the bob's shape and density are not stated, the disc's layer ends at its edge
-BOB_KG_PER_M3 = 7850.0  # steel: of a bob whose size nobody stated
-DOWN_TO = 1e-3  # of the start: the least amplitude at which the disc's law is matched
+PLATE_DRAG = 8.0  # drag coefficient of a plate at KC = 1 [1]_
+EDGE = 2.0 / math.pi  # velocity at a disc's edge over that at the edge of a plate of the same width [3]_
+SHED_POWER = 8.0 / 3.0  # exponent of the velocity at the edge in the force of the shed vortices [1]_
+EDGES = 2.0  # length of a disc's edge per area, relative to a plate's
+U_SHED = 0.2  # relative uncertainty: scatter of measured plates about the law, and its transfer to a disc
+U_VISCOUS = 0.5  # relative uncertainty: bob of unstated shape and density, disc's layer ending at the edge
+BOB_KG_PER_M3 = 7850.0  # density of steel, assumed for a bob of unstated size
+DOWN_TO = 1e-3  # smallest amplitude at which the disc's law is matched, over the initial one
 
 
 @dataclass(frozen=True, slots=True)
 class DerivedDrag:
-    """Coefficients of dA/dt = -(gamma A + beta A^2) that disc, bob and air imply.
+    """Coefficients of dA/dt = -(gamma A + beta A^2) derived from disc, bob and air.
 
     Parameters
     ----------
     gamma_per_s, beta_per_m_s : float
-        1/s, 1/(m s).
+        Coefficients, 1/s and 1/(m s).
     covariance : (2, 2) float64
-        Of both in this order: the literature's.
+        Covariance of gamma and beta, from the uncertainties in the literature.
     shed_per_s, layer_per_s, bob_per_s : float
-        Rates of the logarithm of the amplitude at the start: edge vortices, the disc's Stokes layer, the bob's, 1/s.
+        Decay rates of the logarithm of the amplitude at the start, 1/s: edge vortices, disc's Stokes layer, bob.
     reynolds, keulegan_carpenter, coefficient : float
-        Of the disc at the start; 0 without one.
+        Reynolds number, Keulegan-Carpenter number and drag coefficient of the disc at the start; 0 without a disc.
     mismatch : float
-        Largest difference of the two coefficients' rate from the law that they stand for, over it, down to the
-        amplitude that is expected at the end.
+        Maximum relative difference between the rate by the two coefficients and the disc's law, down to the expected
+        final amplitude.
     """
 
     gamma_per_s: float
@@ -74,13 +74,13 @@ class DerivedDrag:
 
     @property
     def joint(self) -> Joint:
-        """Both coefficients with their covariance, by the scene's attributes."""
+        """Both coefficients with their covariance, named as the scene's attributes."""
         values = np.array([self.gamma_per_s, self.beta_per_m_s])
         return Joint(("gamma_per_s", "beta_per_m_s"), values, self.covariance, ("1/s", "1/(m s)"))
 
     @property
     def words(self) -> str:
-        """Where they come from, in one line."""
+        """Origin of the coefficients, in one line."""
         bob = f"a steel bob's air friction {self.bob_per_s:.2g} 1/s"
         if not self.coefficient:
             return f"{bob} (u 50 %; Landau and Lifshitz, par. 24)"
@@ -92,21 +92,21 @@ class DerivedDrag:
 
 
 def needs_drag(scene: Scene) -> bool:
-    """Whether a scene names what the bob moves in or with, and no damping at all."""
+    """Return whether a scene states the air or the disc but no damping at all."""
     silent = scene.gamma_per_s is None and scene.beta_per_m_s is None and scene.mu_m_per_s is None
     air = (scene.air_temperature_c, scene.air_pressure_pa, scene.air_relative_humidity)
     return silent and (scene.disc_diameter_m is not None or any(each is not None for each in air))
 
 
 def disc_drag_coefficient(keulegan_carpenter: float) -> float:
-    """Return the drag coefficient of a thin disc that oscillates broadside on, of its area and largest speed.
+    """Return the drag coefficient of a thin disc oscillating broadside on, for its area and maximum speed.
 
     Notes
     -----
-    A sharp edge sheds the same vortices whatever it belongs to, and their force goes as the velocity at the edge to
-    the power 8/3 [1]_. At a disc's edge that is :math:`2/\\pi` of a plate's [3]_, of which a disc has twice as much for
-    its area: :math:`8.0\\,(2/\\pi)^{8/3}\\,2\\,KC^{-1/3} = 4.8\\,KC^{-1/3}`, until at KC near 70 it meets the steady
-    1.17.
+    The vortices of a sharp edge do not depend on the body, and their force is proportional to the velocity at the edge
+    to the power 8/3 [1]_. The velocity at a disc's edge is :math:`2/\\pi` of that at a plate's [3]_. A disc has
+    twice as much edge per area. So the coefficient is :math:`8.0\\,(2/\\pi)^{8/3}\\,2\\,KC^{-1/3} = 4.8\\,KC^{-1/3}`,
+    until it reaches the steady value 1.17 at KC near 70.
 
     Examples
     --------
@@ -120,29 +120,30 @@ def disc_drag_coefficient(keulegan_carpenter: float) -> float:
 
 
 def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag:
-    """Return what disc, bob and air take from a motion.
+    """Return the damping of a motion by disc, bob and air.
 
     Parameters
     ----------
     scene : Scene
-        Bob mass and spring constant are needed.
+        Scene with at least the bob's mass and the spring constant.
     amplitude_m : float
-        With which it starts, m.
+        Initial amplitude, m.
     seconds : float
-        How long it goes, s: over the amplitudes of this time the coefficients match the disc's law.
+        Duration of the motion, s; the coefficients match the disc's law over the amplitudes within this time.
 
     Raises
     ------
     SceneError
-        If bob mass or spring constant is not stated.
+        If the bob's mass or the spring constant is not stated.
 
     Notes
     -----
-    The disc's C falls as the amplitude to the power -1/3, so that dA/dt = -c A^(5/3). Least squares over the logarithm
-    of the amplitude, from the start to the end, make gamma + beta A of c A^(2/3). The Stokes layer takes
-    :math:`\\gamma = (4/\\pi)\\,(\\eta/\\delta)\\,a^2\\,(\\ln(2a/\\delta) - 1)/M` with
-    :math:`\\delta = \\sqrt{2\\nu/\\omega}`, from the potential flow along the disc, cut off a layer before the edge;
-    the bob, a sphere of steel of its mass, :math:`3\\pi\\eta R(1 + R/\\delta)/M` [4]_.
+    The disc's drag coefficient is proportional to the amplitude to the power -1/3, so that dA/dt = -c A^(5/3). Least
+    squares over the logarithm of the amplitude, from the start to the end, approximate c A^(2/3) by gamma + beta A. The
+    Stokes layer contributes :math:`\\gamma = (4/\\pi)\\,(\\eta/\\delta)\\,a^2\\,(\\ln(2a/\\delta) - 1)/M` with
+    :math:`\\delta = \\sqrt{2\\nu/\\omega}`, from the potential flow along the disc, cut off at a distance
+    :math:`\\delta` from the edge. The bob, as a steel sphere of its mass, contributes
+    :math:`3\\pi\\eta R(1 + R/\\delta)/M` [4]_.
     """
     if scene.bob_mass_kg is None or scene.spring_constant_n_per_m is None:
         raise SceneError("scene: drag is derived for a [bob] mass_kg on a [spring] constant_n_per_m; add both")
@@ -160,7 +161,7 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
         return DerivedDrag(of_bob, 0.0, covariance, 0.0, 0.0, of_bob, 0.0, 0.0, 0.0, 0.0)
     a = 0.5 * scene.disc_diameter_m.value
     inside = max(math.log(2.0 * a / layer_m) - 1.0, 0.0) if layer_m < a else 0.0
-    # Where the layer is thicker than the disc, its creeping drag 16 eta a v.
+    # Where the layer is thick relative to the disc's radius, the drag is that of creeping flow, 16 eta a v.
     of_layer = (4.0 / math.pi * eta / layer_m * a * a * inside + (8.0 * eta * a if not inside else 0.0)) / mass
 
     def shed(amplitude: float) -> float:
@@ -193,7 +194,7 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
 def _matched(
     shed: Callable[[float], float], start: float, first: float, viscous: float, seconds: float
 ) -> tuple[float, float, float]:
-    """Return gamma and beta that match a rate over the amplitudes of a run, and their largest relative mismatch."""
+    """Return gamma and beta matched to a rate over the amplitudes of a run, and the maximum relative mismatch."""
     if first <= 0.0:
         return 0.0, 0.0, 0.0
     # dA/dt = -c A^(5/3) - g A ends at (1 + (1 - e^(-2 g t / 3)) c A0^(2/3) / g)^(-3/2) e^(-g t) of the start.

@@ -1,4 +1,4 @@
-"""Instrument: what the sensor's clock and scale add to every uncertainty, however long the record (Type B)."""
+"""Instrument: uncertainties from the sensor's clock and scale, which no longer record reduces (Type B)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from pipeline.track import Track
 __all__ = ["U_CRYSTAL", "Instrument"]
 
 U_CRYSTAL = 50e-6 / math.sqrt(3.0)
-"""Relative standard uncertainty of a crystal's rate: 50 ppm as the half-width of a rectangle."""
+"""Relative standard uncertainty of a crystal's rate: 50 ppm as the half-width of a rectangular distribution."""
 HOST_LIMIT = 500e-6
-"""By what share a host's clock may be off, with what steers it: the kernel slews by 500 ppm at most (RFC 5905)."""
+"""Maximum relative error of a host's clock, including its adjustment: the kernel slews by up to 500 ppm (RFC 5905)."""
 CONTRADICTION = 3.0  # standard uncertainties at which the host's clock contradicts the sensor's
 HOST_DELAY_S = 0.02
-"""Time by which a host's stamps may drift within a record though both clocks are right, s: a USB bridge holds bytes for
-up to 16 ms (FTDI AN232B-04), and a host that becomes busy wakes its readers later than before."""
+"""Time by which a host's time stamps may drift within a record although both clocks are right, s. A USB bridge delays
+bytes by up to 16 ms (FTDI AN232B-04), and a host that becomes busy wakes its readers later."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,19 +28,19 @@ class Instrument:
     Parameters
     ----------
     clock : str
-        "nominal", "device" or "host".
+        Source of the times: "nominal", "device" or "host".
     clock_rate : Estimate
-        Factor on every frequency: 1 but where the host's clock contradicts the sensor's.
+        Factor on every frequency; its value is 1 unless frequencies are corrected to the host's clock.
     clock_words : str
-        Where the rate comes from, for the effects table.
+        Origin of the rate, for the effects table.
     clock_refused : bool
-        Whether the host's clock contradicts the sensor's by more than either can be off, or could not be compared.
+        Whether the clocks differ by more than both their errors allow, or held readings prevented a comparison.
     speed_of_sound_m_per_s : float or None
-        That stands in the distances, m/s.
+        Speed of sound used for the distances, m/s.
     u_scale : float
-        Relative standard uncertainty of the scale from a calibration; 0 where none was made.
+        Relative standard uncertainty of the scale from a calibration; 0 without a calibration.
     u_offset_m : float
-        Of the zero, m.
+        Standard uncertainty of the zero, m.
     """
 
     clock: str
@@ -53,34 +53,35 @@ class Instrument:
 
     @classmethod
     def of(cls, track: Track, *, u_crystal: float = U_CRYSTAL) -> Instrument:
-        """Return what a track knows of its sensor.
+        """Return the clock and scale that a track states for its sensor.
 
         Parameters
         ----------
         track : Track
         u_crystal : float
-            Relative standard uncertainty of a clock by its crystal's specification.
+            Relative standard uncertainty of a clock from its crystal's specification.
 
         Raises
         ------
         TrackError
-            If an uncertainty is negative or no number, or a measured rate error has none.
+            If an uncertainty or a limit is negative or not finite, or a measured rate error has no uncertainty.
 
         Notes
         -----
-        A clock that nobody compared with another is only known to its crystal's specification. A comparison of the
-        sensor's clock with the host's tells two crystals apart and not which of them is right, so it changes nothing
-        as long as both can keep their specification. Where it contradicts that by more than three standard
-        uncertainties (a ceramic resonator is off by thousands of ppm) the host is the reference: frequencies are
-        multiplied by 1 + r, and what remains is the host's own crystal and the comparison's scatter. Where all that the
-        clocks drifted apart within the record is less than a host's delays may change (20 ms), nobody can tell a wrong
-        clock from a host that became busy: nothing is corrected, and the difference counts as the half-width of a
-        rectangle.
+        A clock that was not compared with another is known only to its crystal's specification. A comparison of the
+        sensor's clock with the host's gives their difference but not which of them is right. So it changes nothing as
+        long as both can meet their specifications. If the difference exceeds three standard uncertainties, the host is
+        the reference (a ceramic resonator is off by thousands of ppm). Frequencies are then multiplied by
+        1 + r. The remaining uncertainty is that of the host's crystal and of the comparison.
 
-        A difference beyond what the sensor's clock may be off and 500 ppm of the host's is none of the clocks': nothing
-        is corrected, and the difference counts as the half-width of a rectangle. Where
-        readings were held up, a comparison that is left, or none, cannot exclude a clock at its limit: its own
-        uncertainty is added, up to that of the limit.
+        If the drift between the clocks within the record is less than the possible change of a host's delays (20 ms), a
+        wrong clock cannot be distinguished from a host that became busy. Then nothing is corrected, and the difference
+        counts as the half-width of a rectangular distribution.
+
+        A difference beyond the limit of the sensor's clock plus 500 ppm for the host's cannot come from the clocks.
+        Then nothing is corrected either, and the difference counts as such a half-width. Where readings were delayed,
+        the comparison cannot exclude a clock at its limit. Its own uncertainty is then added, up to that of the limit;
+        without any comparison, the limit itself counts as the half-width.
 
         Examples
         --------
@@ -101,7 +102,7 @@ class Instrument:
 
 
 def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
-    """Return the factor on every frequency, where it comes from, and whether a comparison was refused for it."""
+    """Return the factor on every frequency, its origin, and whether the comparison of the clocks was rejected."""
     spec = f"a crystal's {u_crystal * 1e6:.0f} ppm"
     limit = math.inf if track.clock_limit is None else track.clock_limit + HOST_LIMIT
     if track.rate_error is None:
@@ -140,7 +141,7 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
 
 
 def _uncompared(track: Track, u_crystal: float, limit: float, spec: str) -> tuple[Estimate, str, bool]:
-    """Return the same of a clock that was not compared, or could not be: a stall leaves too few stamps in time."""
+    """Return factor, origin and rejection for a clock without a comparison; delays may have prevented one."""
     if track.clock == "device" and track.held_samples:
         half = min(limit, 1.0)
         words = (

@@ -1,4 +1,4 @@
-"""What is at the bench: bob, spring, disc, air, sensor, each with its uncertainty; the unknown is None."""
+"""Scene: bob, spring, disc, air and sensor at the bench, with uncertainties; unknown quantities are None."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ __all__ = ["PLACES", "Scene"]
 
 POSITIONS = ("below", "above")
 _CHOICES = {("sensor", "position"): ("sensor_position", POSITIONS), ("damping", "law"): ("damping_law", LAW_NAMES)}
-"""The keys of a scene file that take a text: the attribute that each becomes, and the texts that it allows."""
+"""Keys of a scene file with text values: the attribute for each key, and the allowed texts."""
 
 
 class _Quantity(NamedTuple):
-    """One key of a scene file: the attribute that it becomes, its unit, and its range, both ends allowed.
+    """One key of a scene file: its attribute, its unit, and its allowed range, including both ends.
 
-    The ends lie far beyond any bench: they are where the arithmetic behind is known to hold, so that whatever lies
-    between gives a number or a finding, and a value typed with a wrong exponent is refused when it is read.
+    The ends lie far beyond any bench. The calculations are known to be valid between them, so every allowed value gives
+    a number or a finding. A value with a wrong exponent is rejected when it is read.
     """
 
     attribute: str
     unit: str
     least: float
     greatest: float
-    usual: tuple[float, float] = (-math.inf, math.inf)  # at a bench: what lies beyond is asked about
-    mistaken: tuple[tuple[str, float, float], ...] = ()  # units it is given in by mistake: name, zero, size of one
+    usual: tuple[float, float] = (-math.inf, math.inf)  # usual range at a bench; other values are queried
+    mistaken: tuple[tuple[str, float, float], ...] = ()  # units used by mistake: name, zero, size
 
     def allowed(self) -> str:
         """Return the range in words."""
@@ -41,7 +41,7 @@ class _Quantity(NamedTuple):
         return f"at least {self.least:g}{unit} and at most {self.greatest:g}"
 
     def meant(self, number: float) -> str:
-        """Ask whether a number stands in another unit, where that makes it a usual one; empty where none does."""
+        """Return a question naming the other units in which a number would be usual; empty if there are none."""
         low, high = max(self.usual[0], self.least), min(self.usual[1], self.greatest)
         likely = [(name, (number - zero) * size) for name, zero, size in self.mistaken]
         suggestions = [f"{name}: {value:.6g}" for name, value in likely if low <= value <= high]
@@ -77,17 +77,17 @@ _QUANTITIES: dict[tuple[str, str], _Quantity] = {
 }
 
 PLACES = {quantity.attribute: place for place, quantity in _QUANTITIES.items()}
-"""Table and key in a scene file of every quantity, by the attribute that it becomes."""
+"""Table and key in a scene file for every quantity, by its attribute."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """The bench.
+    """The quantities of the bench.
 
-    Every quantity is an :class:`Estimate` or None where it is not known; a plain number in the scene file has
-    ``u`` = 0. The attributes ``spring_constant_n_per_m``, ``spring_cubic_n_per_m3``, ``start_*`` and the damping
-    coefficients are what a simulation needs; an analysis measures them instead. ``damping_law`` is the name of the
-    damping law, where it is known; an analysis states its results by that law.
+    Every quantity is an :class:`Estimate`, or None if it is unknown; a plain number in the scene file has ``u`` = 0.
+    The attributes ``spring_constant_n_per_m``, ``spring_cubic_n_per_m3``, ``start_*`` and the damping coefficients are
+    inputs of a simulation; an analysis measures them instead. ``damping_law`` is the name of the damping law if it is
+    known; an analysis states its results by this law.
     """
 
     bob_mass_kg: Estimate | None = None
@@ -112,20 +112,21 @@ class Scene:
 
     @classmethod
     def from_mapping(cls, tables: Mapping[str, Any], *, where: str = "scene") -> Scene:
-        """Check the tables of a scene file and make a scene of them.
+        """Check the tables of a scene file and convert them to a scene.
 
         Parameters
         ----------
         tables : mapping
-            As ``tomllib`` gives it: ``{"bob": {"mass_kg": {"value": 0.2, "u": 5e-5}}, ...}``.
+            Tables as read by ``tomllib``: ``{"bob": {"mass_kg": {"value": 0.2, "u": 5e-5}}, ...}``.
         where : str
-            Named in errors, usually the file.
+            Source named in error messages, usually the file.
 
         Raises
         ------
         SceneError
-            For an unknown table or key, a value that is no number, one outside its range, or a negative
-            uncertainty; the message names file, key, value and what is allowed.
+            For an unknown table or key, a value that is not a number or not an allowed text, a value outside its range,
+            an uncertainty that is negative or too large, or more vapour than the pressure allows. The message names the
+            file, the key, the value and the allowed ones.
 
         Examples
         --------
@@ -158,7 +159,7 @@ class Scene:
         return scene
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
-        """Return the tables again, unknown quantities left out; the inverse of :meth:`from_mapping`."""
+        """Return the tables without unknown quantities; the inverse of :meth:`from_mapping`."""
         tables: dict[str, dict[str, Any]] = {}
         for (table, key), quantity in _QUANTITIES.items():
             estimate: Estimate | None = getattr(self, quantity.attribute)
@@ -173,7 +174,7 @@ class Scene:
         return tables
 
     def unusual(self) -> tuple[str, ...]:
-        """Return a clause for every value that no bench has, with the unit that it may stand in by mistake."""
+        """Return a clause for every implausible value or uncertainty, with the unit that may be mistaken."""
         clauses = []
         for (table, key), q in _QUANTITIES.items():
             found: Estimate | None = getattr(self, q.attribute)
@@ -190,13 +191,13 @@ class Scene:
 
     @property
     def tells_of_bench(self) -> bool:
-        """Whether it describes the bob or the air, and not only the sensor or a simulation."""
+        """Whether the scene states a mass, the disc or the air, and not only the sensor or a simulation."""
         given = (self.bob_mass_kg, self.spring_mass_kg, self.disc_diameter_m, self.air_temperature_c)
         return any(x is not None for x in (*given, self.air_pressure_pa, self.air_relative_humidity))
 
 
 def _check_vapour(scene: Scene, where: str) -> None:
-    """Refuse air with more vapour than its pressure allows, although each single value may be possible."""
+    """Reject air with more vapour than its pressure allows, even if each value is possible on its own."""
     celsius, pascal, humidity = scene.air_temperature_c, scene.air_pressure_pa, scene.air_relative_humidity
     if celsius is None or pascal is None or humidity is None:
         return
@@ -249,7 +250,7 @@ def _number(value: object, name: str) -> float:
 
 
 def _short(value: object) -> str:
-    """Return a value as Python writes it, cut where it is long."""
+    """Return the value's Python representation, shortened if it is long."""
     try:
         words = repr(value)
     except ValueError:

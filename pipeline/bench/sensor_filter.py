@@ -1,4 +1,4 @@
-"""Sensor filter: what a running mean, a running median or a lag of the sensor does to an oscillation."""
+"""Sensor filter: the effect of a sensor's running mean, running median or lag on an oscillation."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from pipeline.numerics.estimate import Estimate
 
 __all__ = ["SensorFilter"]
 
-PLACES = 1024  # of a cosine, at which a median is taken
+PLACES = 1024  # number of phases of a cosine at which a median is taken
 
 
 @dataclass(frozen=True, slots=True)
 class SensorFilter:
-    """The filters that a scene states, one behind the other.
+    """The filters that a scene states, connected in series.
 
     Parameters
     ----------
     mean_samples, median_samples : Estimate or None
-        The last samples of which the sensor gives the mean, or the median.
+        Numbers of latest samples whose mean, or median, the sensor returns.
     lag_s : Estimate or None
         Time constant of a first-order lag, s.
     step_s : float
@@ -30,13 +30,13 @@ class SensorFilter:
 
     Notes
     -----
-    Behind the mean of the last n samples, h apart, an oscillation :math:`\\cos\\omega t` has the size
-    :math:`\\sin(n\\omega h/2)/(n\\sin(\\omega h/2))` and is late by :math:`(n-1)\\omega h/2`; behind a lag
-    :math:`1/(1 + i\\omega\\tau)` it has :math:`(1 + \\omega^2\\tau^2)^{-1/2}` and is late by
-    :math:`\\arctan\\omega\\tau`. A median passes slopes as they are, late by :math:`(n-1)\\omega h/2`, and cuts the
-    crests: its first harmonic is taken from cosines at every place between two samples; of many samples it loses
+    A mean of the last n samples, h apart, reduces the oscillation :math:`\\cos\\omega t` to the amplitude
+    :math:`\\sin(n\\omega h/2)/(n\\sin(\\omega h/2))` and delays its phase by :math:`(n-1)\\omega h/2`. A lag
+    :math:`1/(1 + i\\omega\\tau)` reduces it to :math:`(1 + \\omega^2\\tau^2)^{-1/2}` and delays it by
+    :math:`\\arctan\\omega\\tau`. A median leaves slopes unchanged, delayed by :math:`(n-1)\\omega h/2`, and cuts the
+    crests. Its first harmonic is calculated from cosines with all phases between two samples. For many samples it loses
     :math:`(2/\\pi)(c - \\sin c\\cos c)` with :math:`c = (n-1)\\omega h/4`. Damping that is weak over the filter's
-    length changes none of that.
+    length does not change these results.
     """
 
     mean_samples: Estimate | None
@@ -59,20 +59,20 @@ class SensorFilter:
 
     @property
     def sizes(self) -> tuple[Estimate, Estimate, Estimate]:
-        """The three sizes, those of filters that are not there at which they do nothing."""
+        """The three sizes; an absent filter has the size at which it has no effect."""
         one, nothing = Estimate(1.0, 0.0, ""), Estimate(0.0, 0.0, "s")
         return self.mean_samples or one, self.median_samples or one, self.lag_s or nothing
 
     def gain(
         self, omega: float, mean: float | None = None, median: float | None = None, lag_s: float | None = None
     ) -> float:
-        """Return the size of what was an oscillation of 1 with the angular frequency omega, rad/s.
+        """Return the filtered amplitude of a unit oscillation with the angular frequency omega, rad/s.
 
         Parameters
         ----------
         omega : float
         mean, median, lag_s : float, optional
-            Sizes other than those stated: uncertainties are propagated by them.
+            Sizes that replace those stated; they serve to propagate uncertainties.
         """
         n, m, tau = self._sizes(mean, median, lag_s)
         turn = 0.5 * omega * self.step_s
@@ -82,14 +82,14 @@ class SensorFilter:
     def delay(
         self, omega: float, mean: float | None = None, median: float | None = None, lag_s: float | None = None
     ) -> float:
-        """Return by how much of its phase the oscillation is late, rad; parameters as of :meth:`gain`."""
+        """Return the phase delay of the oscillation, rad; the parameters are those of :meth:`gain`."""
         n, m, tau = self._sizes(mean, median, lag_s)
         return (n + m - 2.0) * 0.5 * omega * self.step_s + math.atan(omega * tau)
 
     def shown(self, omega: float) -> float:
-        """Return what the filter would take by the memory that it leaves in the noise, of an oscillation of 1.
+        """Return the relative loss of amplitude that the filter's correlation in the noise suggests.
 
-        There a median looks like a mean of as many samples.
+        In the noise, a median looks like a mean of as many samples.
         """
         n, m, tau = (size.value for size in self.sizes)
         turn = 0.5 * omega * self.step_s
@@ -97,11 +97,11 @@ class SensorFilter:
         return math.hypot(1.0, omega * tau) / max(means[0] * means[1], 0.01) - 1.0
 
     def u_cut(self, omega: float) -> float:
-        """Return by how much the loss of a median is uncertain: cut crests may have been left out as plateaus."""
+        """Return the uncertainty of a median's loss: cut crests may have been left out as plateaus."""
         return (1.0 - self._passed(omega, self.sizes[1].value)) / math.sqrt(3.0)
 
     def _passed(self, omega: float, samples: float) -> float:
-        """First harmonic of a cosine behind a running median, late by half its length."""
+        """Return the first harmonic of a cosine after a running median, with the delay of half its length removed."""
         count = round(samples)
         if count < 3:  # the median of two is their mean
             return math.cos(0.5 * (count - 1) * omega * self.step_s)

@@ -1,4 +1,4 @@
-"""The spring's own mass: how much of it oscillates, and what springs weigh where the scene does not say."""
+"""Spring: the part of its own mass that oscillates, and the typical mass where the scene does not state it."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ __all__ = ["GRAVITY_M_PER_S2", "HEAVIEST_SHARE", "oscillating_mass_kg", "unstate
 
 GRAVITY_M_PER_S2 = 9.80665  # standard gravity, by definition (3rd CGPM, 1901)
 HEAVIEST_SHARE = 0.3
-"""Of the bob's mass: springs of laboratories weigh 5 to 50 g under bobs of 0.1 to 0.5 kg; a heavier one is weighed."""
-SERIES = 1e-4  # of the load: up to here the series is exact to 1e-13
+"""Maximum mass of an unweighed spring over the bob's; laboratory springs have 5 to 50 g for bobs of 0.1 to 0.5 kg."""
+SERIES = 1e-4  # ratio of spring mass to load up to which the series is exact to 1e-13
 
 
 def oscillating_mass_kg(spring_kg: float, load_kg: float) -> float:
-    """Return the mass M with which k = omega^2 M holds for a load on a uniform spring, kg.
+    """Return the mass M, kg, for which k = omega^2 M is valid for a load on a uniform spring.
 
     Parameters
     ----------
     spring_kg : float
-        Mass of the spring. Less than nothing, as a fit may try, continues the series.
+        Mass of the spring. The series is continued to negative values, which a fit may try.
     load_kg : float
-        What hangs on its end, positive.
+        Mass of the load at its end; positive.
 
     Notes
     -----
-    Waves along the spring give :math:`x \\tan x = m_s/m` with :math:`x = \\omega\\sqrt{m_s/k}`, whose least root has
-    :math:`k = \\omega^2 m_s/x^2`. For a light spring :math:`m_s/x^2 = m + m_s/3 + m_s^2/(45 m) - \\ldots`: a third of
-    the spring is 2.1e-4 too little at a tenth of the load, 42e-4 at half of it.
+    Waves along the spring give :math:`x \\tan x = m_s/m` with :math:`x = \\omega\\sqrt{m_s/k}`, whose smallest root
+    gives :math:`k = \\omega^2 m_s/x^2`. For a light spring :math:`m_s/x^2 = m + m_s/3 + m_s^2/(45 m) - \\ldots`. With a
+    third of the spring's mass, M is too small by the fraction 2.1e-4 for :math:`m_s/m = 0.1` and 42e-4 for 0.5.
 
     References
     ----------
@@ -51,10 +51,10 @@ def oscillating_mass_kg(spring_kg: float, load_kg: float) -> float:
 
 
 def unstated_spring_kg(scene: Scene) -> Estimate:
-    """Return the mass of a spring that a scene with a bob does not weigh, kg: 0, as the scene has it.
+    """Return the mass, kg, of a spring whose mass the scene does not state: 0 with an uncertainty.
 
-    Its uncertainty is the root mean square of a rectangle from 0 to 0.3 of the bob's mass: the mean is not corrected
-    for, so it counts in the uncertainty (JCGM 100:2008, F.2.4.5).
+    The uncertainty is the root mean square of a rectangular distribution from 0 to 0.3 of the bob's mass. The mean is
+    not corrected for, so it is included in the uncertainty (JCGM 100:2008, F.2.4.5).
     """
     bob_kg = 0.0 if scene.bob_mass_kg is None else scene.bob_mass_kg.value
     return Estimate(0.0, HEAVIEST_SHARE * bob_kg / math.sqrt(3.0), "kg")

@@ -1,1 +1,1 @@
-"""Checks: what the residuals of a fit show, and by how much the uncertainties have to grow."""
+"""Checks: what the residuals of a fit show, and by how much the uncertainties must increase."""

@@ -1,4 +1,4 @@
-"""Echoes: how many samples carry which flag, and where the false echoes lie."""
+"""Echoes: the number of samples with each flag, and the position of the false echoes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from pipeline.windows.demodulate import Demodulated
 
 __all__ = ["Clusters", "count_quality", "echoes_by_chance", "find_clusters"]
 
-LEAST = 3  # false echoes that make a cluster
-BRIDGED = 2  # good samples between two false echoes of one cluster, at most
-CHANCE = 1e-3  # of a note on a record whose noise is normal
-SPREAD = 1.2  # of a window's noise over the record's: of twelve samples one in a hundred windows has more
-TURNING = math.pi / 4.0  # phase from a turning point within which half the period's time, but a fourth of its way, lies
+LEAST = 3  # minimum number of false echoes in a cluster
+BRIDGED = 2  # maximum number of good samples between two false echoes of one cluster
+CHANCE = 1e-3  # probability of a finding for a record whose noise is normal
+SPREAD = 1.2  # maximum noise of a window over the record's: one in a hundred windows of twelve samples exceeds it
+TURNING = math.pi / 4.0  # phase from a turning point: this range contains half of the time, but only 0.29 of the path
 
 COUNTED = {
     str(quality.name).lower(): int(quality)
@@ -28,17 +28,18 @@ COUNTED = {
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """False echoes that come together.
+    """Clusters of false echoes.
 
     Parameters
     ----------
     count : int
+        Number of clusters.
     samples : int
-        False echoes in them.
+        Number of false echoes in clusters.
     turning : int
-        Clusters whose middle lies within an eighth of a period of a turning point; by chance it is half of them.
+        Number of clusters whose middle is within an eighth of a period of a turning point; half of them by chance.
     shift_m : float
-        By how much the mean amplitude would come out larger, were all false echoes left in, m.
+        Increase of the mean amplitude if all false echoes were used, m.
     """
 
     count: int
@@ -48,7 +49,7 @@ class Clusters:
 
 
 def count_quality(flags: U8) -> dict[str, int]:
-    """Return how many samples carry each flag, and how many were used.
+    """Return the number of samples with each flag, and the number of samples used.
 
     Examples
     --------
@@ -62,21 +63,21 @@ def count_quality(flags: U8) -> dict[str, int]:
 
 
 def echoes_by_chance(before: U8, demodulated: Demodulated, clip_sigmas: float) -> bool:
-    """Return whether the false echoes are no more, and no farther off, than normal noise leaves beyond the clip.
+    """Return whether normal noise explains both the number and the size of the false echoes.
 
     Parameters
     ----------
     before : (n,) uint8
-        The flags before windows were fitted: false echoes among them are far off.
+        Flags before the windows were fitted; false echoes among them are far from the motion.
     demodulated : Demodulated
     clip_sigmas : float
-        At which windows clip.
+        Number of standard deviations beyond which windows clip samples.
 
     Notes
     -----
-    Of n samples of normal noise :math:`n\\alpha`, :math:`\\alpha = 2\\Phi(-c)`, lie beyond c standard deviations, with
-    Poisson's distribution, and none beyond the quantile of :math:`10^{-3}/2n`. A window knows its own spread to a tenth
-    only, so that as many as twice these are clipped.
+    The number of n samples of normal noise beyond c standard deviations has a Poisson distribution with the mean
+    :math:`n\\alpha`, :math:`\\alpha = 2\\Phi(-c)`. No sample lies beyond the quantile of :math:`10^{-3}/2n`. The noise
+    of a window is known only to a tenth, so up to twice as many samples are clipped.
     """
     from scipy.special import ndtr, ndtri, pdtrc
 
@@ -100,13 +101,14 @@ def find_clusters(track: Track, demodulated: Demodulated, phase: PhaseFit) -> Cl
     ----------
     track : Track
     demodulated : Demodulated
-        For its flags, and for how far off flagged samples lie.
+        The demodulation, with its flags and the residuals of flagged samples.
     phase : PhaseFit
 
     Notes
     -----
-    The shift is what least squares would make of the false echoes' residuals r, in first order:
-    :math:`2\\sum r_i\\cos\\varphi_i/N`, the sum over false echoes and N all samples fitted.
+    The shift is the first-order change of a least-squares fit by the residuals r of the false echoes:
+    :math:`2\\sum r_i\\cos\\varphi_i/N`. The sum is over the false echoes; N is the number of samples fitted, including
+    them.
     """
     rows = np.flatnonzero((demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0)
     if not rows.size:

@@ -1,4 +1,4 @@
-"""Harmonics: whether every period differs from a sinusoid in the same way."""
+"""Harmonics: whether all periods differ from a sinusoid in the same way."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.track import F8
 
 __all__ = ["Harmonics", "Params", "find_harmonics"]
 
-BINS = 64  # of the phase; the eighth harmonic keeps sin(pi 8/64)/(pi 8/64) = 0.97 of itself
+BINS = 64  # phase bins per period; the eighth harmonic keeps sin(pi 8/64)/(pi 8/64) = 0.97 of its amplitude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,9 +26,9 @@ class Params:
     false_alarm : float
         Probability that white noise shows a given harmonic.
     highest : int
-        Order up to which harmonics are looked for.
+        Highest order of harmonics that are sought.
     parts : int
-        Of the run, which have to agree on a harmonic.
+        Number of parts of the run that must agree on a harmonic.
     """
 
     false_alarm: float = 1e-6
@@ -38,22 +38,22 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Harmonics:
-    """A wave locked to the oscillation.
+    """The sum of the harmonics of the oscillation, a wave with the same shape in every period.
 
     Parameters
     ----------
     peak_m : float
-        Its largest value, m, where the amplitude is largest.
+        Largest absolute value of the wave at the largest amplitude, m.
     share : float
-        Of the amplitude there.
+        This value over the amplitude.
     even : float
-        Share of its power in even harmonics.
+        Share of the power of the wave in even harmonics.
     second : float
-        Share of its power in the second harmonic.
+        Share of the power of the wave in the second harmonic.
     near_end : bool
-        Whether it is larger at the near turning point than at the far one.
-    at_samples : (n,) float64, m
-        Its value at the samples of the residuals.
+        Whether the wave is larger at the near turning point than at the far one.
+    at_samples : (k,) float64, m
+        Value of the wave at the samples of the residuals.
     misfit : Misfit
     """
 
@@ -67,28 +67,30 @@ class Harmonics:
 
 
 def find_harmonics(residuals: Residuals, least_m: float, params: Params | None = None) -> Harmonics | None:
-    """Return the harmonics that stand out of the residuals' noise.
+    """Return the harmonics that are significant in the residuals; None if there are none.
 
     Parameters
     ----------
     residuals : Residuals
     least_m : float
-        Largest value of a wave that rounding and the decay within a period explain, m.
+        Maximum of a wave that rounding and the decay within a period explain, m.
     params : Params, optional
 
     Notes
     -----
-    Every window's fit leaves no constant and no first harmonic, so that of a wave of the same shape in every period
-    the harmonics from the second on are left: :math:`c_k = 2\\overline{r e^{-ik\\varphi}}`. A bent scale or spring
-    makes harmonics that fall with the amplitude A as :math:`A^k`; those are found by weights :math:`A^k`, and taken
-    where they are the less likely by chance. Harmonics are taken in sixteen parts of the run; with F the mean's square
-    over its variance by the parts' scatter, a harmonic by chance is as likely as :math:`(1 + F/(S - 1))^{-(S - 1)}`
-    (F of 2 and 2(S - 1) degrees of freedom).
+    The fit of every window removes the constant and the first harmonic. So the residuals contain the harmonics from the
+    second on of a wave that has the same shape in every period: :math:`c_k = 2\\overline{r e^{-ik\\varphi}}`. The
+    harmonics of a nonlinear scale or spring are proportional to the power :math:`A^k` of the amplitude A. They are
+    fitted with the weights :math:`A^k`, and are used instead if they are less likely by chance. Harmonics are fitted in
+    S = 16 parts of the run. Let F be the squared mean of the parts over its variance from their scatter. The
+    probability of such a harmonic by chance is :math:`(1 + F/(S - 1))^{-(S - 1)}`, the F distribution with 2 and
+    2(S - 1) degrees of freedom.
 
-    What the constant and the first harmonic took in is of the order of what is left, so the largest value of the wave
-    is the uncertainty of amplitude and rest position. Of a third harmonic it is three times as much, for
-    :math:`\\cos^3\\varphi = (3\\cos\\varphi + \\cos 3\\varphi)/4`. Where that falls as the square of the amplitude
-    does, the damping rate is off by twice the same share of itself.
+    The contribution of the wave to the constant and the first harmonic is about as large as the part that remains. So
+    the largest value of the wave is the uncertainty of amplitude and rest position. A third harmonic makes the
+    uncertainty of the amplitude three times as large, because
+    :math:`\\cos^3\\varphi = (3\\cos\\varphi + \\cos 3\\varphi)/4`. If this contribution decays as the square of the
+    amplitude, the relative error of the damping rate is twice that of the amplitude.
     """
     params = params or Params()
     turns = residuals.phase * (1.0 / (2.0 * math.pi))
@@ -147,9 +149,9 @@ _CENTRES = 2.0 * math.pi * (np.arange(BINS) + 0.5) / BINS
 def _folded(
     residuals: Residuals, bins: NDArray[np.int64], orders: NDArray[np.int64], weights: F8, parts: int
 ) -> tuple[NDArray[np.complex128], F8]:
-    """Return harmonics (o,), m, that fall as weights (o, k) do, and how likely each is by chance.
+    """Return harmonics (o,), m, proportional to weights (o, k), and the probability of each by chance.
 
-    Least squares for each part of the run, and of these the mean by their weights.
+    Each harmonic is the weighted mean of least-squares fits to the parts of the run.
     """
     counts = np.diff(-(-np.arange(parts + 1) * residuals.values.size // parts))
     place = np.repeat(BINS * np.arange(parts), counts) + bins
@@ -161,7 +163,7 @@ def _folded(
         share = own / own.sum()
         each = 2.0 * (sums @ np.exp(-1j * order * _CENTRES)) / np.maximum(own, 1e-300)
         mean[i] = share @ each
-        # Parts in which the harmonic is weak say little, and count as little.
+        # Parts in which the harmonic is weak contain little information and have little weight.
         known = 1.0 / float(share @ share)
         scatter = float(share**2 @ np.abs(each - mean[i]) ** 2) * known / max(known - 1.0, 1e-9)
         variance = max(scatter, 4.0 * residuals.noise_m**2 / float(own.sum()))

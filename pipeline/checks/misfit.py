@@ -1,4 +1,4 @@
-"""What a check adds to the uncertainties."""
+"""Misfits: the uncertainties that a check adds to the estimates."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ __all__ = ["Misfit"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:
-    """What the estimates may be off by, because the model does not hold as the fit takes for granted.
+    """Uncertainties of the estimates because the model of the fit does not describe the record.
 
     Parameters
     ----------
     name : str
-        Of the input in every budget, one of :data:`pipeline.registry.quantities.INPUTS`.
+        Name of the input in every budget, one of :data:`pipeline.registry.quantities.INPUTS`.
     amplitude_m, offset_m, phase_rad, damping_rate : float
-        Standard uncertainties that it adds to the estimates of these names, m, m, rad, 1/s.
+        Standard uncertainties that are added to amplitude, offset, phase and damping rate, in m, m, rad and 1/s.
     clock : float
-        Relative standard uncertainty that it adds to all that is measured by the record's times.
+        Relative standard uncertainty that is added to all quantities measured by the times of the record.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Generic checks: does one model describe the whole run?
 
-These checks name no cause. They ask whether the model leaves more than the noise of the samples, whether residuals are
-white at any lag, whether the phases scatter as their noise says, and whether both halves of the run agree with one
+These checks name no cause. They test whether the residuals are larger than the noise of the samples, whether they are
+white at all lags, whether the phases scatter as their noise predicts, and whether both halves of the run agree with one
 model.
 """
 
@@ -40,18 +40,19 @@ class Params:
     Parameters
     ----------
     excess : float
-        Ratio of the residuals of the whole model to the noise within a period from which the model counts as
-        incomplete: what it leaves out is then as large as the noise.
+        Maximum ratio of the residuals of the whole model to the noise within a period. Above it the model counts as
+        incomplete, because the part that it does not describe is about as large as the noise.
     false_alarm : float
         Probability that the phases, or the halves, of a run that follows its model contradict it.
     colour : float
-        Correlation of residuals, at any lag, from which they are no noise: a half of their variance can be predicted.
+        Correlation of the residuals, at any lag, above which they are not noise.
     least_share : float
-        Of the amplitude, that the predictable part of the residuals has at least: a percent is what users can act on.
+        Minimum of the predictable part of the residuals, over the amplitude: users can act on one percent.
     least_windows : int
-        Of a half, for halves to be compared.
+        Minimum number of windows in a half for the halves to be compared.
     least_samples : int
-        Of a window, for its residuals to be looked at: of fewer, the five parameters of its fit colour the residuals.
+        Minimum number of samples in a window for the correlation of residuals to be tested. With fewer samples, the
+        fit of five parameters correlates the residuals.
     """
 
     excess: float = 1.5
@@ -72,17 +73,17 @@ class ModelCheck:
     rms_m : float
         Root mean square of the residuals of the whole model.
     noise_m : float
-        Standard deviation of one sample about its window's own fit.
+        Standard deviation of one sample about the fit of its window.
     scatter_excess_m : float
-        By how much amplitudes of single windows scatter beyond their noise.
+        Scatter of the amplitudes of single windows beyond their noise.
     phase_chi2 : float
         Reduced chi-square of the phases about their model.
     halves : float
         Difference between the halves, in standard uncertainties.
     correlation, lag_s : float
-        The strongest correlation of the residuals, and at which lag; 0 where they are white.
+        The strongest correlation of the residuals and its lag; 0 if it is below the limit.
     misfits : tuple of Misfit
-        By how much a fit of the whole waveform differs, where the halves disagree.
+        Difference to a fit of the whole waveform if the halves disagree; otherwise empty.
     """
 
     contradictions: tuple[Contradiction, ...]
@@ -107,19 +108,21 @@ def check_model(
     Parameters
     ----------
     fitted : Fitted
-        By windows.
+        The fit by windows.
     residuals : Residuals or None
-        What no named cause explains; None where one explains all of them.
+        The residuals that no other check explains; None if another check explains all of them.
     fit_waveform : callable or None
-        Fits the whole waveform; it is called where the halves disagree. None where that was done, or takes too long.
+        Function that fits the whole waveform; it is called if the halves disagree. None if this fit was done already,
+        or takes too long.
     params : Params, optional
 
     Notes
     -----
     The residuals of amplitudes and phases, over their standard uncertainties, are fitted by a straight line in each
-    half: where the model holds, levels and slopes differ as noise does (four standard normal numbers, of which the
-    largest counts). Where it does not, windows and waveform weigh its failure differently and nothing shows which is
-    right: the windows' values are kept, and their difference from the waveform's is a standard uncertainty of each.
+    half. If the model is correct, the differences in level and slope are four standard normal numbers, of which the
+    largest is tested. If it is not, the fits by windows and by the whole waveform weight its error differently, and
+    neither is known to be better. So the values of the windows are kept, and their differences from those of the
+    waveform are standard uncertainties.
     """
     from scipy.special import ndtri
 
@@ -155,10 +158,10 @@ def check_model(
 
 
 def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
-    """Return the strongest correlation of the residuals and its lag, s; 0 and 0 where they are white.
+    """Return the strongest correlation of the residuals and its lag, s; 0 and 0 if it is below the limits.
 
-    White noise of n samples has correlations with a standard deviation of :math:`n^{-1/2}`; of L lags none is farther
-    off than the quantile of :math:`\\alpha/2L` with the probability :math:`1 - \\alpha` (Bonferroni).
+    The correlations of n samples of white noise have a standard deviation of :math:`n^{-1/2}`. With the probability
+    :math:`1 - \\alpha`, none of L lags exceeds the quantile of :math:`\\alpha/2L` (Bonferroni).
     """
     from scipy.fft import irfft, next_fast_len, rfft
     from scipy.special import ndtri
@@ -178,7 +181,7 @@ def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
     correlation = np.where(enough, sums / np.maximum(pairs, 1.0), 0.0) / (sums[0] / pairs[0])
     lag = 1 + int(np.argmax(np.abs(correlation[1:])))
     white = -float(ndtri(params.false_alarm / (2.0 * lags))) / math.sqrt(pairs[lag] or 1.0)
-    # Of fewer pairs than samples the estimate may exceed 1, which no correlation does.
+    # With fewer pairs than samples the estimate may exceed 1, which a correlation cannot.
     strongest = max(-1.0, min(float(correlation[lag]), 1.0))
     predictable_m = math.sqrt(abs(strongest) * sums[0] / pairs[0])
     if abs(strongest) <= max(params.colour, white) or predictable_m < params.least_share * residuals.amplitude_m:
@@ -187,7 +190,7 @@ def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
 
 
 def _halves(fitted: Fitted, least_windows: int) -> float:
-    """By how much the halves differ, in standard uncertainties; 0 where they are too short."""
+    """Return the difference between the halves, in standard uncertainties; 0 if they are too short."""
     demodulated, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
     if demodulated.t.size < 2 * least_windows:
         return 0.0
@@ -199,7 +202,10 @@ def _halves(fitted: Fitted, least_windows: int) -> float:
 
 
 def _apart(first: F8, second: F8) -> float:
-    """By how much levels and slopes of two halves of equal length differ, whose points have the uncertainty 1."""
+    """Return the largest difference in level or slope of two halves, over its uncertainty.
+
+    The halves have equal length, and their points have the uncertainty 1.
+    """
     n = first.size
     x = np.arange(n) - 0.5 * (n - 1)
     change = second - first
@@ -209,7 +215,7 @@ def _apart(first: F8, second: F8) -> float:
 
 
 def _difference(fitted: Fitted, whole: Fitted) -> Misfit:
-    """What the estimates differ by between windows and waveform."""
+    """Return the differences between the estimates by windows and by the whole waveform."""
     omega = fitted.phase.angular_frequency.value
     size_m, rate = (b - a for a, b in zip(_at_start(fitted), _at_start(whole), strict=True))
     return Misfit(
@@ -223,7 +229,7 @@ def _difference(fitted: Fitted, whole: Fitted) -> Misfit:
 
 
 def _at_start(fitted: Fitted) -> tuple[float, float]:
-    """Amplitude, m, and damping rate, 1/s, at the start, averaged over the laws."""
+    """Return amplitude, m, and damping rate, 1/s, at the start, averaged over the laws."""
     laws = average_over_laws(fitted.damping, math.sqrt(float(np.mean(fitted.demodulated.amplitude**2))))
     return (
         sum(one.weight * float(one.fit.joint.values[0]) for one in laws),

@@ -1,4 +1,4 @@
-"""Oscillation: whether what was fitted is one, although its spectrum has a peak."""
+"""Oscillation: whether a motion whose spectrum has a peak really is an oscillation."""
 
 from __future__ import annotations
 
@@ -15,32 +15,34 @@ from pipeline.windows.demodulate import Demodulated
 
 __all__ = ["check_coherence", "check_sinusoid", "typical_miss"]
 
-MOST_BENT = 0.25  # of the amplitude: parabolas leave 0.19, a motion of which little but plateaus is seen 0.35
-FOLDED = 32  # parts of a period
-ALIKE = 0.25  # of the residual's variance: what periods that are alike may differ by
-WANDERING = 0.3  # of the amplitude: what a sinusoid may leave beyond white noise
-MANY = 8  # windows, of which an oscillation that leaves a quarter of its amplitude is judged by its coherence instead
-FEWEST, ASTRAY = 4, 0.8  # windows, and how far astray they may be over their amplitudes, to be one oscillation
-ALONE, SEEN = 1e-6, 0.5  # chance of a line in white noise, and the share of its evidence that the fit has to keep
+MOST_BENT = 0.25  # maximum residual over the amplitude: parabolas leave 0.19, a motion seen mostly as plateaus 0.35
+FOLDED = 32  # phase bins per period
+ALIKE = 0.25  # maximum share of the residual's variance by which similar periods may differ
+WANDERING = 0.3  # maximum residual beyond white noise, over the amplitude
+MANY = 8  # number of windows from which a motion with residuals below MOST_BENT is judged by its coherence instead
+FEWEST, ASTRAY = 4, 0.8  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
+ALONE, SEEN = 1e-6, 0.5  # probability of a spectral line in white noise, and share of its evidence that the fit needs
 
 
 def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
-    """Return why the motion is no oscillation although its spectrum has a peak: a step or a ramp has one too.
+    """Return why the motion is no oscillation, although its spectrum has a peak; None if it is one.
+
+    A step or a ramp has a peak in its spectrum too.
 
     Parameters
     ----------
     conditioned, demodulated
-        Outputs of the stages of those names.
+        Outputs of the stages with the same names.
     """
     most = demodulated.amplitude.size * 9 // 10
     size = float(np.partition(demodulated.amplitude, most)[most])
     left, unit = demodulated.noise_m, conditioned.track.unit
     if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
         return NoOscillation(f"the {noun(unit)} does not follow the period of its spectrum")
-    # Correlated noise, a drift or a random walk correlate neighbouring samples more than white noise does.
+    # Correlated noise, a drift or a random walk makes neighbouring samples more similar than white noise does.
     noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
-    # Both are estimates from the same n samples, and of white noise the ratio of their squares has a variance of 8.5/n.
-    # Five standard deviations are nothing: of 2,000 records at -10 dB one has 4.3.
+    # Both noises are estimated from the same n samples. For white noise the ratio of their squares has a variance of
+    # 8.5/n. Five standard deviations are allowed: the largest difference in 2,000 records at -10 dB is 4.3.
     chance = 5.0 * math.sqrt(8.5 / max(float(np.sum(demodulated.count)), 1.0))
     excess = math.sqrt(max(left**2 - (1.0 + chance) * noise**2, 0.0))
     if left <= 0.15 * size or (left <= 4.0 * conditioned.noise_m and excess <= WANDERING * size):
@@ -54,7 +56,7 @@ def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOsci
 
 
 def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
-    """Whether what a sinusoid leaves is alike in every period: a bob that bounces swings all the same."""
+    """Return whether the residual of the sinusoid is similar in every period: a bob that bounces still oscillates."""
     rows = np.flatnonzero(((demodulated.flags & UNUSABLE) == 0) & np.isfinite(demodulated.residual))
     left = demodulated.residual[rows]
     turns = np.interp(conditioned.track.t[rows], demodulated.t, demodulated.phase) / (2.0 * math.pi)
@@ -64,7 +66,7 @@ def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
 
 
 def check_coherence(fitted: Fitted, track: Track, typical: float) -> NoOscillation | None:
-    """Return why a motion is no oscillation although single periods look like one: they do not follow one another.
+    """Return why a motion is no oscillation, although single periods look like one; None if it is one.
 
     Parameters
     ----------
@@ -72,14 +74,15 @@ def check_coherence(fitted: Fitted, track: Track, typical: float) -> NoOscillati
     track : Track
         The record.
     typical : float
-        From :func:`typical_miss`.
+        Result of :func:`typical_miss`.
 
     Notes
     -----
-    Amplitude and phase of a window are one arrow. The law of the amplitude and the line of the phase predict it. Random
-    arrows miss the prediction by more than their own length. Half of the motion, by the arrows' lengths, has to miss it
-    by less than :data:`ASTRAY` of them. The oscillation also has to explain something: among n samples of white noise,
-    a line that stands out lowers the sum of squares by :math:`(2/n)\\ln(n/\\alpha)` of what remains.
+    Amplitude and phase of a window form a phasor, which the damping law and the fit of the phase predict. Random
+    phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
+    differ from it by less than :data:`ASTRAY` times their length. The oscillation must also explain part of the
+    variance: a significant spectral line in n samples of white noise reduces the sum of squares by
+    :math:`(2/n)\\ln(n/\\alpha)` of the remaining sum.
     """
     demodulated = fitted.demodulated
     if demodulated.t.size < FEWEST:
@@ -98,7 +101,10 @@ def check_coherence(fitted: Fitted, track: Track, typical: float) -> NoOscillati
 
 
 def typical_miss(fitted: Fitted) -> float:
-    """Return by what share of their amplitude half of the windows, by amplitude, miss the oscillation fitted."""
+    """Return the weighted median difference of windows from the fitted oscillation, over their amplitudes.
+
+    The weights are the amplitudes of the windows.
+    """
     demodulated, phase = fitted.demodulated, fitted.phase
     expected = phase.damping.best.amplitude(demodulated.t - phase.t0) * np.exp(1j * phase.total(demodulated.t))
     own = demodulated.amplitude * np.exp(1j * demodulated.phase)

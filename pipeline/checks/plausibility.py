@@ -1,4 +1,4 @@
-"""Plausibility: whether a bob on a spring, seen by a sensor of distance or acceleration, can do what is recorded."""
+"""Plausibility: whether the recorded motion is possible for a bob on a spring, and measurable by the sensor."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ class Params:
     Parameters
     ----------
     farthest_m : float
-        That an ultrasonic rangefinder reaches: 10 m of the largest (MaxBotix XL-MaxSonar), and a tenth more.
+        Maximum distance that an ultrasonic rangefinder measures, m: the longest range is 10 m (MaxBotix XL-MaxSonar),
+        and a tenth is added.
     most_gravities : float
-        Acceleration over that of gravity: a bob on a spring that only pulls reaches 1, and little more while the
-        spring is slack.
+        Maximum acceleration over that of gravity. A bob on a spring that can only pull reaches 1, and little more if
+        the spring goes slack.
     longest_sag_m : float
-        By which a bob stretches its spring: 25 m belong to a period of 10 s.
+        Maximum extension of the spring by the bob at rest, m: 25 m correspond to a period of 10 s.
     fewest_per_period : float
-        Samples: below two the frequency is folded, and below four noise decides.
+        Minimum number of samples per period: below two the frequency is aliased, and below four noise decides.
     """
 
     farthest_m: float = 11.0
@@ -43,16 +44,17 @@ class Params:
 
 @dataclass(frozen=True, slots=True)
 class Plausibility:
-    """What no bob on a spring does, or no rangefinder sees.
+    """Features of the motion that are impossible for a bob on a spring, or not measurable by a rangefinder.
 
     Parameters
     ----------
     undersampled, too_fast, too_slow, out_of_range : bool
         Whether each limit is exceeded.
     samples_per_period, frequency_hz, amplitude, gravities, sag_m : float
-        The amplitude in the unit of the track; NaN where a number has no meaning for it.
+        The numbers compared with the limits. The amplitude is in the unit of the track; numbers that have no meaning
+        for its quantity are NaN.
     low_m, high_m : float
-        The least and the largest distance.
+        The smallest and the largest distance; NaN if distances have no defined zero.
     misfits : tuple of Misfit
     """
 
@@ -73,20 +75,21 @@ class Plausibility:
 def check_plausibility(
     conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit, params: Params | None = None
 ) -> Plausibility:
-    """Return what no bob on a spring does, or no distance sensor sees.
+    """Compare a motion with the limits for a bob on a spring and for a distance sensor.
 
     Parameters
     ----------
     conditioned, demodulated, phase
-        Outputs of the stages of those names.
+        Outputs of the stages with the same names.
     params : Params, optional
 
     Notes
     -----
-    A bob hangs from a spring that pulls only, so it never falls faster than freely: :math:`A\\omega^2 \\le g`, and
-    not much more while the spring goes slack; of an acceleration that is the amplitude itself. What goes beyond enters
-    the uncertainties: of an amplitude n times as large as gravity lets it be, the share :math:`1 - 1/n`; of a distance
-    that cannot be, all. The bob stretches its spring by :math:`g/\\omega^2`.
+    The spring can only pull, so the bob never accelerates downward faster than in free fall: :math:`A\\omega^2 \\le g`,
+    and not much more if the spring goes slack. For a recorded acceleration :math:`A\\omega^2` is the amplitude itself.
+    The excess enters the uncertainties. If the amplitude is n times as large as gravity allows, its relative
+    uncertainty is :math:`1 - 1/n`. If a distance is impossible, the uncertainty of the rest position is as large as the
+    rest position. The bob at rest extends its spring by :math:`g/\\omega^2`.
     """
     params = params or Params()
     track = conditioned.track
@@ -104,7 +107,7 @@ def check_plausibility(
     if too_fast:
         misfits.append(Misfit(name="implausible_motion", amplitude_m=amplitude * (1.0 - 1.0 / gravities)))
     out_of_range, low_m, high_m = False, math.nan, math.nan
-    # Where distances count from the first sample, as from a velocity, their zero has no meaning.
+    # If distances start from zero at the first sample, as after integration of a velocity, their zero has no meaning.
     if track.unit == "m" and y.size and track.y[0] != 0.0:
         low_m, high_m = float(np.min(y)), float(np.max(y))
         mean = abs(float(np.mean(demodulated.offset)))

@@ -1,4 +1,4 @@
-"""Residuals: what the windows' fits leave of every sample, as the checks look at it."""
+"""Residuals: the difference of every sample from its window's fit, as input of the checks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pipeline.windows.disturbances import Disturbances
 
 __all__ = ["Residuals", "residuals_of"]
 
-FEWEST = 64  # samples: four in each of the sixteen parts that harmonics are compared in
+FEWEST = 64  # minimum number of samples: four in each of the sixteen parts in which harmonics are compared
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,20 +25,20 @@ class Residuals:
     Parameters
     ----------
     values : (k,) float64, m
-        Of the samples used; harmonics that were fitted along are put back.
+        Residuals of the samples used; they still contain the harmonics that the model includes.
     phase : (k,) float64, rad
-        Of the oscillation at these samples.
+        Phase of the oscillation at these samples.
     used : (n,) bool
-        Which of all samples they are.
+        Whether each sample of the record was used.
     noise_m, amplitude_m : float
         Standard deviation of one sample, and mean amplitude.
     interval_s, seconds : float
-        From sample to sample, and from the first to the last.
+        Mean time between samples, and time from the first to the last sample used.
     radians_per_sample : float
-        Angle by which the oscillation turns from sample to sample.
+        Increase of the phase from sample to sample.
     samples_per_window : int
     relative : (k,) float64 or None
-        Amplitude of the oscillation at these samples over that at the start; None where it is constant.
+        Amplitude of the oscillation at these samples over that at the first of them; None if this cannot be calculated.
     """
 
     values: F8
@@ -54,25 +54,25 @@ class Residuals:
 
     @property
     def on_grid(self) -> F8:
-        """(n,) float64, m: the residuals at every sample, 0 where it was not used."""
+        """The residuals of all samples, (n,) float64, m; 0 for samples that were not used."""
         whole = np.zeros(self.used.size)
         whole[self.used] = self.values
         return whole
 
     def less(self, taken_m: F8) -> Residuals:
-        """Return the residuals with something (k,) taken out."""
+        """Return the residuals after subtraction of a signal (k,), m."""
         return replace(self, values=self.values - taken_m)
 
 
 def residuals_of(
     conditioned: Conditioned, demodulated: Demodulated, disturbances: Disturbances, phase: PhaseFit
 ) -> Residuals | None:
-    """Return the residuals of a run, None where it has too few samples to look for anything in them.
+    """Return the residuals of a run; None if it has too few samples for the checks.
 
     Parameters
     ----------
     conditioned, demodulated, disturbances, phase
-        Outputs of the stages of those names.
+        Outputs of the stages with the same names.
     """
     t = conditioned.track.t
     used = ((demodulated.flags & UNUSABLE) == 0) & np.isfinite(demodulated.residual)

@@ -1,4 +1,4 @@
-"""Sensor: whether its distances are held over several samples, joined by straight lines, or smoothed."""
+"""Sensor: whether distances are held over several samples, joined by straight lines, or smoothed."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from pipeline.track import F8
 
 __all__ = ["Held", "Params", "Smoothing", "find_held", "find_joined", "find_smoothing", "held_count", "matters"]
 
-EXACT = 1e-12  # of the range of the distances: rounding of computed ones
-BESIDE = 4.0  # frequencies: twice the half-width of a line behind a Hann window
+EXACT = 1e-12  # rounding error of computed distances, over their range
+BESIDE = 4.0  # minimum distance from a spectral line, in bins: twice its half-width with a Hann window
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,25 +28,25 @@ class Params:
     Parameters
     ----------
     correlation : float
-        Of neighbouring residuals from which a filter is looked for: a running mean over two samples leaves 0.5.
+        Correlation of neighbouring residuals from which a filter is sought: a running mean over two samples gives 0.5.
     steady : float
-        Ratio by which the covariance of neighbouring residuals may differ between the halves of the recording. The
-        noise of a sensor stays the same; what a model leaves of the motion decays with it. For 1,200 samples behind
-        a filter over ten of them, chance makes the ratio scatter by a quarter.
+        Maximum ratio between the covariances of neighbouring residuals in the two halves of the recording. The noise of
+        a sensor is constant; residuals of the motion decay with it. After a filter over ten of 1,200 samples the ratio
+        scatters by a quarter.
     unlike : float
-        Root mean square by which the correlations may differ from those of a filter. Correlations of 1,200 samples
-        scatter by 0.03.
+        Maximum root-mean-square difference between the correlations and those of a filter. The correlations of 1,200
+        samples scatter by 0.03.
     fall : float
-        Ratio by which the first correlation's distance from 1 may differ from the filter's, for the sensor to be named:
-        white noise from behind the filter makes it fall within one lag, and so do other residuals of the model.
+        Maximum ratio between the decrease of the correlation over the first lag and that of the filter, for a finding
+        to name the sensor. White noise added after the filter increases it, and so do other residuals of the model.
     white : float
-        Share of the variance that white noise from behind the filter may have, which lowers all correlations alike.
+        Maximum share of the variance in white noise added after the filter, which lowers all correlations alike.
     as_stated : float
-        Share by which the loss that the residuals show may differ from that of the filter that the scene states.
+        Maximum relative difference between the loss that the residuals show and that of the filter in the scene.
     straight : float
-        Share of second differences between the bends that must be rounding errors.
+        Minimum share of second differences between the bends that are only rounding errors.
     chance : float
-        Probability that bends which come at random seem to come at a constant rate.
+        Probability that bends at random times seem to come at a constant rate.
     """
 
     correlation: float = 0.4
@@ -66,9 +66,9 @@ class Held:
     Parameters
     ----------
     count : int
-        Samples over which each distance is repeated.
+        Number of samples with the same distance.
     interval_s : float
-        From one measurement to the next.
+        Time from one measurement to the next.
     misfit : Misfit
     """
 
@@ -84,20 +84,21 @@ class Smoothing:
     Parameters
     ----------
     correlation : float
-        Of neighbouring residuals.
+        Correlation of neighbouring residuals.
     mean_samples : float
-        Of the running mean that explains the correlations best; 0 where another filter does better.
+        Width of the running mean, in samples, if it explains the correlations best; otherwise 0.
     lag_s : float
-        Of the first-order lag that does; 0 where another filter does better.
+        Time constant of the first-order lag, if it explains the correlations best; otherwise 0.
     joined_samples : float
-        Between the readings that are joined by straight lines; 0 where another filter does better.
+        Number of samples between readings that are joined by straight lines, if this explains the correlations best;
+        otherwise 0.
     loss : float
-        Share of the amplitude that such a filter takes away.
+        Relative loss of amplitude in the filter.
     late_s : float
-        By how much it delays the motion.
+        Delay of the motion by the filter.
     certain : bool
-        Whether a filter alone explains the correlations; with white noise besides, other causes do as well, so the
-        uncertainties cover the filter and no finding names it.
+        Whether the filter alone explains the correlations. If white noise must be added, other causes are possible too,
+        so the uncertainties include the filter but no finding names it.
     misfit : Misfit
     """
 
@@ -112,7 +113,7 @@ class Smoothing:
 
 
 def held_count(conditioned: Conditioned) -> int:
-    """Return over how many samples each distance is held; 1 where every sample is new.
+    """Return the number of samples over which each distance is held; 1 if every sample is new.
 
     Parameters
     ----------
@@ -120,8 +121,8 @@ def held_count(conditioned: Conditioned) -> int:
 
     Notes
     -----
-    Distances in coarse steps repeat too, but change at any row. Those of a sensor slower than the recording change at
-    every k-th row only.
+    Distances in coarse steps are repeated too, but they change at any row. The distances of a sensor slower than the
+    recording change only at every k-th row.
     """
     y = conditioned.track.y[conditioned.used]
     changes = np.flatnonzero(np.diff(y) != 0.0)
@@ -129,14 +130,14 @@ def held_count(conditioned: Conditioned) -> int:
         return 1
     for k in range(min(int(y.size // 8), 200), 1, -1):
         most = int(np.bincount(changes % k).max())
-        # By chance a k-th of the changes falls on each row of a cycle; for the right k nearly all fall on one.
+        # By chance, each row of a cycle has a k-th of the changes; with the correct k, one row has nearly all of them.
         if most > 0.9 * changes.size and most > 2.5 * changes.size / k:
             return k
     return 1
 
 
 def find_held(conditioned: Conditioned, residuals: Residuals) -> Held | None:
-    """Return the sensor's own rate where it is slower than the recording.
+    """Return the actual rate of a sensor that is slower than the recording; None if it is not slower.
 
     Parameters
     ----------
@@ -145,8 +146,8 @@ def find_held(conditioned: Conditioned, residuals: Residuals) -> Held | None:
 
     Notes
     -----
-    Holding each of k samples is a running mean over k of them: the amplitude loses
-    :math:`1 - \\sin(x)/x` with :math:`x = k\\omega h/2`, and the motion is late by :math:`(k - 1)h/2`.
+    Holding a reading over k samples acts as a running mean over k samples. The amplitude decreases by
+    :math:`1 - \\sin(x)/x` with :math:`x = k\\omega h/2`, and the motion is delayed by :math:`(k - 1)h/2`.
     """
     count = held_count(conditioned)
     if count == 1:
@@ -159,7 +160,7 @@ def find_held(conditioned: Conditioned, residuals: Residuals) -> Held | None:
 
 
 def find_joined(conditioned: Conditioned, residuals: Residuals, params: Params | None = None) -> Smoothing | None:
-    """Return the distance of the readings of a slow sensor that were joined by straight lines; None without any.
+    """Return the interval between readings of a slow sensor that were joined by straight lines; None without any.
 
     Parameters
     ----------
@@ -169,11 +170,11 @@ def find_joined(conditioned: Conditioned, residuals: Residuals, params: Params |
 
     Notes
     -----
-    On a straight line second differences are rounding errors, at most twice the last digit; the line bends at each
-    reading. Bends at a constant rate are a line in the spectrum of the marks of all bends. The highest of n
-    frequencies of random marks exceeds :math:`\\log_2(n/\\alpha)` times the median power with the probability
-    :math:`\\alpha`. Multiples of the frequency of the motion are not looked at, because larger accelerations bend more.
-    With N samples from reading to reading the motion loses :math:`1 - (\\sin x/x)^2` of its amplitude, where
+    On a straight line, second differences are rounding errors of at most two units of the last digit; the line bends at
+    each reading. Each bend is marked, and bends at a constant rate give a line in the spectrum of the marks. The
+    highest of n frequencies of random marks exceeds :math:`\\log_2(n/\\alpha)` times the median power with the
+    probability :math:`\\alpha`. Multiples of the frequency of the motion are excluded, because larger accelerations
+    make more bends. With N samples from reading to reading, the amplitude decreases by :math:`1 - (\\sin x/x)^2`, where
     :math:`x = N\\omega h/2`.
     """
     params = params or Params()
@@ -195,13 +196,13 @@ def find_joined(conditioned: Conditioned, residuals: Residuals, params: Params |
     high = beside & (power > np.median(power[beside]) * math.log2(power.size / params.chance))
     if not high.any():
         return None
-    # Bends at every N-th sample have lines at multiples of the rate as high as at the rate itself; those of a mean over
-    # neighbours fall.
+    # Bends at every N-th sample give equal lines at the rate and at its multiples. The weights, which act as a mean
+    # over neighbouring marks, reduce the multiples.
     line = int(np.argmax(high * power * np.cos(0.5 * np.pi * np.arange(power.size) / power.size) ** 4))
     count = marks.size / _between_bins(power, line)
     turned = np.flatnonzero(seen) / count
     from_bend = np.abs((turned - _phase_of(bent, turned) + 0.5) % 1.0 - 0.5) * count
-    between = from_bend > 1.0  # a reading between two samples bends at both
+    between = from_bend > 1.0  # a reading between two samples makes a bend at both
     if not (between.any() and np.mean(~bent[between]) > params.straight):
         return None
     half = 0.5 * count * residuals.radians_per_sample
@@ -212,12 +213,12 @@ def find_joined(conditioned: Conditioned, residuals: Residuals, params: Params |
 
 
 def _between_bins(power: F8, line: int) -> float:
-    """Return where a line's maximum is, in bins of a spectrum behind a Hann window.
+    """Return the position of the maximum of a line, in bins of a spectrum with a Hann window.
 
     Notes
     -----
-    With the ratio a of the amplitudes of the higher neighbour and the highest bin, the line is (2a - 1)/(a + 1) bins
-    towards that neighbour.
+    If the amplitude of the higher neighbour is a times that of the highest bin, the line is (2a - 1)/(a + 1) bins
+    towards this neighbour.
     """
     side = 1 if power[line + 1] > power[line - 1] else -1
     ratio = math.sqrt(float(power[line + side] / power[line]))
@@ -225,7 +226,7 @@ def _between_bins(power: F8, line: int) -> float:
 
 
 def _phase_of(marks: NDArray[np.bool_], turned: F8) -> float:
-    """Return at which part of a turn the marks are, on the average; ``turned`` counts turns."""
+    """Return the mean phase of the marks, in turns; ``turned`` contains the phases of all samples."""
     return float(np.angle(np.sum(np.exp(2j * np.pi * turned[marks])))) / (2.0 * math.pi)
 
 
@@ -236,16 +237,16 @@ def matters(
     stated: SensorFilter | None = None,
     params: Params | None = None,
 ) -> bool:
-    """Return whether a filter takes enough of the amplitude to matter, and is not the one that the scene states.
+    """Return whether a filter reduces the amplitude significantly and is not the filter that the scene states.
 
     Parameters
     ----------
     found : Smoothing
     residuals : Residuals
     u_amplitude_m : float
-        Standard uncertainty of the amplitude, m: a filter that takes less than half of it does not matter.
+        Standard uncertainty of the amplitude, m: a loss of less than half of it is ignored.
     stated : SensorFilter, optional
-        From the scene.
+        The filter in the scene.
     params : Params, optional
     """
     params = params or Params()
@@ -257,7 +258,7 @@ def matters(
 
 
 def find_smoothing(residuals: Residuals, params: Params | None = None) -> Smoothing | None:
-    """Return the filter whose correlation the residuals show.
+    """Return the filter whose correlations agree with those of the residuals; None if none does.
 
     Parameters
     ----------
@@ -266,12 +267,12 @@ def find_smoothing(residuals: Residuals, params: Params | None = None) -> Smooth
 
     Notes
     -----
-    White noise that a sensor smooths over N samples is correlated, :math:`\\rho_l = 1 - l/N` behind a running mean and
-    :math:`e^{-l/\\tau}` behind a first-order lag; the motion loses
-    :math:`1 - \\sin(N\\omega h/2)/(N\\sin(\\omega h/2))` or :math:`1 - (1 + \\omega^2\\tau^2)^{-1/2}` of its amplitude.
-    Readings N samples apart that are joined by straight lines are correlated as a cubic B-spline of width 4N is, and
-    the motion loses :math:`1 - (\\sin x/x)^2` with :math:`x = N\\omega h/2`. White noise from behind the filter lowers
-    all correlations by one factor, which is fitted along.
+    White noise smoothed by a sensor is correlated: :math:`\\rho_l = 1 - l/N` after a running mean over N samples, and
+    :math:`\\rho_l = e^{-l/\\tau}` after a first-order lag of :math:`\\tau` samples. The amplitude decreases by
+    :math:`1 - \\sin x/x` with :math:`x = N\\omega h/2`, or by :math:`1 - (1 + \\omega^2\\tau^2h^2)^{-1/2}`. If readings
+    N samples apart are joined by straight lines, the correlation is a cubic B-spline of width 4N, and the amplitude
+    decreases by :math:`1 - (\\sin x/x)^2`. White noise added after the filter multiplies all correlations by one
+    factor, which is also fitted.
     """
     params = params or Params()
     whole, turn, step = residuals.on_grid, residuals.radians_per_sample, residuals.interval_s
@@ -348,12 +349,13 @@ def _nearest(
     turn: float,
     most_white: float,
 ) -> tuple[float, float, float]:
-    """How far the nearest filter's correlations are from those seen, its size in samples, and how fast they fall.
+    """Return the misfit of the nearest filter's correlations, the filter's size, and a ratio of decreases.
 
-    The last is the ratio of the first correlation's distance from 1 to the filter's own.
+    The misfit is the root-mean-square difference from the observed correlations. The size is in samples. The ratio is
+    the observed decrease of the correlation over the first lag, over that for the filter.
 
-    Of noise with a memory a window's fit of a constant and a sinusoid takes along more than of white noise: the share
-    :math:`\\sum_l (1 - |l|/L) \\rho_l (1 + 2 \\cos \\omega l)/L` of its variance, L samples a window.
+    The window's fit of a constant and a sinusoid removes more of correlated noise than of white noise: the share
+    :math:`\\sum_l (1 - |l|/L) \\rho_l (1 + 2 \\cos \\omega l)/L` of its variance, for L samples in a window.
     """
     every = np.arange(length)
     taper = (1.0 - every / length) * (2.0 - (every == 0)) / length

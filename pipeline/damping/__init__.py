@@ -1,5 +1,6 @@
-"""Damping: from the windows' amplitudes to the laws by which they fall.
+"""Damping: from the windows' amplitudes to the laws by which they decay.
 
-In: amplitudes with covariances against time. Out: every law's parameters, the selected one and those the record admits.
-To add a law, write one class and one entry in ``laws``; only ``evidence`` decides which law is selected.
+Input: amplitudes with covariances against time. Output: the parameters of every law, the selected law, and the laws
+that the record admits. To add a law, write one class and one entry in ``laws``; only ``evidence`` decides which law is
+selected.
 """

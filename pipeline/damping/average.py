@@ -1,9 +1,9 @@
-"""Averages over laws: amplitude and damping rate where a record cannot tell which law it follows.
+"""Averages over laws: amplitude and damping rate if a record cannot show which law it follows.
 
-Kept by hand: averages by an information criterion alone take a lone term where the other one is there and merely too
-small to show, and state an interval that misses it. Here drag between friction and quadratic is one family, its
-curvature known beforehand to within what any drag shows, and what the record knows of it takes over as it grows
-(``tests/trials/test_law_coverage.py``).
+This is written by hand because an average by an information criterion alone selects a single term if the other term is
+too small to detect, and its interval then misses the true value. Here linear and quadratic drag are one family. The
+prior for its curvature covers every known drag, from friction to quadratic drag, and the record's own information
+outweighs the prior as it grows (``tests/trials/test_law_coverage.py``).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from pipeline.track import F8
 
 __all__ = ["Weighted", "average_over_laws", "scaled", "spread_counts"]
 
-SPREAD_OF_POWER = 1.4  # about 1, of the power by which drag grows: friction's 0 and quadratic drag's 2 are well inside
-OTHER_LAW = 0.15  # prior odds of a law with friction, or of one that the user made, against linear and quadratic drag
-BELOW_LINEAR = 0.03  # the same of a power below 1: nothing that is known to damp grows so slowly, friction aside
-APART = 5.0  # how many u rates lie apart where evidence on a power counts half as much again, and not twice
+SPREAD_OF_POWER = 1.4  # prior u of the power of the drag about 1: 0 of friction and 2 of quadratic drag are well inside
+OTHER_LAW = 0.15  # prior odds of a law with friction, or of a user-defined law, against linear and quadratic drag
+BELOW_LINEAR = 0.03  # prior odds of a power below 1: no known damping but friction grows so slowly
+APART = 5.0  # difference of rates, in standard uncertainties, at which evidence on a power counts 1.5 times, not twice
 STEEPNESS, FAR = (
     5.0,
     5.0,
-)  # of what the spread between laws counts; chosen with those above for the coverage of the intervals
+)  # exponent and factor of the spread between laws; chosen, as the values above, for the coverage of the intervals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,9 +38,9 @@ class Weighted:
     Parameters
     ----------
     fit : LawFit
-        Parameters and covariance are those to be used.
+        The fit with the parameters and the covariance that the average uses.
     weight : float
-        All weights add up to 1.
+        Weight of the law; the weights of all laws add up to 1.
     """
 
     fit: LawFit
@@ -48,9 +48,9 @@ class Weighted:
 
 
 def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, ...]:
-    """Return the laws by which quantities are stated, the one whose coefficients are stated first.
+    """Return the laws over which quantities are averaged, first the law whose coefficients are stated.
 
-    A law that the user stated is the only one.
+    If the user stated a law and it is selected, it is the only one.
 
     Parameters
     ----------
@@ -60,36 +60,41 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
 
     Notes
     -----
-    Linear and quadratic drag together hold "none", "linear" and "quadratic"; which of the four is selected says that a
-    term does not show, not that it is zero. So unless the recording contradicts it, what is stated is this law's,
-    with what is known beforehand: the power :math:`1 + \\beta A/(\\gamma + \\beta A)` by which drag grows is
-    :math:`1 \\pm 1.4`, which makes :math:`\\beta = 0 \\pm \\tau` with :math:`\\tau = 1.4\\,\\gamma_l/\\bar A` from the
-    lone exponential's rate. The fit alone knows :math:`\\beta` to u; together parameters and covariance are
+    The law of linear and quadratic drag together contains "none", "linear" and "quadratic" as special cases. If one of
+    these is selected, a term was not detected, but it need not be zero. So unless the recording contradicts the law of
+    both drags, results are stated by it, with a prior. The prior for the power
+    :math:`1 + \\beta A/(\\gamma + \\beta A)` of the drag is :math:`1 \\pm 1.4`. This means
+    :math:`\\beta = 0 \\pm \\tau`, with :math:`\\tau = 1.4\\,\\gamma_l/\\bar A` from the rate of the exponential alone.
+    If the fit alone determines :math:`\\beta` with the standard uncertainty u, fit and prior together have the
+    parameters and the covariance
 
     .. math:: \\theta = \\theta_l + w\\,(\\theta_{lq} - \\theta_l), \\quad
-              C = C_l + w\\,(C_{lq} - C_l), \\quad w = \\frac{\\tau^2}{\\tau^2 + u^2}:
+              C = C_l + w\\,(C_{lq} - C_l), \\quad w = \\frac{\\tau^2}{\\tau^2 + u^2}.
 
-    the exponential's where the record knows no curvature, and with an uncertainty that covers every drag from
-    friction to quadratic; those of the fit where it does. The other admissible laws weigh
-    :math:`0.15\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` each against it if they have friction, and a free power, which is as
-    likely beforehand, :math:`w\\,e^{-s\\Delta\\mathrm{BIC}/2}`. Wherever it weighs it does so by the probability P that
-    it is above 1, :math:`P + 0.03 (1 - P)`: a smaller one stands for friction together with drag, which has
-    separate laws, and no recording can distinguish the two. A power has as many parameters as both drags. Where a
-    recording distinguishes the two at all, the less likely one is soon left out, or nearly every interval would widen:
-    :math:`s = 1 + 1/(1 + (d/5)^4)` for rates at the start that lie d standard uncertainties apart. Far apart s is 1,
-    for there the rare record that supports the wrong one would be wrong by as much.
+    If the record does not determine the curvature, they are those of the exponential, with an uncertainty that covers
+    every drag from friction to quadratic. If it does, they are those of the fit.
 
-    Both drags take part although a coefficient of their free fit is negative, where none is by more than two standard
-    uncertainties once what is known beforehand is in it: a record that knows no curvature gives one drag a negative
-    coefficient by chance as often as not.
+    Every other admissible law, one with friction or a user-defined one, has the weight
+    :math:`0.15\\,w\\,e^{-\\Delta\\mathrm{BIC}/2}` against the law of both drags. A free power has
+    :math:`w\\,e^{-s\\Delta\\mathrm{BIC}/2}`, because its prior probability is as high. The weight of a power is also
+    multiplied by :math:`P + 0.03 (1 - P)`, where P is the probability that the power is above 1. A smaller power
+    represents friction together with drag, which has separate laws, and no recording can distinguish them. A power has
+    as many parameters as both drags. If a recording distinguishes the power from both drags at all, the less likely
+    law should soon lose its weight, or nearly every interval would widen. So :math:`s = 1 + 1/(1 + (d/5)^4)` if the
+    rates of the two laws at the start are d standard uncertainties apart. If the rates are far apart, s is 1, because
+    a rare record that supports the wrong law would then be wrong by as much.
 
-    Laws that are not rejected and no longer admissible weigh too, for a small weight counts where the rates lie far
-    apart; those that only add a term to the selected one do not. Where linear and quadratic drag is out of reach, the
-    laws are weighed by their BIC; where chi-square rejects them all, by their BIC over the reduced chi-square of the
-    best: the points scatter by so much more than they should, and the nearest is one of several.
+    The law of both drags takes part even if a coefficient of its fit without the prior is negative. The condition is
+    that, with the prior, no coefficient is negative by more than two standard uncertainties. If a record does not
+    determine the curvature, the fit often gives one drag a negative coefficient by chance.
 
-    Covariances are multiplied by the reduced chi-square where that is above 1, the scale factor of [1]_: a law between
-    two that were fitted is seen in what they leave before it rejects them.
+    Laws that are neither rejected nor admissible take part too, because a small weight counts if the rates are far
+    apart. Laws that only add a term to the selected one do not. If the law of both drags cannot be used, the laws are
+    weighted by their BIC. If all laws are rejected, the weights use the BIC over the reduced chi-square of the best
+    law, because the points scatter by that much more than expected and several laws are about equally near.
+
+    Covariances are multiplied by the reduced chi-square if it is above 1, the scale factor of [1]_. If the true law
+    lies between two fitted laws, their residuals grow before chi-square rejects them.
 
     References
     ----------
@@ -121,7 +126,7 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
                     prior = OTHER_LAW
                 against = 0.5 * sharpness * (other.bic - mixed.bic)
                 evidence.append((other, _belief(other) + math.log(share * prior) - against - 0.5 * mixed.bic))
-    # The coefficients of a power or of a function are stated where it is selected; else both drags', within reach.
+    # A selected power or function states its own coefficients; otherwise those of both drags are stated, if possible.
     first = mixed.name if mixed is not None and stands and isinstance(damping.best.law, Drag) else damping.selected
     evidence.sort(key=lambda one: one[0].name != first)
     most = max(log for _, log in evidence)
@@ -130,12 +135,12 @@ def average_over_laws(damping: Damping, amplitude_m: float) -> tuple[Weighted, .
 
 
 def _in_family(law: Law) -> bool:
-    """Whether a law is linear and quadratic drag together, or a case of it."""
+    """Return whether a law is linear and quadratic drag together, or a special case of it."""
     return isinstance(law, Drag) and set(law.powers) <= {1, 2}
 
 
 def _belief(fit: LawFit) -> float:
-    """Logarithm of how likely a free power's value is beforehand; 0 of other laws."""
+    """Return the logarithm of the prior odds of the value of a free power; 0 for other laws."""
     name = free_power(fit.law)
     if name is None:
         return 0.0
@@ -145,7 +150,7 @@ def _belief(fit: LawFit) -> float:
 
 
 def _sharpness(power: LawFit, mixed: LawFit) -> float:
-    """By how much the evidence on a power counts more than it says; 1 where the rates at the start lie far apart."""
+    """Return the factor on the evidence for or against a power; 1 if the rates at the start are far apart."""
     rate = mixed.damping_rate()
     apart = abs(power.rate_at_start() - rate.value)
     return 1.0 + 1.0 / (1.0 + (apart / (APART * rate.u)) ** 4) if rate.u > 0.0 else 1.0
@@ -157,17 +162,18 @@ def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
     Parameters
     ----------
     weights : (k,) float64
-        Of the laws; their sum is 1.
+        Weights of the laws; their sum is 1.
     rates, variances : (k,) float64
-        Damping rate at the start by each law, 1/s, and its variance: what laws differ in most.
+        Damping rate at the start by each law, 1/s, and its variance: the quantity in which laws differ most.
 
     Notes
     -----
-    With the mean own variance :math:`W` and the variance :math:`B = \\sum_i w_i (x_i - x)^2` between laws it is
-    :math:`5 \\min(B/W, 1)^5`: hardly anything where laws agree within their own uncertainties, for an
-    interval of these holds the neighbours too; and more than all of it where they do not, for then the truth is one
-    law's value and not a mean, and the interval has to reach the one that weighs less. With 1 throughout, intervals
-    cover the truth too often in the first case and too seldom in the second (``tests/trials/test_law_coverage.py``).
+    Let :math:`W` be the mean variance within laws and :math:`B = \\sum_i w_i (x_i - x)^2` the variance between laws.
+    The factor is :math:`5 \\min(B/W, 1)^5`. It is nearly 0 if the laws agree within their own uncertainties, because
+    their intervals then cover the other laws too. It is above 1 if they disagree, because the true value is then that
+    of one law and not the mean, and the interval must include the law with less weight. With a constant factor of 1,
+    intervals cover the true value too often in the first case and too seldom in the second
+    (``tests/trials/test_law_coverage.py``).
     """
     own, between = float(weights @ variances), float(weights @ (rates - weights @ rates) ** 2)
     if between == 0.0:
@@ -176,9 +182,9 @@ def spread_counts(weights: F8, rates: F8, variances: F8) -> float:
 
 
 def _far(damping: Damping, names: tuple[str, ...]) -> list[str]:
-    """Laws that stand beside the admissible ones: neither rejected nor the selected one with a term more.
+    """Return the laws that are neither admissible nor rejected, and do not only add a term to the selected law.
 
-    Nor any with a coefficient below zero, whose evidence is that of one of its cases.
+    Laws with a negative coefficient are left out too, because their evidence is that of a special case.
     """
     others = {name: fit for name, fit in damping.fits.items() if name not in names and not fit.rejected}
     return [
@@ -187,7 +193,7 @@ def _far(damping: Damping, names: tuple[str, ...]) -> list[str]:
 
 
 def _nearest(damping: Damping) -> tuple[Weighted, ...]:
-    """Return the laws that come near where none fits, the selected one first."""
+    """Return the laws nearest to the record if no law fits, the selected one first."""
     best = damping.best
     odds = {best.name: 1.0}
     for name, fit in damping.fits.items():
@@ -198,21 +204,21 @@ def _nearest(damping: Damping) -> tuple[Weighted, ...]:
 
 
 def scaled(fit: LawFit) -> LawFit:
-    """Return a fit with its covariance times the reduced chi-square where that exceeds 1 and is not in it already."""
+    """Return a fit, its covariance multiplied by the reduced chi-square if that exceeds 1 and was not applied yet."""
     if not fit.reduced_chi2 > 1.0 or fit.widening != 1.0:
         return fit
     return replace(fit, joint=replace(fit.joint, covariance=fit.reduced_chi2 * fit.joint.covariance))
 
 
 def _with_prior(mixed: LawFit, linear: LawFit | None, amplitude_m: float) -> tuple[float, LawFit]:
-    """The share that the record has in the curvature, and linear and quadratic drag with what is known beforehand."""
+    """Return the weight of the record in the curvature, and the fit of both drags combined with the prior."""
     if linear is None:
         return 1.0, mixed
     gamma = linear.joint["gamma"]
     tau = SPREAD_OF_POWER * math.hypot(gamma.value, gamma.u) / amplitude_m
     share = 1.0 / (1.0 + (mixed.joint["beta"].u / tau) ** 2) if tau > 0.0 else 0.0
     values, covariance = np.zeros(3), np.zeros((3, 3))
-    # Where chi-square rejects the exponential its covariance was widened: here it is a part of what fits.
+    # If chi-square rejected the exponential, its covariance was widened. Here it is part of a law that fits.
     values[:2], covariance[:2, :2] = linear.joint.values, linear.joint.covariance / linear.widening
     joint = replace(
         mixed.joint,
@@ -223,7 +229,7 @@ def _with_prior(mixed: LawFit, linear: LawFit | None, amplitude_m: float) -> tup
 
 
 def _allowed_by_prior(mixed: LawFit, linear: LawFit | None, amplitude_m: float) -> bool:
-    """Whether linear and quadratic drag are rejected only for a negative coefficient, which the prior removes."""
+    """Return whether both drags together are rejected only for a negative coefficient that the prior removes."""
     joint = _with_prior(mixed, linear, amplitude_m)[1].joint
     return mixed.rejection == "negative" and bool(
         np.all(joint.values >= -NEGATIVE * np.sqrt(np.diag(joint.covariance)))

@@ -1,9 +1,9 @@
-"""Evidence: what the points say for and against fitted laws, and the choice among them.
+"""Evidence: tests of the fitted laws against the points, and the selection among the laws.
 
-Kept by hand: libraries rank models by an information criterion alone, which names a winner though none fits. Here
-chi-square on correlated points may reject a law, a coefficient below zero contradicts it, and a law that says the
-same as a simpler one is no other answer. The true law is admissible in at least 95 % of simulated records and rejected
-in at most 2 % (``tests/trials/test_law_selection.py``).
+This is written by hand because libraries rank models only by an information criterion, which names a winner even if no
+model fits. Here chi-square of correlated points may reject a law, and so may a negative coefficient. A law that
+predicts the same damping as a simpler one is not admissible. The true law is admissible in at least 95 % of simulated
+records and rejected in at most 2 % (``tests/trials/test_law_selection.py``).
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ __all__ = ["BARE_MENTION", "NEGATIVE", "Weighed", "choose", "least_chi2", "weigh
 # Difference of BIC below which evidence is "not worth more than a bare mention": Kass and Raftery, J. Am. Stat. Assoc.
 # 90 (1995) 773.
 BARE_MENTION = 2.0
-ALIKE = 0.1  # share of the damping that two laws may differ by and still say the same
-SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # of the first amplitude, to which at most and at least it is compared
-# Standard uncertainties below zero at which a coefficient rejects its law: a probability of 0.023 if it is truly zero.
+ALIKE = 0.1  # maximum relative difference in damping between two laws that count as equivalent
+SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # limits of the lower end of this comparison, over the largest amplitude
+# A coefficient this many standard uncertainties below zero rejects its law: a probability of 0.023 if its true value is
+# zero.
 NEGATIVE = 2.0
 
 
 def least_chi2(fits: Mapping[str, Minimum], laws: Mapping[str, Law] = LAWS) -> dict[str, float]:
-    """Each law's chi-square at its best without negative coefficients, which is a special case's or its own."""
+    """Return the minimum chi-square of each law without negative coefficients: its own or that of a special case."""
     least: dict[str, float] = {}
     for name in sorted(fits, key=lambda name: len(laws[name].parameters)):
         fit = fits[name]
@@ -40,25 +41,26 @@ def least_chi2(fits: Mapping[str, Minimum], laws: Mapping[str, Law] = LAWS) -> d
             with np.errstate(divide="ignore", invalid="ignore"):
                 below = np.minimum(fit.theta, 0.0) ** 2 / np.diag(fit.covariance)
             cases = [least[case] for case in laws[name].cases if case in least]
-            # Without its special cases at hand: what the worst coefficient costs to be zero.
+            # If no special case was fitted: the increase of chi-square if the most negative coefficient is set to zero.
             least[name] = min(cases) if cases else fit.chi2 + float(np.max(below))
     return least
 
 
 def weigh(law: Law, fit: Minimum, least_chi2: float, points: int, correlation: float, rejection_level: float) -> LawFit:
-    """Hold one law's fit to the points.
+    """Test the fit of one law against the points.
 
     Parameters
     ----------
     law : Law
     fit : Minimum
     least_chi2 : float
-        As :func:`least_chi2` gives it, for the BIC.
+        The law's value from :func:`least_chi2`, for the BIC.
     points : int
+        Number of points.
     correlation : float
-        Points that count as one.
+        Correlation length: the number of points that count as one independent point.
     rejection_level : float
-        Probability at which chi-square rejects a law that is true.
+        Probability with which chi-square rejects a true law.
     """
     count = len(law.parameters)
     covariance = correlation * fit.covariance
@@ -77,11 +79,11 @@ def weigh(law: Law, fit: Minimum, least_chi2: float, points: int, correlation: f
 
 
 class Weighed(Protocol):
-    """A fit that takes part in the choice among laws: of one run, or of several together."""
+    """A fit that takes part in the selection among laws, to one run or to several runs together."""
 
     @property
     def law(self) -> Law:
-        """Which law."""
+        """The law."""
         ...
 
     @property
@@ -91,7 +93,7 @@ class Weighed(Protocol):
 
     @property
     def rejection(self) -> str:
-        """Why the law is rejected, empty where it is not."""
+        """The reason why the law is rejected; empty if it is not."""
         ...
 
     @property
@@ -101,36 +103,39 @@ class Weighed(Protocol):
 
     @property
     def reduced_chi2(self) -> float:
-        """Chi-square by degrees of freedom."""
+        """Chi-square over the degrees of freedom."""
         ...
 
     def rates(self, amplitude: F8) -> tuple[F8, F8]:
-        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
+        """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty, both in m/s."""
         ...
 
 
 def choose(fits: Mapping[str, Weighed], evidence: float, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:
-    """Return the selected law and the admissible ones, best first; of rejected laws the one that fits best.
+    """Return the selected law, and the admissible laws from best to worst.
+
+    If all laws are rejected, the law that fits best is selected and no law is admissible.
 
     Parameters
     ----------
     fits : mapping of str to fit
     evidence : float
-        A law whose BIC exceeds the best by more than this is not admissible.
+        A law is not admissible if its BIC exceeds the lowest BIC by more than this.
     span : callable
-        Gives the greatest and the least amplitude, m, that a law shows over the points.
+        Returns the largest and the smallest amplitude, m, of a law over the points.
 
     Notes
     -----
-    A law that holds the selected one as a special case is no other answer where its further coefficient gains it
-    nothing (its BIC is higher by more than 2) and where the damping it tells is, with twice its uncertainty, within a
-    tenth of the simpler law's at both ends of the span, which is taken to a third of the greatest amplitude where the
-    record ends before. It is left out. Where the record cannot exclude a tenth, it stays.
+    A law that contains the selected one as a special case is left out of the admissible laws on two conditions. Its
+    further coefficient improves nothing: its BIC is higher by more than 2. Its damping, with twice its uncertainty, is
+    within a tenth of the simpler law's at both ends of the span. The lower end of the span is at most a third of the
+    largest amplitude, even if the record ends earlier. The law stays if the record cannot exclude a difference of a
+    tenth.
     """
     allowed = [name for name in fits if not fits[name].rejected]
     count = {name: len(fit.law.parameters) for name, fit in fits.items()}
     if not allowed:
-        # A law of damping that does not fit is better than one that fits by driving the motion, if any damps.
+        # A damping law that does not fit is better than one that fits only because it drives the motion.
         damping = [name for name, fit in fits.items() if fit.rejection != "negative" and count[name] > 1]
         least = min(fits.values(), key=lambda fit: fit.bic).bic
         tolerable = [name for name in damping if fits[name].bic == least]

@@ -1,4 +1,4 @@
-"""Joint damping: does one law, with one set of coefficients, hold across several runs?"""
+"""Joint damping: does one law with one set of coefficients describe several runs?"""
 
 from __future__ import annotations
 
@@ -27,24 +27,25 @@ Rejection = Literal["", "misfit", "differ", "negative", "not converged"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointFit:
-    """One law with shared coefficients on all runs.
+    """The fit of one law to all runs, with common coefficients.
 
     Parameters
     ----------
     law : Law
     coefficients : Joint
-        What the runs share; empty for the law "none".
+        The common coefficients; empty for the law "none".
     amplitudes : tuple of Estimate
-        At the first sample used of each run, m.
+        Amplitude at the start of each run, m.
     chi2, dof : float
-        After correlation between points, of all runs together.
+        Chi-square and degrees of freedom of all runs together, reduced for the correlation between points.
     bic : float
-        Bayesian information criterion, up to a constant that all laws share.
+        Bayesian information criterion, up to a constant that is the same for all laws.
     excess_chi2, excess_dof : float
-        What sharing the coefficients costs against fitting every run by itself, and how many coefficients it saves.
+        The increase of chi-square over separate fits of the runs, and the number of coefficients saved.
     rejection : {"", "misfit", "differ", "negative", "not converged"}
-        Why the law does not hold across the runs, if so: chi-square is improbable; each run follows the law but their
-        coefficients differ; a coefficient is negative beyond three standard uncertainties; no convergence.
+        Why the law does not describe all runs, if it does not: chi-square is improbable; each run follows the law but
+        the coefficients differ; a parameter is negative by more than two standard uncertainties; the fit did not
+        converge.
     """
 
     law: Law
@@ -59,24 +60,24 @@ class JointFit:
 
     @property
     def rejected(self) -> bool:
-        """Whether the runs contradict one such law."""
+        """Whether the runs contradict one law with common coefficients."""
         return self.rejection != ""
 
     @property
     def reduced_chi2(self) -> float:
-        """Chi-square by degrees of freedom."""
+        """Chi-square over the degrees of freedom."""
         return self.chi2 / self.dof if self.dof > 0 else math.nan
 
     def rates(self, amplitude: F8) -> tuple[F8, F8]:
-        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
-        # A rate depends only on the coefficients, so any first amplitude will do.
+        """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty, both (n,) in m/s."""
+        # The rate depends only on the coefficients, so any start amplitude gives the same result.
         theta = np.concatenate([[1.0], self.coefficients.values])
         covariance = np.zeros((theta.size, theta.size))
         covariance[1:, 1:] = self.coefficients.covariance
         return rates_of(self.law, amplitude, theta, covariance)
 
     def span(self, times: Sequence[F8]) -> F8:
-        """Return the greatest and the least amplitude over all runs' times since their first samples, m."""
+        """Return the largest and the smallest amplitude of all runs, m, at times since the start of each run."""
         ends = [
             self.law.curve(np.array([0.0, float(t[-1])]), np.concatenate([[a.value], self.coefficients.values]))[0]
             for t, a in zip(times, self.amplitudes, strict=True)
@@ -86,19 +87,19 @@ class JointFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointDamping:
-    """What several runs say together about damping.
+    """The damping laws fitted to several runs together, and which of them the runs admit.
 
     Parameters
     ----------
     runs : tuple of str
-        Names.
+        Names of the runs.
     fits : mapping of str to JointFit
     selected : str
         As in :class:`pipeline.damping.select.Damping`.
     admissible : tuple of str
-        Laws that hold across all runs, best first; empty where none does.
+        Laws that describe all runs, from best to worst; empty if none does.
     message : str
-        One sentence.
+        The result in one sentence.
     """
 
     runs: tuple[str, ...]
@@ -109,18 +110,18 @@ class JointDamping:
 
     @property
     def best(self) -> JointFit:
-        """The selected law's fit."""
+        """The fit of the selected law."""
         return self.fits[self.selected]
 
     @property
     def one_law(self) -> bool:
-        """Whether one law with one set of coefficients holds across all runs."""
+        """Whether one law with one set of coefficients describes all runs."""
         return bool(self.admissible)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Points:
-    """The amplitudes of all runs, one after the other; ``parts`` are their places."""
+    """The amplitudes of all runs, concatenated; ``parts`` are the slices of the runs."""
 
     t: tuple[F8, ...]
     y: F8
@@ -134,9 +135,9 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
     Parameters
     ----------
     runs : sequence of (name, Demodulated, Damping)
-        Two at least, of one bob and disc: the coefficients go as one over the mass.
+        At least two runs with the same bob and disc, because the coefficients are inversely proportional to the mass.
     params : Params, optional
-        Of :func:`pipeline.damping.select.fit_damping`; laws that lack a fit in any run are left out.
+        Options of :func:`pipeline.damping.select.fit_damping`. Laws without a fit to every run are left out.
 
     Returns
     -------
@@ -149,16 +150,16 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
 
     Notes
     -----
-    The points and their uncertainties, excess scatter included, are those that each run's own fits used; each run's
-    chi-square is divided by its correlation length. The sum of the runs' own chi-squares under a law, subtracted from
-    that of the joint fit, tests whether the coefficients are the same: under that hypothesis the difference is
-    chi-square distributed with (runs - 1) times the number of coefficients.
+    The points and their uncertainties, including excess scatter, are those of the separate fits. The chi-square of each
+    run is divided by its correlation length. The chi-square of the joint fit, less the sum of those of the separate
+    fits, tests whether the coefficients of the runs are equal. If they are, the difference follows a chi-square
+    distribution whose degrees of freedom are (runs - 1) times the number of coefficients.
     """
     params = params or Params()
     if len(runs) < 2:
         raise AnalysisError(f"a joint fit needs two runs at least, got {len(runs)}")
     laws = {name: fit.law for _, _, damping in runs for name, fit in damping.fits.items()}
-    # Laws of one's own are wanted wherever they were fitted.
+    # User-defined laws are always included if they were fitted.
     allowed = {law if isinstance(law, str) else law.name for law in params.laws}
     wanted = [name for name in laws if name in allowed or name not in LAWS]
     shared = [name for name in wanted if all(name in damping.fits for _, _, damping in runs)]
@@ -166,7 +167,7 @@ def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params |
         raise AnalysisError("no damping law was fitted to every run; a joint fit has nothing to join")
     points = _points(runs)
     fits = {name: _fit(laws[name], runs, points, params) for name in shared}
-    # As for one run: a law whose parameters the windows do not determine states nothing.
+    # As for one run, a law is left out if the windows do not determine its parameters.
     fits = {name: fit for name, fit in fits.items() if math.isfinite(fit.chi2) and _determined(fit)}
     if not fits:
         raise AnalysisError("no damping law could be fitted to the runs together; fit them one by one")
@@ -189,7 +190,7 @@ def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
         kept = spread.kept
         times.append((demodulated.t - damping.t0)[kept])
         values.append(demodulated.amplitude[kept])
-        # Points that count as one share their information.
+        # Correlated points count as fewer points, so their uncertainties are increased.
         errors.append(spread.u[kept] * math.sqrt(spread.correlation))
         parts.append(slice(at, at + int(np.count_nonzero(kept))))
         at = parts[-1].stop
@@ -197,13 +198,13 @@ def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
 
 
 def _curve(law: Law, points: _Points, theta: F8) -> F8:
-    """Amplitudes of all runs, (n,); parameters are the runs' amplitudes, then the coefficients."""
+    """Return the amplitudes (n,) of all runs; ``theta`` contains the start amplitudes, then the coefficients."""
     count = len(points.t)
     return np.concatenate([law.curve(t, np.append(theta[run], theta[count:]))[0] for run, t in enumerate(points.t)])
 
 
 def _slopes(law: Law, points: _Points, theta: F8) -> F8:
-    """Their derivatives, (n, p)."""
+    """Return the derivatives (n, p) of the amplitudes of all runs by the parameters."""
     count = len(points.t)
     slopes = np.zeros((points.y.size, theta.size))
     for run, (t, part) in enumerate(zip(points.t, points.parts, strict=True)):
@@ -254,7 +255,7 @@ def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Po
 
 
 def _start(joints: Sequence[Joint]) -> F8:
-    """The runs' own amplitudes, and their coefficients' mean with weights by variance."""
+    """Return start values: the amplitudes of the separate fits, and the weighted means of their coefficients."""
     amplitudes = [joint.values[0] for joint in joints]
     coefficients = np.array([joint.values[1:] for joint in joints])
     weights = 1.0 / np.maximum([np.diag(joint.covariance)[1:] for joint in joints], 1e-300)
@@ -262,13 +263,13 @@ def _start(joints: Sequence[Joint]) -> F8:
 
 
 def _scaled(law: Law, theta: F8, length_m: float, count: int) -> F8:
-    """All parameters with lengths divided by ``length_m``."""
+    """Return all parameters in units of length of ``length_m`` metres."""
     coefficients = in_units(law, np.concatenate([[1.0], theta[count:]]), length_m=length_m)[1:]
     return np.concatenate([theta[:count] / length_m, coefficients])
 
 
 def _chi2(reduced: float, free: int) -> float:
-    """Chi-square of a run's own fit; nothing where it passes through its points."""
+    """Return the chi-square of the fit to one run; 0 if no degree of freedom is left."""
     return reduced * free if free > 0 else 0.0
 
 

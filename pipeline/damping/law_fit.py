@@ -1,4 +1,4 @@
-"""One damping law on one record: where its chi-square is least, and what follows from there with its uncertainty."""
+"""Fit of one damping law to one record: the minimum of chi-square, and results from it with their uncertainties."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ Rejection = Literal["", "misfit", "negative", "not converged"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Minimum:
-    """Where the fit of one law ended.
+    """The result of the fit of one law.
 
     Parameters
     ----------
     theta : (p,) float64
+        Parameters.
     covariance : (p, p) float64
-        :math:`(J^T J)^{-1}` from the points' standard uncertainties; infinite where they do not determine the law.
+        :math:`(J^T J)^{-1}` from the standard uncertainties of the points; infinite if they do not determine the law.
     chi2 : float
     converged : bool
     tried : str
-        What was tried, for a fit that did not converge.
+        What was tried if the fit did not converge.
     """
 
     theta: F8
@@ -44,28 +45,28 @@ class Minimum:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LawFit:
-    """One law on one record.
+    """The fit of one law to one record, and its test.
 
     Parameters
     ----------
     law : Law
     joint : Joint
-        Parameters, the amplitude at the first sample used in front.
+        Parameters with their covariance; the amplitude at the start is the first one.
     reduced_chi2 : float
-        Against noise and excess scatter.
+        Reduced chi-square, with noise and excess scatter as uncertainties.
     dof : float
-        Degrees of freedom after correlation between points.
+        Degrees of freedom, reduced for the correlation between points.
     bic : float
-        Bayesian information criterion, up to a constant that all laws share, of the law at its best without a
-        coefficient below zero.
+        Bayesian information criterion of the law's best fit without negative coefficients, up to a constant that is
+        the same for all laws.
     converged : bool
     rejection : {"", "misfit", "negative", "not converged"}
         Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative by more than two standard
         uncertainties, or the fit did not converge.
     tried : str
-        What was tried where the fit did not converge.
+        What was tried if the fit did not converge.
     widening : float
-        Factor on the covariance, of what a law that chi-square rejects leaves over what was expected.
+        Factor by which the covariance was multiplied because chi-square rejects the law; 1 if it does not.
     """
 
     law: Law
@@ -85,18 +86,19 @@ class LawFit:
 
     @property
     def name(self) -> str:
-        """The law's name."""
+        """The name of the law."""
         return self.law.name
 
     def drag_term(self, name: str) -> float | None:
         """Return a coefficient of friction ("mu"), linear ("gamma") or quadratic ("beta") drag.
 
-        None where the law lacks the term, or is no sum of these: another law's parameter may share the name.
+        Return None if the law lacks the term. Return None also if the law is no sum of these terms, because its
+        parameter of the same name is another quantity.
         """
         return self.joint[name].value if isinstance(self.law, Drag) and name in self.joint.names else None
 
     def amplitude(self, t: F8) -> F8:
-        """Return (n,) float64, m, at times since the first sample used, s."""
+        """Return the amplitudes (n,) in m at times (n,) in s since the start."""
         return self.law.curve(t, self.joint.values)[0]
 
     def u_amplitude(self, t: F8) -> F8:
@@ -106,15 +108,15 @@ class LawFit:
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def rates(self, amplitude: F8) -> tuple[F8, F8]:
-        """Return -dA/dt at amplitudes (n,) m, and its standard uncertainty, both (n,) float64, m/s."""
+        """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty, both (n,) in m/s."""
         return rates_of(self.law, amplitude, self.joint.values, self.joint.covariance)
 
     def rate_at_start(self) -> float:
-        """Return the logarithmic rate of the amplitude at the first sample, :math:`-\\dot A/A`, 1/s."""
+        """Return the damping rate at the start, :math:`-\\dot A/A`, 1/s."""
         return _relative_rate(self.law, self.joint.values)
 
     def by_parameters(self, f: Callable[[F8], F8 | float]) -> F8:
-        """Return the derivatives (p, ...) of a number or an array by the parameters of which it is a function."""
+        """Return the derivatives (p, ...) of a function, with a number or an array as its value, by the parameters."""
         return _slopes(f, self.joint.values, self.joint.covariance)
 
     def slopes_of_rate(self) -> F8:
@@ -134,14 +136,14 @@ def joint_of(law: Law, theta: F8, covariance: F8) -> Joint:
 
 
 def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
-    """Return a law's -dA/dt at amplitudes (n,) m, and its standard uncertainty, m/s."""
+    """Return -dA/dt of a law at amplitudes (n,) in m, and its standard uncertainty, both in m/s."""
     gradient = _slopes(lambda at: law.rate(amplitude, at), theta, covariance)
     variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
     return -law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def _slopes(f: Callable[[F8], F8 | float], theta: F8, covariance: F8) -> F8:
-    """Derivatives (p, ...) by central differences over a thousandth of each parameter's uncertainty."""
+    """Return derivatives (p, ...) by central differences with steps of a thousandth of each parameter's uncertainty."""
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     steps = np.maximum(1e-3 * u, 1e-7 * np.abs(theta))
     steps = np.where(steps > 0.0, steps, 1e-16)
@@ -150,26 +152,27 @@ def _slopes(f: Callable[[F8], F8 | float], theta: F8, covariance: F8) -> F8:
 
 
 def _relative_rate(law: Law, theta: F8) -> float:
-    """-dA/dt over A at the first amplitude, 1/s."""
+    """Return -dA/dt over A at the start, 1/s."""
     return -float(law.rate(theta[:1], theta)[0] / theta[0])
 
 
 def mean_squared_rate(fit: LawFit, amplitude: F8, weights: F8 | None = None) -> float:
-    """Return the mean by which drag lowers the square of the angular frequency, 1/s^2.
+    """Return the mean decrease of the squared angular frequency by drag, 1/s^2.
 
     Parameters
     ----------
     fit : LawFit
     amplitude : (n,) float64, m
-        Of the law; those that are 0 do not count.
+        Amplitudes of the law; those that are 0 are ignored.
     weights : (n,) float64, optional
-        The squares of the amplitudes if left out, as in a straight line through the phases of windows.
+        Weights; by default the squared amplitudes, as in the fit of a straight line to the phases of windows.
 
     Notes
     -----
-    With :math:`r(A) = -\\dot A` less dry friction it is taken as :math:`r r'/A`: :math:`\\gamma^2` for linear drag.
-    Friction lowers nothing, beside linear drag too: it moves the rest position of a half-cycle and not its duration.
-    Both are exact. For quadratic drag the exact motion has 1.85 :math:`(r/A)^2` in place of 2.
+    The decrease is calculated as :math:`r r'/A`, where :math:`r(A)` is :math:`-\\dot A` without dry friction. It is
+    :math:`\\gamma^2` for linear drag. Friction does not change the frequency, with linear drag or without: it moves the
+    rest position of a half-cycle but does not change its duration. Both statements are exact. For quadratic drag the
+    exact decrease is 1.85 :math:`(r/A)^2` instead of 2.
     """
     moving = amplitude != 0.0
     amplitude, weights = amplitude[moving], (amplitude**2 if weights is None else weights)[moving]
@@ -182,25 +185,26 @@ def mean_squared_rate(fit: LawFit, amplitude: F8, weights: F8 | None = None) -> 
 
 
 def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:
-    """Fit a law to points by weighted least squares, from the law's own guess.
+    """Fit a law to points by weighted least squares, starting from the law's own guess.
 
     Parameters
     ----------
     law : Law
-        With no more parameters than there are points.
+        A law with at most as many parameters as points.
     t, y, u : (n,) float64
         Times in s in ascending order, amplitudes and their standard uncertainties in m.
 
     Returns
     -------
     Minimum
-        Not finite where the law's numbers ran out of range.
+        The result of the fit; not finite if the numbers of the law overflowed.
 
     Notes
     -----
-    Amplitudes are counted in units of their root mean square, so that no power of a metre disturbs the search.
+    The search uses the root mean square of the amplitudes as the unit of length, so that the choice of metres does not
+    affect it.
     """
-    if len(law.parameters) == 1 and not law.rate(y, y[:1]).any():  # what stays as it is has a mean: nothing to search
+    if len(law.parameters) == 1 and not law.rate(y, y[:1]).any():  # a constant amplitude is a mean and needs no search
         line = solve_weighted(np.ones((t.size, 1)), y, u)
         return Minimum(line.values, line.covariance, line.chi2, True, "")
     length = math.sqrt(float(y @ y) / y.size) or 1.0

@@ -1,4 +1,4 @@
-"""Mixed drag: whether a recording needs two kinds of drag or friction together, even where no law fits."""
+"""Mixed drag: whether a recording needs two or more kinds of drag or friction together, even if no law fits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.damping.select import Damping, LawFit
 
 __all__ = ["MixedDrag", "Params", "find_mixed"]
 
-PRESENT = 3.0  # standard uncertainties above zero that a term must have: a probability of 0.0013 if it is truly zero
+PRESENT = 3.0  # minimum of a coefficient in standard uncertainties: a probability of 0.0013 if its true value is zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,9 +21,10 @@ class Params:
     Parameters
     ----------
     evidence : float
-        By how much the BIC of each law of one term must exceed that of the mixture; 10 is "very strong" [1]_.
+        Minimum by which the BIC of each law with one term must exceed that of the mixture; 10 is "very strong" [1]_.
     rival : float
-        The same for each other mixture, none of its terms negative, unless it only adds a term; 6 is "strong".
+        Minimum by which the BIC of each other mixture must exceed it; 6 is "strong". Mixtures that only add a term, or
+        have a term that is not significantly positive, are ignored.
 
     References
     ----------
@@ -37,14 +38,14 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MixedDrag:
-    """Terms of :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)` that a record demands together.
+    """Terms of :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)` that a record needs together.
 
     Parameters
     ----------
     fit : LawFit
-        Of the law of these terms; its uncertainties hold its misfit, if it has any.
+        Fit of the law with these terms; its uncertainties include its misfit, if chi-square rejects it.
     against : mapping of str to float
-        By how much the BIC of each law of one term is higher.
+        Difference in BIC between each law with one term and the mixture, by name.
     """
 
     fit: LawFit
@@ -52,7 +53,7 @@ class MixedDrag:
 
 
 def find_mixed(damping: Damping, params: Params | None = None) -> MixedDrag | None:
-    """Return the mixture that the amplitudes demand, None where one term may do or it is not clear which two.
+    """Return the mixture that the amplitudes need; None if one term may suffice or the mixture is ambiguous.
 
     Parameters
     ----------
@@ -61,11 +62,10 @@ def find_mixed(damping: Damping, params: Params | None = None) -> MixedDrag | No
 
     Notes
     -----
-    All coefficients must exceed zero by three standard uncertainties. Chi-square may reject the mixture, as it does
-    where the coefficients themselves change with the amplitude: then what it leaves takes the noise's place, in the
-    uncertainties and in every BIC (:attr:`pipeline.damping.select.LawFit.widening`). So a mixture that fits badly
-    needs laws
-    of one term that fit worse by far.
+    All coefficients must exceed zero by three standard uncertainties. Chi-square may reject the mixture, for example if
+    the coefficients change with the amplitude. The residuals of the mixture then replace the noise, in the
+    uncertainties and in every BIC (:attr:`pipeline.damping.select.LawFit.widening`). So a mixture that fits badly is
+    returned only if the laws with one term fit far worse.
     """
     params = params or Params()
     sums = [fit for fit in damping.fits.values() if isinstance(fit.law, Drag) and fit.dof > 0]
@@ -87,11 +87,11 @@ def _positive(fit: LawFit) -> bool:
 
 
 def _chi2(fit: LawFit) -> float:
-    """Chi-square on as many points as are independent."""
+    """Return chi-square, reduced for the correlation between points."""
     return fit.reduced_chi2 * fit.dof
 
 
 def _excess(fit: LawFit, best: LawFit) -> float:
-    """By how much the BIC of a law is higher, noise being what the best one leaves."""
+    """Return the difference in BIC between a law and the best one, with the residuals of the best one as noise."""
     fewer = len(best.law.parameters) - len(fit.law.parameters)
     return (_chi2(fit) - _chi2(best)) / best.widening - fewer * math.log(max(best.dof, 2.0))

@@ -1,4 +1,4 @@
-"""Damping: fit every law to the amplitudes, reject those the record contradicts, name those it admits."""
+"""Selection of damping laws: fit all laws to the amplitudes and reject those that the record contradicts."""
 
 from __future__ import annotations
 
@@ -27,26 +27,25 @@ class Params:
     Parameters
     ----------
     rejection : float
-        Probability at which chi-square rejects a law that is true.
+        Probability with which chi-square rejects a true law.
     evidence : float
-        A law whose BIC exceeds the best by more than this is not admissible; 6 is "strong" [1]_.
+        A law is not admissible if its BIC exceeds the lowest BIC by more than this; 6 is "strong" [1]_.
     laws : tuple of str or Law
-        The laws to try: names of :data:`pipeline.damping.laws.LAWS`, or laws of one's own, such as
-        :func:`pipeline.damping.laws.of_function.make_law` makes.
+        The laws to try: names in :data:`pipeline.damping.laws.LAWS`, or user-defined laws, for example from
+        :func:`pipeline.damping.laws.of_function.make_law`.
     stated : str, Law or None
-        The law that the user knows the damping to follow. It is selected whatever the others say of the record, and
-        results are stated by it alone; it is tried besides ``laws``, and the record may still contradict it.
+        The law that the damping follows, if the user knows it. It is tried in addition to ``laws`` and selected however
+        well other laws fit, and results are stated by it alone. The record may still contradict it.
     from_scene : bool
-        Whether a law that the scene states counts as stated, where none is given here.
+        Whether a law from the scene counts as stated if ``stated`` is None.
     otherwise : tuple of str or Law
-        The laws to try where the record rejects all of ``laws``, or knows a curvature of the decay that none of them
-        with one term makes, or leaves more than ``doubt`` allows: where few are tried to save time, a wrong one must
-        not be stated.
+        The laws to try instead if the record rejects all of ``laws``, needs both linear and quadratic drag, or fails a
+        test at the level ``doubt``. So no wrong law is stated if only a few laws are tried to save time.
     doubt : float
-        Probability at which a record that one of ``laws`` made has ``otherwise`` tried, by its chi-square or by a term
-        of linear and quadratic drag below zero.
+        Probability with which a record that follows one of ``laws`` still causes ``otherwise`` to be tried. The tests
+        are chi-square, and whether a coefficient of linear and quadratic drag together is negative.
     loosest_power : float
-        Standard uncertainty up to which a free power is stated: known powers lie between 0 and 2.
+        Maximum standard uncertainty of a free power that is stated: known powers lie between 0 and 2.
 
     References
     ----------
@@ -66,27 +65,27 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Damping:
-    """What the amplitudes say about damping.
+    """The damping laws fitted to a record, and which of them it admits.
 
     Parameters
     ----------
     t0 : float
-        Time of the first sample used, s; laws count from here.
+        Time at which the analysed part starts, s; laws count time from here.
     fits : mapping of str to LawFit
-        Every law tried that could be fitted.
+        Every law that could be fitted, by name.
     selected : str
-        The admissible law of lowest BIC; of all laws where every one is rejected. Where BIC differs by less than 2
-        ("not worth more than a bare mention") the law with fewer parameters, then the one listed first. A law that was
-        stated is selected wherever it could be fitted.
+        The admissible law with the lowest BIC, or the law that fits best if all are rejected (:func:`choose`). If the
+        BIC differs by less than 2 ("not worth more than a bare mention"), it is the law with fewer parameters, then the
+        law listed first. A stated law is always selected if it could be fitted.
     admissible : tuple of str
-        Laws the record does not contradict and whose evidence is within reach of the best, best first; without those
-        that repeat a simpler one (:func:`choose`).
+        Laws that the record does not contradict and whose BIC is near the lowest, from best to worst. Laws that are
+        equivalent to a simpler one are left out (:func:`choose`).
     scatter : Scatter
-        Of the amplitudes about a smooth curve.
+        Scatter of the amplitudes about a smooth curve.
     unfitted : mapping of str to str
-        Why a law asked for has no fit.
+        The reason why a law has no fit, by name.
     stated : str
-        Name of the law that the user stated; empty where none was.
+        Name of the law that the user stated; empty if none was stated.
     """
 
     t0: float
@@ -99,14 +98,14 @@ class Damping:
 
     @property
     def by_statement(self) -> bool:
-        """Whether the selected law is one that the user stated, and no choice of the record's."""
+        """Whether the user stated the selected law, so that the record did not select it."""
         return bool(self.stated) and self.selected == self.stated
 
     @property
     def ahead(self) -> bool:
-        """Whether the selected law is clearly ahead: every other law that is admissible needs more coefficients.
+        """Whether the selected law is clearly ahead: every other admissible law needs more coefficients.
 
-        Not of a law without any, nor of one that the record rejects.
+        It is False if the selected law has no coefficients, or if the record rejects it.
         """
         count = len(self.best.law.parameters)
         others = (len(self.fits[name].law.parameters) for name in self.admissible if name != self.selected)
@@ -114,26 +113,26 @@ class Damping:
 
     @property
     def best(self) -> LawFit:
-        """The selected law's fit."""
+        """The fit of the selected law."""
         return self.fits[self.selected]
 
     @property
     def considered(self) -> Mapping[str, LawFit]:
-        """The fits that an average over laws may draw on: the selected one and the admissible ones."""
+        """The fits of the selected law and of the admissible laws."""
         return {name: self.fits[name] for name in dict.fromkeys((self.selected, *self.admissible))}
 
     @property
     def settled(self) -> bool:
-        """Whether the selected law is the only admissible one, so that its coefficients mean something."""
+        """Whether the selected law is the only admissible one, so that its coefficients are meaningful."""
         return self.admissible == (self.selected,)
 
     def of_powers(self, *powers: int) -> LawFit | None:
-        """Return the fit of the law whose rate has these powers of the amplitude, each with a coefficient."""
+        """Return the fit of the law whose rate has exactly these powers of the amplitude; None if it has no fit."""
         fits = (fit for fit in self.fits.values() if isinstance(fit.law, Drag) and set(fit.law.powers) == set(powers))
         return next(fits, None)
 
     def squared_rate(self, t: F8) -> float:
-        """Return by how much drag lowers the square of the angular frequency over times t (n,), s, 1/s^2.
+        """Return the mean decrease of the squared angular frequency by drag, 1/s^2, at times t (n,) in s.
 
         See :func:`pipeline.damping.law_fit.mean_squared_rate`.
         """
@@ -147,7 +146,7 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     ----------
     demodulated : Demodulated
     t0 : float
-        Time of the first sample used, s.
+        Time at which the analysed part starts, s.
     params : Params, optional
 
     Returns
@@ -157,29 +156,30 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     Raises
     ------
     AnalysisError
-        If no law can be fitted at all.
+        If no law can be fitted.
 
     Notes
     -----
-    Real amplitudes scatter more than their noise says (beats with a sideways mode, clusters of false echoes).
-    The excess is measured against a smooth curve that no law restricts, so that a wrong law cannot hide its misfit
-    in it; where friction stops the motion at a corner that no smooth curve follows, a law that leaves less than
-    half of it takes the curve's place. Points that are correlated count as fewer: chi-square, BIC and degrees of
-    freedom are divided and the covariance is multiplied by the correlation length. The covariance of a law that
-    chi-square rejects is by its own residuals: times its reduced chi-square, and with their correlation length.
+    Real amplitudes scatter more than their noise, for example because of beats with a sideways mode or clusters of
+    false echoes. The excess scatter is measured about a smooth curve that is independent of all laws, so that a wrong
+    law cannot hide its misfit in it. If friction stops the motion, the decay has a corner that no smooth curve
+    follows. A law whose residuals are less than half as large then replaces the curve. Correlated points count as fewer
+    points: chi-square, BIC and degrees of freedom are divided by the correlation length, and the covariance is
+    multiplied by it. If chi-square rejects a law, its covariance comes from its own residuals: it is multiplied by the
+    reduced chi-square, and the correlation length is that of the residuals.
 
-    Coefficients of drag are not negative, yet their estimates may be by chance, and unbounded estimates are unbiased
-    with intervals that hold. So fits are unbounded; a law with a coefficient below zero by more than two standard
-    uncertainties is rejected; and the BIC is that of the law's best without negative coefficients, which lies in one
+    Drag coefficients are not negative, but their estimates may be by chance; only unbounded estimates are unbiased and
+    have correct intervals. So the fits are unbounded. A law is rejected if a coefficient is negative by more than two
+    standard uncertainties. The BIC is that of the law's best fit without negative coefficients, which is that of one
     of its special cases.
     """
     params = params or Params()
     t, amplitude = demodulated.t - t0, demodulated.amplitude
     noise = np.sqrt(demodulated.covariance[:, 0, 0])
     if t.size < 3:
-        # One or two points show no law: what the amplitude lost since the start is then its uncertainty.
+        # One or two points determine no law: the decrease of the amplitude since the start then counts as uncertainty.
         noise = np.hypot(noise, amplitude * demodulated.decay * t)
-    # Perfect data still carry rounding: without a floor chi-square would divide by nothing.
+    # Even computed data contain rounding errors: without a minimum noise, chi-square would divide by zero.
     noise = np.maximum(noise, 1e-12 * float(np.max(amplitude)) + 1e-100)
     points = _Points(t0, t, amplitude, noise, scatter(t, amplitude, noise))
     found = _fit_laws(points, params.laws, params)
@@ -188,9 +188,9 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
 
 
 def select_law(fits: Mapping[str, LawFit], params: Params, last_s: float) -> tuple[str, tuple[str, ...], str]:
-    """Return the selected law, the admissible ones and the stated one, of a record that lasts ``last_s`` seconds.
+    """Return the selected law, the admissible laws and the stated law, for a record of ``last_s`` seconds.
 
-    A stated law is selected if it has a fit, and then it alone is admissible, or none is where the record rejects it.
+    A stated law is selected if it has a fit. It is then the only admissible law, or no law is if the record rejects it.
     """
     stated = "" if params.stated is None else find_law(params.stated).name
     if stated in fits:
@@ -200,7 +200,7 @@ def select_law(fits: Mapping[str, LawFit], params: Params, last_s: float) -> tup
 
 
 def _curved(damping: Damping, doubt: float) -> bool:
-    """Whether the decay bends as neither linear nor quadratic drag can bend it; other laws may also explain it."""
+    """Return whether the decay has a curvature that neither linear nor quadratic drag explains alone."""
     mixed, best = damping.of_powers(1, 2), damping.best
     if best is mixed or (best.dof > 0 and best.reduced_chi2 * best.dof > chi2_quantile(1.0 - doubt, best.dof)):
         return True
@@ -212,7 +212,7 @@ def _curved(damping: Damping, doubt: float) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Points:
-    """Amplitudes (n,) at times (n,) since t0, their noise, their scatter, and the laws fitted to them so far."""
+    """Amplitudes (n,) at times (n,) since t0, their noise and scatter, and the fits of laws made so far."""
 
     t0: float
     t: F8
@@ -222,7 +222,7 @@ class _Points:
     minima: dict[str, Minimum] = field(default_factory=dict)
 
     def minimum(self, law: Law) -> Minimum:
-        """Return the fit of a law, which is made once."""
+        """Return the fit of a law, which is calculated only once."""
         if law.name not in self.minima:
             kept = self.spread.kept
             self.minima[law.name] = minimum_of(law, self.t[kept], self.amplitude[kept], self.spread.u[kept])
@@ -230,7 +230,7 @@ class _Points:
 
 
 def _fit_laws(points: _Points, wanted: Sequence[str | Law], params: Params) -> Damping:
-    """Fit some of the laws and choose among them."""
+    """Fit some laws and select among them."""
     unfitted: dict[str, str] = {}
     every = [find_law(law) for law in wanted]
     if params.stated is not None and (known := find_law(params.stated)).name not in [law.name for law in every]:
@@ -258,7 +258,7 @@ def _affordable(wanted: Sequence[Law], points: int, unfitted: dict[str, str]) ->
 
 
 def _weigh_all(laws: Sequence[Law], points: _Points, params: Params, unfitted: dict[str, str]) -> dict[str, LawFit]:
-    """Fit the laws; those whose numbers ran out of range, which no law with a chance does, are listed as unfitted."""
+    """Fit the laws and test each against the points; laws without a usable fit are added to ``unfitted``."""
     spread = points.spread
     t, y, u = points.t[spread.kept], points.amplitude[spread.kept], spread.u[spread.kept]
     sound = {}
@@ -279,15 +279,15 @@ def _weigh_all(laws: Sequence[Law], points: _Points, params: Params, unfitted: d
 
 
 def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
-    """Return a law that does not fit with uncertainties by its own residuals: their size and how they hang together."""
-    # A law that runs away between its fit's points and these has no residuals to go by.
+    """Return a rejected fit with uncertainties from the size and the correlation length of its own residuals."""
+    # If the law is not finite at these points, it has no residuals to use.
     own = correlation_length(residual) if np.isfinite(residual).all() else correlation
     widening = fit.reduced_chi2 * max(own / correlation, 1.0)
     return replace(fit, joint=replace(fit.joint, covariance=widening * fit.joint.covariance), widening=widening)
 
 
 def _astray(law: Law, fit: Minimum, t: F8, y: F8, loosest_power: float) -> str | None:
-    """Why a fit's numbers are of no use."""
+    """Return why a fit is not usable; None if it is."""
     top = float(np.max(y))
     if not 1e-3 * top <= fit.theta[0] <= 1e3 * top or not math.isfinite(fit.chi2):
         return "its numbers ran out of range"
@@ -302,13 +302,13 @@ def _astray(law: Law, fit: Minimum, t: F8, y: F8, loosest_power: float) -> str |
     end = t[-1:] + 0.5 * np.max(np.diff(t), initial=0.0)
     with np.errstate(all="ignore"):
         growth = law.rate(y, fit.theta) * (t[-1] - t[0])
-        # A growth that outruns the record by e^20 is a fit gone astray, and so is a pole within it.
+        # A fit has failed if its growth rate times the duration exceeds 20 times the largest amplitude, or at a pole.
         astray = np.any(growth > 20.0 * top) or not np.isfinite(law.curve(end, fit.theta)[0][0])
     return "its numbers ran out of range" if astray else None
 
 
 def _corner(fits: Mapping[str, LawFit], points: _Points) -> Scatter | None:
-    """The scatter about a law that follows the points much closer than the smooth curve does, if there is one."""
+    """Return the scatter about a law that fits the points much better than the smooth curve; None if none does."""
     fit = min(fits.values(), key=lambda fit: fit.reduced_chi2)
     if points.spread.excess == 0.0 or not fit.reduced_chi2 < 0.25:
         return None

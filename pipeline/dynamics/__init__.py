@@ -1,8 +1,8 @@
-"""The equation of motion, the integrators that solve it, and the step halving that shows their error.
+"""The equation of motion, the integrators that solve it, and the step halving that estimates their error.
 
-In: a scene, or an equation with an initial state. Out: a trajectory with its stated error (``halving.py``). To add an
-integrator, add one entry to ``methods.py`` and to ``INTEGRATORS``; it must pass tests/conformance/test_integrators.py
-under its name.
+Input: a scene, or an equation with an initial state. Output: a trajectory with its stated error (``halving.py``). To
+add an integrator, add one entry to ``methods.py`` and one to ``INTEGRATORS``; it must pass
+tests/conformance/test_integrators.py under its name.
 
 Examples
 --------
@@ -44,7 +44,7 @@ def get_integrator(name: str) -> Integrator:
     Raises
     ------
     DynamicsError
-        For a name that none has; the message lists them.
+        For an unknown name; the message lists the allowed names.
     """
     if name not in INTEGRATORS:
         raise DynamicsError(f"unknown method {name!r}; allowed are auto, {', '.join(INTEGRATORS)}")

@@ -1,4 +1,4 @@
-"""The averaged law of the amplitude, dA/dt = -(mu + gamma A + beta A^2): its course, and when friction ends it."""
+"""The averaged amplitude law dA/dt = -(mu + gamma A + beta A^2): its solution, and the time when friction ends it."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ __all__ = ["amplitude", "stopping_time"]
 
 
 def amplitude(start: float, gamma: float, beta: float, mu: float, t: F8) -> F8:
-    """Return A(t) of dA/dt = -(mu + gamma A + beta A^2), 0 once it has stopped.
+    """Return the solution A(t) of dA/dt = -(mu + gamma A + beta A^2), which is 0 after the motion has stopped.
 
     Parameters
     ----------
     start : float, m
+        Amplitude at t = 0.
     gamma, beta, mu : float
-        1/s, 1/(m s), m/s.
+        Coefficients in 1/s, 1/(m s) and m/s.
     t : (n,) float64, s
 
     Returns
     -------
     (n,) float64, m
-        By the closed form of :mod:`pipeline.damping.laws.drag`.
+        Amplitudes from the closed form of :mod:`pipeline.damping.laws.drag`.
 
     Raises
     ------
     DynamicsError
-        If products of the coefficients leave the range of numbers.
+        If products of the coefficients overflow.
 
     Examples
     --------
@@ -46,12 +47,12 @@ def amplitude(start: float, gamma: float, beta: float, mu: float, t: F8) -> F8:
 
 
 def stopping_time(start: float, gamma: float, beta: float, mu: float) -> float:
-    """Return when the amplitude reaches 0, s; inf without friction.
+    """Return the time at which the amplitude reaches 0 in s; inf if it never does, as without friction.
 
     Notes
     -----
     The numerator of the closed form is 0 where :math:`\\tanh(\\kappa t)/\\kappa = A_0/(\\mu + \\gamma A_0/2)` with
-    :math:`\\kappa^2 = \\gamma^2/4 - \\beta\\mu`, with tan in place of tanh if that is negative.
+    :math:`\\kappa^2 = \\gamma^2/4 - \\beta\\mu`. If :math:`\\kappa^2` is negative, tan replaces tanh.
 
     Examples
     --------
@@ -59,7 +60,7 @@ def stopping_time(start: float, gamma: float, beta: float, mu: float) -> float:
     5.0
     """
     pull = mu + 0.5 * gamma * start
-    # A negative rate, as of a method that adds energy, may outgrow friction: then it never stops.
+    # A negative decay rate, as of a method that adds energy, can exceed friction; then the motion never stops.
     if not (mu > 0.0 and pull > 0.0 and mu + (gamma + beta * start) * start > 0.0):
         return math.inf
     square = 0.25 * gamma * gamma - mu * beta

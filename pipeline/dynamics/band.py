@@ -1,7 +1,7 @@
-"""The band that a scene's uncertainties make around its motion: the quantiles of members drawn from them.
+"""The uncertainty band around the motion of a scene: quantiles of an ensemble drawn from the scene's uncertainties.
 
-Where amplitude and phase change in proportion to each input the members are moved by linear propagation; where they do
-not, as friction stops each bob elsewhere, each is solved.
+If amplitude and phase change in proportion to each input, the members follow from linear propagation. Otherwise, for
+example if friction stops each bob at a different place, every member is solved.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ from pipeline.track import F8
 __all__ = ["LEVELS", "Band", "draw", "spread", "uncertain"]
 
 LEVELS = ("low_95", "low_68", "high_68", "high_95")
-SHARES = (0.025, 0.158655, 0.841345, 0.975)  # of the members below each
-MEMBERS = 800  # the share beyond an edge of 95 % then scatters by half a percent
-RADIANS = 0.2  # a step of Strang splitting: its error is that of all members alike, and leaves their differences
-MOST_STEPS = 50_000
-MEMBERS_MOVED = 2500  # where sensitivities move them, which costs less
-REACH = 4.0  # uncertainties
-TURNS_COST = 5  # times as long a step takes where friction asks for every turning point
+SHARES = (0.025, 0.158655, 0.841345, 0.975)  # share of the members below each level
+MEMBERS = 800  # default ensemble size; the share beyond an edge of the 95 % band then scatters by half a percent
+RADIANS = 0.2  # step of Strang splitting in rad; its error is common to all members and cancels in differences
+MOST_STEPS = 50_000  # maximum number of steps of a band
+MEMBERS_MOVED = 2500  # minimum ensemble size with linear propagation, which costs less
+REACH = 4.0  # minimum ratio of a nonnegative quantity to its uncertainty for linear propagation
+TURNS_COST = 5  # ratio of the times of a step with friction, which locates turning points, and without
 SIGNED = ("start_displacement_m", "start_velocity_m_per_s", "spring_cubic_n_per_m3", "air_temperature_c")
 POSITIVE = ("bob_mass_kg", "spring_constant_n_per_m")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Band:
-    """Quantiles of an ensemble about the motion that the scene's values give.
+    """Quantiles of an ensemble, relative to the motion for the scene's values.
 
     Parameters
     ----------
     quantities : tuple of str
         The scene's attributes that are uncertain.
     members, seed : int
-        Of the ensemble.
+        Number of members and random seed of the ensemble.
     t : (n,) float64, s
     amplitude : (n,) float64, m
-        :math:`\\sqrt{y^2 + (v/\\omega_0)^2}` of the scene's values.
+        :math:`\\sqrt{y^2 + (v/\\omega_0)^2}` for the scene's values.
     of_displacement, of_amplitude, of_phase : (4, n) float64, m, m and rad
-        The quantiles of :data:`LEVELS` less what the scene's values give.
+        The quantiles at :data:`LEVELS` minus the result for the scene's values.
     sensitivity : Sensitivity
-        What each quantity contributes.
+        Contribution of each quantity.
     linear : bool
-        Whether the members are moved by these sensitivities; else each is solved.
+        Whether the members follow from these sensitivities; otherwise each member was solved.
     """
 
     quantities: tuple[str, ...]
@@ -68,45 +68,48 @@ class Band:
 
     @property
     def relative_u(self) -> float:
-        """Largest half width of the 68 % of the displacement over the starting amplitude; 0 where that is 0."""
+        """Maximum half width of the displacement's 68 % band, relative to the starting amplitude; 0 if that is 0."""
         half = 0.5 * float(np.max(self.of_displacement[2] - self.of_displacement[1]))
         return half / float(self.amplitude[0]) if self.amplitude[0] > 0.0 else 0.0
 
     @property
     def words(self) -> str:
-        """How it was made, of what."""
+        """Description of the method and of the uncertain quantities."""
         how = "by linear propagation of" if self.linear else f"{self.members} motions drawn from"
         return f"{how} the uncertainties of {', '.join(self.quantities)}"
 
     def displacement_at(self, t: F8) -> F8:
-        """Return the quantiles (4, k) of the displacement less that of the scene's values, m, at times (k,), s."""
+        """Return quantiles (4, k) in m of the displacement minus that for the scene's values, at times t (k,) in s."""
         return self._between(self.of_displacement, t)
 
     def amplitude_at(self, t: F8) -> tuple[F8, F8]:
-        """Return the amplitude (k,) of the scene's values and its quantiles (4, k), m, at times (k,), s."""
+        """Return the amplitude for the scene's values (k,) and its quantiles (4, k) in m, at times t (k,) in s."""
         middle = self._between(self.amplitude, t)
         return middle, middle + self._between(self.of_amplitude, t)
 
     def phase_at(self, t: F8) -> F8:
-        """Return the quantiles (4, k) of the phase less that of the scene's values, rad, at times (k,), s."""
+        """Return quantiles (4, k) in rad of the phase minus that for the scene's values, at times t (k,) in s."""
         return self._between(self.of_phase, t)
 
     def _between(self, curves: F8, t: F8) -> F8:
-        """Interpolate, held before and after: where friction holds many bobs a chord would leave out 2 % of them."""
+        """Interpolate curves by cubic splines, with constant values before the first and after the last time.
+
+        If friction holds many bobs, linear interpolation would leave 2 % of them out of the band.
+        """
         from scipy.interpolate import CubicSpline
 
         return np.asarray(CubicSpline(self.t, curves, axis=-1)(np.clip(t, self.t[0], self.t[-1])))
 
 
 def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
-    """Return what of a scene has an uncertainty and moves its bob.
+    """Return the quantities of a scene that are uncertain and affect the motion of its bob.
 
     Parameters
     ----------
     scene : Scene
-        Its quantities are taken as independent.
+        The scene; its quantities are assumed to be independent.
     measured : Joint, optional
-        Of some of the scene's attributes together, in place of the scene's own uncertainties.
+        Joint estimate of some of the scene's attributes, which replaces the scene's own values and uncertainties.
     """
     together = measured or Joint((), np.empty(0), np.empty((0, 0)), ())
     alone: dict[str, Estimate] = {}
@@ -127,27 +130,28 @@ def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
 
 
 def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS, seed: int = 0) -> list[Problem]:
-    """Return an ensemble of problems: that of the scene's values, then members drawn from its uncertainties.
+    """Return an ensemble of problems: first that of the scene's values, then members drawn from its uncertainties.
 
     Parameters
     ----------
     scene, measured
-        As in :func:`uncertain`. A measured spring constant stands for a measured frequency: its uncertainty is what the
-        frequency adds, and it goes with the drawn masses.
+        As in :func:`uncertain`. A measured spring constant represents a measured frequency: its uncertainty is that
+        from the frequency alone, and its value is scaled in proportion to the drawn masses.
     members, seed : int
+        Number of members and random seed.
 
     Raises
     ------
     SceneError
-        If the scene lacks what a motion needs.
+        If the scene lacks a value that a motion requires.
     DynamicsError
-        If mass or spring constant may as well be 0, or a member cannot move.
+        If a mass or spring constant is drawn as 0 or less, or a member gives no valid problem.
 
     Notes
     -----
-    Normal distributions on a Latin hypercube [1]_: each quantity falls once into each of as many shares of equal
-    probability as there are members, which leaves quantiles less to chance than independent draws. Below 0, where a
-    quantity cannot be, it is drawn as 0.
+    The quantities are normally distributed and drawn on a Latin hypercube [1]_. The range of each quantity is divided
+    into as many intervals of equal probability as there are members, and each interval is drawn once. Quantiles then
+    scatter less than with independent draws. Negative draws of a quantity that cannot be negative are set to 0.
 
     References
     ----------
@@ -160,13 +164,13 @@ def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS,
 
 
 def _normal(joint: Joint, members: int, seed: int) -> F8:
-    """Standard normal numbers (members, k) with the correlations of a joint, on a Latin hypercube."""
+    """Return standard normal numbers (members, k) with the correlations of a joint estimate, on a Latin hypercube."""
     from scipy.special import ndtri
 
     u = np.sqrt(np.diag(joint.covariance))
     correlation = _correlation(joint) + 1e-12 * np.eye(
         u.size
-    )  # a correlation of 1 needs it: its matrix has no Cholesky factor
+    )  # required for a correlation of 1, whose singular matrix has no Cholesky factor
     shares = np.tile((np.arange(members) + 0.5) / members, (u.size, 1))
     normal = ndtri(np.random.default_rng(seed).permuted(shares, axis=1))
     return np.asarray((np.linalg.cholesky(correlation) @ normal).T)
@@ -181,7 +185,7 @@ def _correlation(joint: Joint) -> F8:
 
 
 def _member(scene: Scene, joint: Joint, measured: Joint | None, values: list[float]) -> Problem:
-    """One member, its uncertain quantities as drawn."""
+    """Return one member with the drawn values of the uncertain quantities."""
     member = replace(scene, **_limited(joint, values))
     if measured is not None and "spring_constant_n_per_m" in measured.names:
         constant = member.spring_constant_n_per_m
@@ -207,14 +211,14 @@ def spread(
     scene, measured, members, seed
         As in :func:`draw`.
     seconds : float
-        How long, s.
+        Duration, s.
     ensemble : bool
-        Solve every member, even where linear propagation holds.
+        Solve every member even if linear propagation is valid.
 
     Raises
     ------
     SceneError, DynamicsError
-        As :func:`draw`; and if the run is longer than 50,000 steps of a fifth of a radian, with friction 10,000.
+        As in :func:`draw`, and if the run exceeds 50,000 steps of 0.2 rad (10,000 steps with friction).
     """
     joint = uncertain(scene, measured)
     middle = Problem.from_scene(scene)
@@ -238,7 +242,7 @@ def spread(
 
 
 def _shifted(scene: Scene, joint: Joint, measured: Joint | None) -> list[Problem]:
-    """For each quantity the problems with it larger and smaller by its uncertainty, the others where they are."""
+    """Return two problems per quantity: with the quantity alone increased, then decreased, by its uncertainty."""
     found = []
     for row, u in enumerate(np.sqrt(np.diag(joint.covariance)).tolist()):
         for sign in (1.0, -1.0):
@@ -249,7 +253,7 @@ def _shifted(scene: Scene, joint: Joint, measured: Joint | None) -> list[Problem
 
 
 def _reaches_zero(joint: Joint) -> bool:
-    """Whether what cannot be negative is drawn as 0 now and then."""
+    """Return whether a quantity that cannot be negative is near enough to 0 for some draws to be set to 0."""
     u = np.sqrt(np.diag(joint.covariance))
     return any(
         name not in SIGNED and value < REACH * each
@@ -258,9 +262,10 @@ def _reaches_zero(joint: Joint) -> bool:
 
 
 def _moved(found: Sensitivity, correlation: F8, normal: F8) -> Iterator[tuple[F8, F8, F8]]:
-    """Quantiles that the sensitivities make, a stretch at a time: of the displacement from members that they move.
+    """Yield the quantiles from linear propagation for successive blocks of steps.
 
-    Phase and logarithm of the amplitude are sums of normal inputs: their quantiles are known.
+    The quantiles of the displacement are those of members computed with the sensitivities. Phase and logarithm of the
+    amplitude are sums of normal inputs, so that their quantiles follow in closed form.
     """
     from scipy.special import ndtri
 
@@ -275,7 +280,7 @@ def _moved(found: Sensitivity, correlation: F8, normal: F8) -> Iterator[tuple[F8
 
 
 def _solved(ensemble: list[Problem], step_s: float, steps: int) -> Iterator[tuple[F8, F8, F8]]:
-    """Quantiles of members that are solved, a stretch at a time."""
+    """Yield the quantiles of solved members for successive blocks of steps."""
     last: F8 = np.zeros((len(ensemble) - 1, 1))
     for states in solved(ensemble, step_s, steps):
         turned = np.angle(states[1:] * np.conj(states[0]))
@@ -289,12 +294,12 @@ def _solved(ensemble: list[Problem], step_s: float, steps: int) -> Iterator[tupl
 
 
 def _quantiles(members: F8, middle: F8) -> F8:
-    """Quantiles (4, n) of members less the middle; the hypercube's shares begin as Hazen's do."""
+    """Return the quantiles (4, n) of members minus the middle, by Hazen's method, which matches the hypercube."""
     return np.asarray(np.quantile(members, SHARES, axis=0, method="hazen") - middle)
 
 
 def _limited(joint: Joint, values: list[float]) -> dict[str, Any]:
-    """What is drawn, by the scene's attributes, within what it can be."""
+    """Return the drawn values by attribute of the scene, with negative values set to 0 where they are impossible."""
     found = {}
     for name, value, unit in zip(joint.names, values, joint.units, strict=True):
         if name in POSITIVE and value <= 0.0:

@@ -2,7 +2,7 @@
 
 .. math:: \\ddot y = -\\omega_0^2 y - 2\\gamma\\dot y - b|\\dot y|\\dot y - f\\,\\mathrm{sign}(\\dot y) - c y^3
 
-Friction holds a bob that rests where the spring pulls with less than f.
+Friction holds a bob at rest if the pull of the spring per mass is at most f.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from pipeline.errors import DynamicsError
 __all__ = ["Equation", "Real", "double"]
 
 Real = Any
-"""A float, or an array of such for several states or steps."""
+"""A float, or an array of floats for several states or steps."""
 
-_AMPLITUDE_TO_DRAG = 3.0 * math.pi / 4.0  # b = (3 pi / 4) beta / omega, from energy lost per cycle
+_AMPLITUDE_TO_DRAG = 3.0 * math.pi / 4.0  # b = (3 pi / 4) beta / omega, from the energy loss per cycle
 _LARGEST, _SMALLEST = 1e100, 1e-100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Equation:
-    """The coefficients.
+    """The coefficients of the equation of motion.
 
     Parameters
     ----------
     angular_frequency_per_s : float, 1/s
-        Of the undamped, infinitely small motion; positive.
+        Angular frequency :math:`\\omega_0` of the undamped motion at infinitesimal amplitude; positive.
     gamma_per_s : float, 1/s
-        Half the viscous force per mass and speed; 0 or more.
+        Viscous drag :math:`\\gamma`: half the force per mass and speed; 0 or more.
     drag_per_m : float, 1/m
-        The quadratic force per mass and squared speed; 0 or more.
+        Quadratic drag b: the force per mass and squared speed; 0 or more.
     friction_m_per_s2 : float, m/s^2
-        The friction force per mass; 0 or more.
+        Friction f: the force per mass; 0 or more.
     cubic_per_m2_s2 : float, 1/(m^2 s^2)
-        The spring's hardening (positive) or softening (negative).
+        Cubic coefficient c of a hardening (positive) or softening (negative) spring.
     """
 
     angular_frequency_per_s: float
@@ -64,7 +64,7 @@ class Equation:
 
     @property
     def is_linear(self) -> bool:
-        """Whether spring and viscous drag are all there is."""
+        """Whether a linear spring and viscous drag are the only forces."""
         return not (self.drag_per_m or self.friction_m_per_s2 or self.cubic_per_m2_s2)
 
     @property
@@ -78,16 +78,16 @@ class Equation:
         return pull + self.cubic_per_m2_s2 * y * y * y if self.cubic_per_m2_s2 else pull
 
     def direction(self, y: float, v: float) -> int:
-        """Return which way a bob moves, or would from rest: 1, -1, or 0 where friction holds it."""
+        """Return the direction in which a bob moves or starts from rest: 1, -1, or 0 if friction holds it."""
         if v:
             return 1 if v > 0 else -1
         pull = self.spring(y)
         return 0 if abs(pull) <= self.friction_m_per_s2 else -1 if pull > 0 else 1
 
     def laws(self) -> tuple[float, float, float]:
-        """Return gamma (1/s), beta (1/(m s)) and mu (m/s) of the averaged dA/dt = -(mu + gamma A + beta A^2).
+        """Return gamma (1/s), beta (1/(m s)) and mu (m/s) of the averaged law dA/dt = -(mu + gamma A + beta A^2).
 
-        One that is too large for a number is inf.
+        A coefficient that overflows is inf.
         """
         omega = self.angular_frequency_per_s
         return (
@@ -106,12 +106,12 @@ class Equation:
         mu_m_per_s: float = 0.0,
         cubic_per_m2_s2: float = 0.0,
     ) -> Equation:
-        """Return the equation whose average is dA/dt = -(mu + gamma A + beta A^2).
+        """Return the equation whose averaged amplitude law is dA/dt = -(mu + gamma A + beta A^2).
 
         Notes
         -----
-        A force F per mass takes :math:`\\oint F\\,dy` from the energy :math:`\\omega^2A^2/2` in a cycle. For
-        :math:`2\\gamma\\dot y`, :math:`b\\dot y^2` and :math:`f` that makes
+        In each cycle a force F per mass takes :math:`\\oint F\\,dy` from the energy per mass :math:`\\omega^2A^2/2`.
+        For the forces :math:`2\\gamma\\dot y`, :math:`b\\dot y^2` and :math:`f` the resulting law is
         :math:`\\dot A = -(2f/\\pi\\omega + \\gamma A + (4\\omega/3\\pi)\\,b A^2)` [1]_.
 
         References
@@ -133,14 +133,14 @@ class Equation:
 
 
 def double(given: Any, name: str) -> float:
-    """Return one finite number as a float; narrower floats are refused, as their rounding shows.
+    """Return one finite number as a float; floats below double precision are refused because of their rounding.
 
     Raises
     ------
     DynamicsError
-        For what is no number, not finite, or of less than double precision; the message begins with ``name``.
+        If the value is not a single number, not finite, or below double precision; the message begins with ``name``.
     """
-    if type(given) is float and math.isfinite(given):  # nearly always, and an array takes ten times as long
+    if type(given) is float and math.isfinite(given):  # the usual case; conversion to an array takes ten times as long
         return given
     array = np.asarray(given)
     if array.dtype.kind == "f" and array.dtype.itemsize < 8:

@@ -1,7 +1,7 @@
-"""The exact propagator: a linear scene needs no approximation.
+"""The exact propagator: the analytic solution of a linear scene.
 
-By hand, as no library evaluates it: scipy.signal.lfilter has the same recurrence in the same time, and its rounding
-adds up from sample to sample.
+It is implemented here because no library evaluates it. scipy.signal.lfilter computes the equivalent recurrence in the
+same time, but its rounding errors accumulate from sample to sample.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from pipeline.track import F8
 
 __all__ = ["EXACT", "Exact"]
 
-BLOCK = 128  # states of a block from its first by one matrix each; a block's first by the closed form
+BLOCK = 128  # states per block: the first from the closed form, each other state from the first by one matrix
 
 
 @dataclass(frozen=True, slots=True)
 class Exact(Integrator):
-    """The linear oscillator's own solution, evaluated at each time."""
+    """Integrator that evaluates the linear oscillator's analytic solution at each time."""
 
     name: str = "exact"
     words: str = "the exact propagator"
     order: int = 0
 
     def refusal(self, problem: Problem) -> str:
-        """Return why not, where anything but spring and viscous drag acts."""
+        """Return the reason for refusal if any force other than spring and viscous drag acts; empty otherwise."""
         if problem.equation.is_linear:
             return ""
         return "it knows spring and viscous drag only, this scene has more; take strang or auto"
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        """Evaluate the solution at every kept time; rates beyond all bounds end at rest."""
+        """Evaluate the solution at every kept time; extremely large rates give the state of rest."""
         return _states(problem, step_s * every, steps // every + 1)
 
 
@@ -43,9 +43,12 @@ EXACT = Exact()
 
 
 def _states(problem: Problem, apart: float, count: int) -> tuple[F8, F8]:
-    """States at multiples of a time apart: half as long as the closed form at each, and as long as scipy's lfilter."""
+    """Return displacements and velocities at multiples of the time ``apart``.
+
+    This takes half the time of the closed form at each state, and the same time as scipy's lfilter.
+    """
     blocks = -(-count // BLOCK)
-    # One call for the first states of all blocks and for the matrices within one.
+    # A single call computes the first states of all blocks and the matrices within a block.
     times = apart * np.concatenate([np.arange(0.0, blocks * BLOCK, BLOCK), np.arange(float(BLOCK))])
     a, b, c, d = flows(problem.equation.angular_frequency_per_s, problem.equation.gamma_per_s, times)
     y = a[:blocks] * problem.displacement_m + b[:blocks] * problem.velocity_m_per_s

@@ -1,7 +1,7 @@
-"""The flow of the linear oscillator in forms that hold from no damping through critical to any.
+"""The flow of the linear oscillator in forms that are accurate for any damping, from none through critical to strong.
 
-By hand: scipy.linalg.expm takes 13 us a matrix where this takes 0.4, and where damping is stiff, gamma = 1000 omega,
-its entries err by 1.5e-12 of themselves after 120 s, these by 2e-16.
+It is implemented here because scipy.linalg.expm takes 13 us per matrix and this code 0.4 us. With strong damping,
+gamma = 1000 omega, the entries from expm have relative errors of 1.5e-12 after 120 s, and those from here 2e-16.
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ from pipeline.track import F8
 __all__ = ["Entries", "flow", "flows"]
 
 Entries = tuple[float, float, float, float]
-"""The matrix (a, b; c, d) that takes displacement and velocity through a time."""
+"""The entries of the matrix (a, b; c, d) that advances displacement and velocity by a time interval."""
 
 
 def flow(omega: float, gamma: float, t: float) -> Entries:
-    """Return the matrix of :math:`\\ddot y = -\\omega^2 y - 2\\gamma\\dot y` over a time, s.
+    """Return the matrix of :math:`\\ddot y = -\\omega^2 y - 2\\gamma\\dot y` over a time t in s.
 
     Notes
     -----
-    :math:`e^{-\\gamma t}(C + \\gamma S,\\ S;\\ -\\omega^2 S,\\ C - \\gamma S)` with
-    :math:`S = \\sin(\\omega_d t)/\\omega_d` below critical damping. Above it,
+    The matrix is :math:`e^{-\\gamma t}(C + \\gamma S,\\ S;\\ -\\omega^2 S,\\ C - \\gamma S)`. Below critical damping
+    :math:`C = \\cos(\\omega_d t)` and :math:`S = \\sin(\\omega_d t)/\\omega_d`. Above it, the entries use
     :math:`\\kappa = \\sqrt{(\\gamma-\\omega)(\\gamma+\\omega)}`, the fast rate :math:`\\gamma + \\kappa` and the slow
-    rate :math:`\\omega^2/(\\gamma+\\kappa)`: no difference of near numbers, no product of a huge and a tiny one.
+    rate :math:`\\omega^2/(\\gamma+\\kappa)`. This avoids differences of nearly equal numbers and products of a huge and
+    a tiny one.
 
     Examples
     --------
@@ -38,12 +39,12 @@ def flow(omega: float, gamma: float, t: float) -> Entries:
 
 
 def flows(omega: float, gamma: float, t: F8) -> tuple[F8, F8, F8, F8]:
-    """Return the entries of :func:`flow` over many times, (n,) float64 each."""
+    """Return the entries of :func:`flow`, (n,) float64 each, for an array of times (n,)."""
     return _entries(omega, gamma, t, np)  # type: ignore[no-any-return]
 
 
 def _entries(omega: float, gamma: float, t: Any, of: Any) -> Any:
-    """Entries by the functions of ``math``, of a number twenty times as fast as numpy's, or of ``numpy``."""
+    """Return the entries with functions of ``math``, twenty times as fast for a single time, or of ``numpy``."""
     if gamma < omega:
         damped = math.sqrt((omega - gamma) * (omega + gamma))
         shrink = of.exp(-gamma * t)

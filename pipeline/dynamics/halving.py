@@ -1,12 +1,12 @@
-"""Solve a motion to a tolerance by step halving, which also shows the error.
+"""Solve a motion to a tolerance by step halving, which also estimates the error.
 
-1. Solve with a step h and with h / 2. The largest difference of the two runs is the stated error of the finer one.
+1. Solve with a step h and with h / 2. The maximum difference of the two runs is the stated error of the finer one.
 2. Halve the step until the stated error is within the tolerance.
-3. Where two halvings do not reduce the difference, rounding is all that is left: the tolerance is refused.
-4. A method of scipy has no step of ours: it takes a tenth of its tolerance instead of half a step.
+3. If two halvings do not reduce the difference, only rounding remains, and the tolerance is refused.
+4. Methods of scipy choose their own steps; for them the tolerance is divided by ten instead of halving the step.
 
-:func:`auto` evaluates the exact flow of a linear scene. Any other scene it solves by Strang splitting, and what that
-cannot reach without friction by DOP853.
+:func:`auto` evaluates the exact flow of a linear scene. It solves every other scene by Strang splitting. If that cannot
+reach the tolerance and there is no friction, it uses DOP853.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from pipeline.errors import DynamicsError
 
 __all__ = ["Solution", "auto", "demand_tolerance", "halved", "solved_once"]
 
-LONGEST_STEP = 0.5  # radians of the first step: fewer than six steps a cycle show nothing of the error
-MOST_STEPS = 2**25  # of one run, about ten seconds; the finest of all takes half of the time
+LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
+MOST_STEPS = 2**25  # maximum number of steps of one run, about ten seconds; the finest run takes half of the total time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,19 +40,20 @@ class Solution:
     ----------
     integrator : Integrator
     parts : int
-        Steps from one kept state to the next.
+        Number of steps from one kept state to the next.
     problem : Problem
-        What was solved: the terms that the tolerance requires.
+        The problem that was solved; from :func:`auto` it has only the terms that the tolerance requires.
     trajectory : Trajectory
     error, velocity_error : float or None
-        Stated errors of displacement and velocity over the starting amplitude, and over that times the angular
-        frequency, with what the terms left out may change; None where halving shows nothing of them.
+        Stated error of the displacement relative to the starting amplitude, and of the velocity relative to that
+        amplitude times the angular frequency. They include the effect of omitted terms; None if halving cannot
+        estimate them.
     no_estimate : str
         Why there is no estimate; empty if there is one.
     running_s : float
-        What the returned run took, s.
+        Running time of the returned run, s.
     terms : tuple of Term
-        What became of each term; empty for a method by name, which solves all of them.
+        The decision on each term; empty for a method selected by name, which solves all terms.
     """
 
     integrator: Integrator
@@ -74,7 +75,7 @@ class Solution:
 def auto(
     problem: Problem, spacing_s: float, count: int, tolerance: float, timer: Callable[[], float] = lambda: 0.0
 ) -> Solution:
-    """Solve what a tolerance requires of a motion, to that tolerance.
+    """Solve a motion to a tolerance, with only the terms that the tolerance requires.
 
     Parameters
     ----------
@@ -84,14 +85,14 @@ def auto(
     count : int
         Number of spacings.
     tolerance : float
-        Largest error of the displacement over the starting amplitude.
+        Maximum error of the displacement relative to the starting amplitude.
     timer : callable
-        To seconds; it times the returned run.
+        Returns a time in seconds; it measures the returned run.
 
     Raises
     ------
     DynamicsError
-        If the tolerance is below what double precision can reach, or nothing keeps it.
+        If the tolerance is below the limit of double precision, or no method reaches it.
 
     Examples
     --------
@@ -134,7 +135,7 @@ def halved(
     tolerance: float,
     timer: Callable[[], float] = lambda: 0.0,
 ) -> Solution:
-    """Solve a motion by one method, its step halved until the stated error is within a tolerance.
+    """Solve a motion by one method and halve its step until the stated error is within a tolerance.
 
     Parameters
     ----------
@@ -145,13 +146,13 @@ def halved(
     Raises
     ------
     DynamicsError
-        If the method cannot solve this or has no estimate of its error, or where its difference no longer falls or its
-        step becomes too short.
+        If the method cannot solve this problem or has no error estimate, if the difference no longer decreases, or if
+        too many steps are needed.
 
     Notes
     -----
-    With an error of :math:`c h^p` the difference is :math:`2^p - 1` times the error of the finer run. The rounding of
-    the phase, which both runs have alike, is added.
+    With an error of :math:`c h^p` the difference is :math:`2^p - 1` times the error of the finer run. The rounding
+    error of the phase is common to both runs and is therefore added.
     """
     demand_times(spacing_s, spacing_s * count)
     if integrator.refusal(problem):
@@ -174,7 +175,7 @@ def halved(
         fine = _run(setting, problem, spacing_s, count, parts)
         running_s = timer() - started
         if fine is not None:
-            moving = 1 + int(np.count_nonzero(fine.v))  # until friction holds the bob
+            moving = 1 + int(np.count_nonzero(fine.v))  # number of states before friction holds the bob
         if coarse is not None and fine is not None:
             error, velocity_error = (each + rounding for each in _difference(fine, coarse))
             if error <= tolerance:
@@ -194,21 +195,22 @@ def halved(
 def solved_once(
     problem: Problem, integrator: Integrator, spacing_s: float, count: int, timer: Callable[[], float] = lambda: 0.0
 ) -> Solution:
-    """Solve a motion in the step that was asked for, the spacing, and state the error that half of it shows.
+    """Solve a motion with the spacing as the step, and estimate the error from a second run with half this step.
 
     Parameters
     ----------
     problem, integrator, spacing_s, count, timer
-        As in :func:`halved`; the integrator has a step.
+        As in :func:`halved`; the integrator must be a method of fixed step.
 
     Raises
     ------
     DynamicsError
-        If the method cannot solve this, or the numbers ran away.
+        If the method cannot solve this problem, or the solution overflows.
 
     Notes
     -----
-    With an error of :math:`c h^p` the run in the longer step h errs by :math:`2^p / (2^p - 1)` of the difference.
+    With an error of :math:`c h^p` the error of the run with the longer step h is :math:`2^p / (2^p - 1)` times the
+    difference.
     """
     started = timer()
     run = integrator.run(problem, spacing_s, count)
@@ -225,11 +227,12 @@ def solved_once(
 
 
 def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: float) -> None:
-    """Refuse a tolerance that no integrator could keep.
+    """Refuse a tolerance that no integrator can reach.
 
     Raises
     ------
     DynamicsError
+        If the tolerance is not finite or is below the limit of double precision, or if a time is out of range.
     """
     seconds = spacing_s * count
     demand_times(spacing_s, seconds)
@@ -244,16 +247,16 @@ def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: 
 def _settings(
     integrator: Integrator, problem: Problem, spacing_s: float, count: int, tolerance: float
 ) -> Iterator[tuple[Integrator, int]]:
-    """Yield the method with its steps a spacing, twice as many each time; of scipy's a tenth of the tolerance."""
+    """Yield the method and its steps per spacing, doubled each time; scipy's tolerance is divided by ten instead."""
     omega = problem.equation.angular_frequency_per_s
     if isinstance(integrator, SolveIvp):
-        # The errors of all steps add up, and a step is about a radian.
+        # The errors of all steps accumulate, and a step is about one radian.
         rtol = max(min(tolerance / (1.0 + omega * spacing_s * count), 1e-3), 10.0 * LEAST_RTOL)
         while rtol >= LEAST_RTOL:
             yield replace(integrator, rtol=rtol), 1
             rtol *= 0.1
         return
-    # Drag that outweighs the spring has its own time, which a longer step would pass over.
+    # Drag stronger than the spring has its own, shorter time scale, which the step must resolve.
     fast = omega * (1.0 + problem.equation.drag_per_m * problem.amplitude_m())
     limit = integrator.stable_step(problem) or math.inf
     parts = math.floor(min(max(spacing_s * fast / LONGEST_STEP, spacing_s / limit), MOST_STEPS)) + 1
@@ -263,7 +266,7 @@ def _settings(
 
 
 def _run(integrator: Integrator, problem: Problem, spacing_s: float, count: int, parts: int) -> Trajectory | None:
-    """Return a run; None where a method of fixed step ran away, as it may in too long a step."""
+    """Return a run; None if a method of fixed step fails, as it may overflow with too long a step."""
     try:
         return integrator.run(problem, spacing_s / parts, count * parts, every=parts)
     except DynamicsError:
@@ -273,7 +276,7 @@ def _run(integrator: Integrator, problem: Problem, spacing_s: float, count: int,
 
 
 def _difference(one: Trajectory, other: Trajectory) -> tuple[float, float]:
-    """Return the largest differences of displacement and velocity, as shares of what the start has."""
+    """Return the maximum differences of displacement and velocity, relative to amplitude and speed at the start."""
     size = one.problem.amplitude_m()
     if size == 0.0:
         return 0.0, 0.0
@@ -282,5 +285,5 @@ def _difference(one: Trajectory, other: Trajectory) -> tuple[float, float]:
 
 
 def _needed(integrator: Integrator, steps: int, times: float) -> float:
-    """Return the number of steps for an error smaller by this factor, from the order of the method."""
+    """Return the number of steps that the order of the method requires for an error smaller by a factor ``times``."""
     return float(steps * times ** (1.0 / integrator.order)) if integrator.order else 0.0

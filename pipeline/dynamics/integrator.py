@@ -1,4 +1,4 @@
-"""What every integrator is, what it returns, and what all of them demand."""
+"""The base class of all integrators, the trajectory that they return, and the checks common to all of them."""
 
 from __future__ import annotations
 
@@ -18,27 +18,30 @@ from pipeline.track import F8
 __all__ = ["Integrator", "Step", "StepMaker", "Trajectory", "demand_times", "kept", "with_start"]
 
 SHORTEST_S, LONGEST_S = 1e-100, 1e100
-STRETCH = 1_000_000  # states held until those asked for are taken from them
+STRETCH = 1_000_000  # approximate number of states buffered before every n-th one is kept
 
 Step = Callable[[Real, Real], tuple[Real, Real]]
-"""One step: displacement and velocity before it to those after it."""
+"""One step: takes displacement and velocity before the step and returns those after it."""
 
 StepMaker = Callable[[Equation, Real], Step]
-"""Equation and step, s, to the function of one step; of many steps, (n,) float64, it is a step of each."""
+"""Takes an equation and a step in s and returns the function of one step.
+
+With an array of steps (n,) the function makes one step of each length.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Integrator(ABC):
-    """A way to solve the equation of motion.
+    """Base class of the methods that solve the equation of motion.
 
     Parameters
     ----------
     name : str
-        What the command line takes.
+        Name on the command line.
     words : str
-        Its name in a sentence.
+        Name for use in a sentence.
     order : int
-        Power of the step with which the error falls; 0 where the step is only the spacing of what is kept.
+        Order of the method: the power of the step in the error; 0 if the step is only the spacing of kept states.
     """
 
     name: str
@@ -46,23 +49,23 @@ class Integrator(ABC):
     order: int
 
     def refusal(self, problem: Problem) -> str:  # noqa: ARG002 - some integrators override this
-        """Return why the integrator cannot solve this problem; empty if it can."""
+        """Return why the integrator cannot solve this problem; empty if it can solve it."""
         return ""
 
     def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - for some it depends on the problem
-        """Return the largest step that does not make a free motion grow, s; inf for any, 0 for none."""
+        """Return the largest step in s at which no free motion grows; inf if every step is stable, 0 if none is."""
         return math.inf
 
     def no_estimate(self, problem: Problem) -> str:  # noqa: ARG002 - for some it depends on the problem
-        """Return why step halving shows nothing of its error; empty where it does."""
+        """Return why step halving cannot estimate the integrator's error; empty if it can."""
         return ""
 
     @abstractmethod
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        """Return displacements and velocities (n,) in units of the amplitude, once per ``every`` steps."""
+        """Return displacements and velocities (n,) at the start and after every ``every`` steps, in problem units."""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem: check what is asked, march in units of the amplitude, check what came.
+        """Solve a problem in units near its amplitude, with checks of the arguments and of the result.
 
         Parameters
         ----------
@@ -72,12 +75,13 @@ class Integrator(ABC):
         steps : int
             Number of steps.
         every : int
-            Keep the state after each so many steps; divides ``steps``.
+            Number of steps from one kept state to the next; it must divide ``steps``.
 
         Raises
         ------
         DynamicsError
-            If step or number of steps cannot be, the method cannot solve this problem, or the numbers ran away.
+            If the step or the number of steps is invalid, the method cannot solve this problem, or the solution
+            overflows.
         """
         demand_times(step_s, step_s * steps)
         if steps < 1 or every < 1 or steps % every:
@@ -134,19 +138,20 @@ class Trajectory:
 
     @property
     def t(self) -> F8:
-        """Times (n,) float64, s: each the product of its number and the spacing, so that nothing accumulates."""
+        """Times (n,) float64, s, each as index times spacing, so that rounding errors do not accumulate."""
         return np.asarray(self.spacing_s * np.arange(len(self.y), dtype=np.float64))
 
     def at(self, t: F8) -> F8:
-        """Return displacements (k,) at times between, (k,) in s; held before and after.
+        """Return interpolated displacements (k,) at times t (k,) in s; constant before the first and after the last.
 
-        A cubic through displacements and velocities: it errs by at most (omega spacing)^4 / 384 of the amplitude. On
-        equal spacings in 0.4 of the time of scipy.interpolate.CubicHermiteSpline, which a fit would import first.
+        The cubic Hermite interpolation through displacements and velocities errs by at most (omega spacing)^4 / 384 of
+        the amplitude. For equal spacings it takes 0.4 of the time of scipy.interpolate.CubicHermiteSpline, which a fit
+        would have to import first.
 
         Raises
         ------
         DynamicsError
-            For a time that is no number, or a displacement beyond the range of numbers.
+            For a time that is not a number, or a displacement that overflows.
         """
         with np.errstate(all="ignore"):
             place = np.clip(np.asarray(t) / self.spacing_s, 0.0, len(self.y) - 1.0)
@@ -163,9 +168,9 @@ class Trajectory:
         return found
 
     def relative_energy(self) -> F8:
-        """Return the mechanical energy over that of the start, (n,); 1 where there was none.
+        """Return the mechanical energy (n,) relative to that at the start; 1 if the start has no energy.
 
-        Scaled before it is squared, so that it is right for every amplitude that a number can hold.
+        The state is scaled before it is squared, so that the result is correct for every representable amplitude.
         """
         scaled, unit = self.problem.scaled()
         with np.errstate(over="ignore", invalid="ignore"):
@@ -184,7 +189,7 @@ def _energy(problem: Problem, y: F8, v: F8) -> F8:
 
 
 def kept(states: Iterator[float], steps: int, every: int) -> F8:
-    """Return every so many of the states after each step, displacement and velocity in turn: (n, 2), to their end."""
+    """Return the states (n, 2) after every ``every`` steps, from displacements and velocities in alternation."""
     stretch = every * max(1, STRETCH // every)
     parts = []
     for start in range(0, steps, stretch):
@@ -196,16 +201,17 @@ def kept(states: Iterator[float], steps: int, every: int) -> F8:
 
 
 def with_start(problem: Problem, y: F8, v: F8) -> tuple[F8, F8]:
-    """Return displacements and velocities (n + 1,) with the start before those (n,) after it."""
+    """Return displacements and velocities (n + 1,) with the start state prepended to the given ones (n,)."""
     return np.concatenate([[problem.displacement_m], y]), np.concatenate([[problem.velocity_m_per_s], v])
 
 
 def demand_times(step_s: float, seconds: float) -> None:
-    """Refuse a step or a duration that is none, or at which numbers end.
+    """Refuse a step or a duration that is not positive or is outside the allowed range.
 
     Raises
     ------
     DynamicsError
+        For a step or a duration outside 1e-100 to 1e100 s.
     """
     for name, value in (("step", step_s), ("duration", seconds)):
         if not SHORTEST_S <= value <= LONGEST_S:

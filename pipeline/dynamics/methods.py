@@ -1,4 +1,4 @@
-"""Explicit methods of fixed step: the two Eulers, velocity Verlet, Yoshida's composition and classical Runge-Kutta.
+"""Explicit methods of fixed step: both Euler methods, velocity Verlet, Yoshida's composition, classical Runge-Kutta.
 
 They repeat one step and do not locate turning points.
 
@@ -34,19 +34,21 @@ class OneStep(Integrator):
     Parameters
     ----------
     make : callable
-        Equation and step, s, to the function of one step; of many steps, (n,) float64, it is a step of each.
+        Takes an equation and a step in s and returns the function of one step. With an array of steps (n,) the
+        function makes one step of each length.
     closed_limit : callable, optional
-        Frequency, 1/s, and damping, 1/s, to the largest stable step, s; without it the limit is searched for.
+        Takes angular frequency and damping rate in 1/s and returns the largest stable step in s. Without it the limit
+        is determined by search.
     """
 
     make: StepMaker = field(repr=False)
     closed_limit: Callable[[float, float], float] | None = field(default=None, repr=False)
 
     def stable_step(self, problem: Problem) -> float:
-        """Return the largest step at which neither a small nor the starting motion grows, s."""
+        """Return the largest step in s at which no motion grows, from small ones up to the starting amplitude."""
         eq = problem.equation
         start = problem.amplitude_m()
-        # As stiff as it gets: drag at the greatest speed, the spring at the greatest reach.
+        # The stiffest case: drag at the maximum speed and the spring at the maximum displacement.
         stiffer = 3.0 * eq.cubic_per_m2_s2 * start * start if eq.cubic_per_m2_s2 > 0 else 0.0
         hard = math.sqrt(eq.angular_frequency_per_s**2 + stiffer)
         fast = eq.gamma_per_s + eq.drag_per_m * hard * start
@@ -58,7 +60,7 @@ class OneStep(Integrator):
         return float(min(limit_by_search(self.make, gamma / omega) / omega for omega, gamma in pairs))
 
     def no_estimate(self, problem: Problem) -> str:
-        """Return that the order drops with friction, whose turning points this method does not locate."""
+        """Return, with friction, that the order drops because the method does not locate turning points; else empty."""
         if not problem.equation.friction_m_per_s2:
             return ""
         return (
@@ -66,7 +68,7 @@ class OneStep(Integrator):
         )
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        """Repeat the step."""
+        """Solve by repeating the step."""
         step = self.make(problem.equation, step_s)
 
         def states(y: float, v: float) -> Iterator[float]:
@@ -102,7 +104,7 @@ def _verlet(eq: Equation, h: float) -> Step:
     a = acceleration(eq)
 
     def step(y: Real, v: Real) -> tuple[Real, Real]:
-        # Drag depends on the velocity that is sought: the second kick takes the one that the first predicts.
+        # Drag depends on the unknown new velocity; the second kick uses the velocity that the first one predicts.
         before = a(y, v)
         y = y + h * (v + 0.5 * h * before)
         return y, v + 0.5 * h * (before + a(y, v + h * before))
@@ -116,7 +118,7 @@ def _yoshida(eq: Equation, h: float) -> Step:
     friction = eq.friction_m_per_s2
 
     def step(y: Real, v: Real) -> tuple[Real, Real]:
-        # One direction of friction a step: its parts go forth, back and forth.
+        # Friction keeps one direction per step, because the parts of a step go forward, backward and forward in time.
         way = (v > 0) - (v < 0) if friction else 0
         for part in parts:
             y, v = part(y, v, way)
@@ -126,11 +128,11 @@ def _yoshida(eq: Equation, h: float) -> Step:
 
 
 def _symmetric(eq: Equation, h: float) -> Callable[[Real, Real, Real], tuple[Real, Real]]:
-    """Half the drag by its own exact flow, a Verlet step of the spring, half the drag: the same forth and back."""
+    """Return a time-symmetric step: half the drag by its exact flow, a Verlet step of the spring, half the drag."""
     gamma, drag, friction = eq.gamma_per_s, eq.drag_per_m, eq.friction_m_per_s2
     stiffness, cubic = eq.angular_frequency_per_s**2, eq.cubic_per_m2_s2
     shrink = np.exp(-gamma * h)
-    # The time in which quadratic drag acts, shortened by what viscous drag takes of the speed meanwhile.
+    # Quadratic drag times its effective time, which is shorter because viscous drag reduces the speed meanwhile.
     reach = drag * (-np.expm1(-gamma * h) / (2.0 * gamma) if gamma else 0.5 * h)
     if np.ndim(shrink) == 0:
         shrink, reach = float(shrink), float(reach)
@@ -164,7 +166,7 @@ def _rk4(eq: Equation, h: float) -> Step:
 
 
 def acceleration(eq: Equation) -> Callable[[Real, Real], Real]:
-    """Return the acceleration as a function of displacement and velocity, m/s^2; terms that are 0 are left out."""
+    """Return the acceleration in m/s^2 as a function of displacement and velocity, without terms that are zero."""
     stiffness, cubic, force = eq.angular_frequency_per_s**2, eq.cubic_per_m2_s2, _drag_force(eq)
     if cubic:
         return lambda y, v: -(stiffness + cubic * y * y) * y - force(v)
@@ -172,7 +174,7 @@ def acceleration(eq: Equation) -> Callable[[Real, Real], Real]:
 
 
 def _drag_force(eq: Equation) -> Callable[[Real], Real]:
-    """Drag and friction per mass as a function of velocity, m/s^2."""
+    """Return drag and friction per mass in m/s^2 as a function of velocity."""
     viscous, drag, friction = 2.0 * eq.gamma_per_s, eq.drag_per_m, eq.friction_m_per_s2
     if friction:
         return lambda v: (viscous + drag * abs(v)) * v + (friction if v > 0 else -friction if v < 0 else 0.0)

@@ -1,4 +1,4 @@
-"""An equation of motion with a start, and what a scene makes of both."""
+"""An equation of motion with an initial state, and the derivation of both from a scene."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ _MOST_FRICTION = 1e300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """An equation of motion and a start.
+    """An equation of motion and an initial state.
 
     Parameters
     ----------
     equation : Equation
     displacement_m : float, m
-        At t = 0.
+        Displacement at t = 0.
     velocity_m_per_s : float, m/s
+        Velocity at t = 0.
 
     Raises
     ------
     DynamicsError
-        For a start that is not one finite number of double precision, or a softening spring that is stretched
-        beyond the point where it would pull back.
+        If a start value is not a finite number of double precision, if the amplitude overflows, or if the start lets a
+        softening spring stretch beyond the point up to which it pulls back.
 
     Examples
     --------
@@ -51,13 +52,13 @@ class Problem:
         self._demand_bound()
 
     def amplitude_m(self) -> float:
-        """Return the amplitude with which an undamped oscillation would start, m."""
+        """Return the amplitude of the undamped linear oscillation with this initial state, m."""
         return math.hypot(self.displacement_m, self.velocity_m_per_s / self.equation.angular_frequency_per_s)
 
     def scaled(self) -> tuple[Problem, float]:
-        """Return the same motion in units of a length near its amplitude, and that length, m.
+        """Return the problem in units of a length near its amplitude, and this length in m.
 
-        The length is a power of two, so that nothing is rounded; squares then neither overflow nor vanish.
+        The length is a power of two, so that scaling causes no rounding. Squares then neither overflow nor underflow.
         """
         eq = self.equation
         size = max(abs(self.displacement_m), abs(self.velocity_m_per_s / eq.angular_frequency_per_s))
@@ -66,7 +67,7 @@ class Problem:
             return self, unit
         parts = {
             "drag_per_m": eq.drag_per_m * unit,
-            # Friction beyond all bounds holds whatever it touches, and a bound that large does too.
+            # Friction as large as the bound holds the bob in any case, so that a larger value makes no difference.
             "friction_m_per_s2": min(eq.friction_m_per_s2 / unit, _MOST_FRICTION),
             "cubic_per_m2_s2": eq.cubic_per_m2_s2 * unit * unit,
         }
@@ -80,24 +81,27 @@ class Problem:
 
     @classmethod
     def from_scene(cls, scene: Scene, *, where: str = "scene") -> Problem:
-        """Return the problem that a scene states.
+        """Return the problem that a scene describes.
 
         Parameters
         ----------
         scene : Scene
-            Bob mass, spring constant and starting displacement are needed; what else is left out is zero.
+            Must give bob mass, spring constant and starting displacement; other missing values count as zero.
         where : str
-            Named in errors.
+            Name of the source of the scene for error messages.
 
         Raises
         ------
         SceneError
-            If something needed is left out; the message names it.
+            If a required value is missing; the message names it.
+        DynamicsError
+            If the values of the scene give no valid problem.
 
         Notes
         -----
-        :math:`\\omega_0^2 = k/(m + m_s/3 + m_a)` with the spring's mass and the air that the disc carries along. The
-        coefficients of ``[damping]`` are those of the amplitude; see :meth:`Equation.from_laws`.
+        :math:`\\omega_0^2 = k/(m + m_s/3 + m_a)` with the mass :math:`m_s` of the spring and the mass :math:`m_a` of
+        the air that the disc carries along. The coefficients of ``[damping]`` are those of the amplitude laws; see
+        :meth:`Equation.from_laws`.
 
         Examples
         --------
@@ -128,7 +132,7 @@ class Problem:
             raise DynamicsError(f"{where}: {error}") from error
 
     def _demand_amplitude(self) -> None:
-        """A start of finite displacement and velocity still has no amplitude where the frequency is next to none."""
+        """Refuse an amplitude that overflows, as a finite velocity can cause if the frequency is extremely low."""
         if not math.isfinite(self.amplitude_m()):
             raise DynamicsError(
                 f"velocity_m_per_s over angular_frequency_per_s must be a length that a number holds, got "
@@ -136,7 +140,7 @@ class Problem:
             )
 
     def _demand_bound(self) -> None:
-        """A softening spring pulls back only up to omega / sqrt(-c), and only below the energy at that point."""
+        """Refuse a start outside the range omega / sqrt(-c) of a softening spring, or with energy to leave it."""
         eq = self.equation
         if eq.cubic_per_m2_s2 >= 0.0:
             return
@@ -151,7 +155,7 @@ class Problem:
 
 
 def effective_mass_kg(scene: Scene) -> float:
-    """Return bob, the spring's share, and the air that the disc carries along, kg.
+    """Return the oscillating mass in kg: the bob, the spring's share, and the air that the disc carries along.
 
     Raises
     ------

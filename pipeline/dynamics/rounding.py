@@ -1,4 +1,4 @@
-"""What rounding leaves of a motion in double precision."""
+"""Limits that rounding in double precision sets to the accuracy of a motion."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ LEAST_TOLERANCE = 1e-13
 
 
 def rounding_error(problem: Problem, seconds: float) -> float:
-    """Return the most that rounding of the phase leaves, over the amplitude.
+    """Return the maximum error of the displacement by rounding of the phase, relative to the amplitude.
 
     Notes
     -----
-    The phase :math:`\\omega t` is a product of rounded numbers: its error is its own size times the relative rounding,
-    and the displacement is rounded too.
+    The phase :math:`\\omega t` is a product of rounded numbers, so that its error is the phase times the machine
+    epsilon. Rounding of the displacement itself is included.
     """
     return EPS * (4.0 + problem.equation.angular_frequency_per_s * seconds)
 
 
 def least_tolerance(problem: Problem, seconds: float) -> float:
-    """Return the least tolerance that can be kept: twice the rounding of the phase, or 1e-13.
+    """Return the minimum achievable tolerance: twice the rounding error, but at least 1e-13.
 
     Examples
     --------

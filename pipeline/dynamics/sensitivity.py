@@ -1,7 +1,8 @@
-"""How each uncertain input moves a motion: linear propagation of uncertainties along the trajectory.
+"""Sensitivity of a motion to each uncertain input: linear propagation of uncertainties along the trajectory.
 
-Linear in the logarithm of the amplitude and in the phase, where it holds far longer than in the displacement: after a
-hundred periods an uncertain frequency turns the phase by a radian, and the displacement by no derivative.
+Propagation is linear in the logarithm of the amplitude and in the phase, where it is valid much longer than in the
+displacement. After a hundred periods an uncertain frequency can shift the phase by a radian, and then no derivative
+describes the change of the displacement.
 """
 
 from __future__ import annotations
@@ -18,28 +19,28 @@ from pipeline.track import F8
 
 __all__ = ["C16", "STRETCH", "Sensitivity", "sensitivity", "solved"]
 
-STRETCH = 2000  # steps held in memory
-BENT = 0.1  # of all sensitivities together: as much may the mean of two shifts differ from none
-BENT_LEAST = 1e-3  # of the largest: what differs by less is of no account
+STRETCH = 2000  # number of steps in memory at a time
+BENT = 0.1  # maximum nonlinearity, the mean of the two shifts of an input, relative to all sensitivities combined
+BENT_LEAST = 1e-3  # negligible nonlinearity, relative to the maximum of the combined sensitivities
 
 C16 = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Changes of the motion with each input, by one standard uncertainty of it.
+    """Changes of the motion when each input changes by one standard uncertainty.
 
     Parameters
     ----------
     names : tuple of str
-        The inputs.
+        Names of the inputs.
     t : (n,) float64, s
     middle : (n,) complex128, m
-        :math:`y - iv/\\omega_0 = A e^{i\\theta}` of the scene's values.
+        :math:`y - iv/\\omega_0 = A e^{i\\theta}` for the scene's values.
     of_log : (k, n) complex128
         Change of :math:`\\ln A + i\\theta` with each input.
     holds : bool
-        Whether it is a change in proportion, up to one uncertainty either way and at all times.
+        Whether the change is proportional to the input, up to one uncertainty in either direction and at all times.
     """
 
     names: tuple[str, ...]
@@ -49,21 +50,21 @@ class Sensitivity:
     holds: bool
 
     def displacement(self) -> F8:
-        """Return the change of the displacement with each input (k, n), m: linear, for small changes."""
+        """Return the change of the displacement with each input (k, n) in m, linearised for small changes."""
         return np.asarray((self.middle * self.of_log).real)
 
     def phase_at_end(self) -> dict[str, float]:
-        """Return by how many radians each input's uncertainty turns the phase at the end."""
+        """Return the phase shift at the end in rad that each input's standard uncertainty causes."""
         return {name: float(abs(each[-1].imag)) for name, each in zip(self.names, self.of_log, strict=True)}
 
 
 def solved(problems: Sequence[Problem], step_s: float, steps: int) -> Iterator[C16]:
-    """Yield :math:`y - iv/\\omega_0` (members, n), m, of several problems, a stretch of their steps at a time."""
+    """Yield :math:`y - iv/\\omega_0` (members, n) in m of several problems for successive blocks of steps."""
     omegas = np.array([one.equation.angular_frequency_per_s for one in problems])[:, None]
     now = list(problems)
     for start in range(0, steps, STRETCH):
         runs = [STRANG.run(one, step_s, min(STRETCH, steps - start)) for one in now]
-        rows = slice(0 if start == 0 else 1, None)  # a stretch begins where the last one ended
+        rows = slice(0 if start == 0 else 1, None)  # a block begins with the last state of the previous block
         y, v = (np.array([getattr(run, name)[rows] for run in runs]) for name in ("y", "v"))
         yield y - 1j * v / omegas
         now = [Problem(run.problem.equation, run.y[-1], run.v[-1]) for run in runs]
@@ -72,18 +73,20 @@ def solved(problems: Sequence[Problem], step_s: float, steps: int) -> Iterator[C
 def sensitivity(
     names: tuple[str, ...], middle: Problem, shifted: Sequence[Problem], step_s: float, steps: int
 ) -> Sensitivity:
-    """Solve a motion and its neighbours.
+    """Solve a motion with each input shifted both ways, and return its sensitivity to the inputs.
 
     Parameters
     ----------
     names : tuple of str
-        The inputs.
+        Names of the inputs.
     middle : Problem
-        Of the scene's values.
+        The problem for the scene's values.
     shifted : sequence of Problem
-        For each input one with it larger, then one with it smaller, by its standard uncertainty.
+        For each input two problems: with the input increased, then decreased, by its standard uncertainty.
     step_s : float
+        Step, s.
     steps : int
+        Number of steps.
     """
     parts = list(solved([middle, *shifted], step_s, steps))
     states = np.concatenate(parts, axis=1)

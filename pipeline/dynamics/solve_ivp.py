@@ -1,4 +1,4 @@
-"""scipy's solve_ivp behind the interface of the other integrators, by its LSODA and DOP853."""
+"""The methods LSODA and DOP853 of scipy's solve_ivp, with the interface of the other integrators."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from pipeline.track import F8
 
 __all__ = ["DOP853", "LEAST_RTOL", "LSODA", "SolveIvp"]
 
-MOST_CALLS = 3_000_000  # of the right side: about ten seconds
-LEAST_RTOL = 3e-14  # scipy raises anything less to a hundred roundings
+MOST_CALLS = 3_000_000  # maximum number of evaluations of the right-hand side, about ten seconds
+LEAST_RTOL = 3e-14  # minimum tolerance; scipy raises smaller values to a hundred times the machine epsilon
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,27 +29,27 @@ class SolveIvp(Integrator):
     Parameters
     ----------
     method : str
-        As solve_ivp calls it.
+        Name of the method in solve_ivp.
     rtol : float
-        Tolerance of one step, over the amplitude; the errors of all steps add up.
+        Tolerance of one step relative to the amplitude; the errors of all steps accumulate.
     """
 
     method: str
     rtol: float = 1e-9
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        """Solve at every kept time, and give up where that takes too long."""
+        """Solve at every kept time, and raise an error if that takes too long."""
         t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of a failure that solve_ivp reports as well
+            warnings.simplefilter("ignore", UserWarning)  # solve_ivp also reports such failures in its result
             try:
                 y, v = self._solve(problem, t)
-            except (ValueError, np.linalg.LinAlgError) as error:  # scipy's, where its numbers end
+            except (ValueError, np.linalg.LinAlgError) as error:  # raised by scipy on overflow
                 raise DynamicsError(f"{self.name} gave up: {error}; take strang or auto") from error
         return y, v
 
     def _solve(self, problem: Problem, t: F8) -> F8:
-        """Return displacement and velocity (2, n); with friction from turning point to turning point."""
+        """Return displacement and velocity (2, n); with friction, integrate from turning point to turning point."""
         from scipy.integrate import solve_ivp
 
         eq, calls = problem.equation, itertools.count()

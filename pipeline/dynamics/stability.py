@@ -1,7 +1,7 @@
-"""How large a step may be: closed limits of the two Eulers, and a search on the matrix of a step for any other.
+"""Largest stable step: closed forms for both Euler methods, and a search on the step matrix for the other methods.
 
-A method that repeats a linear map grows without bound where an eigenvalue of that map leaves the unit circle. Lengths
-of time are in units of the undamped radian, 1 / omega: ``x`` is omega h, ``ratio`` is gamma / omega.
+The solution of a method that repeats a linear map grows without bound if an eigenvalue of the map lies outside the
+unit circle. Times are in units of 1 / omega, an undamped radian: ``x`` is omega h, ``ratio`` is gamma / omega.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from pipeline.track import F8
 
 __all__ = ["forward_euler_limit", "limit_by_search", "step_matrix", "symplectic_euler_limit"]
 
-GREATEST = 20.0  # largest x that is looked at
-LOOKS, REFINEMENTS = 250, 6  # each narrows the bracket 249-fold
+GREATEST = 20.0  # maximum x of the search
+LOOKS, REFINEMENTS = 250, 6  # points of a scan, and number of scans; each further scan narrows the bracket 249-fold
 _ROUNDING = 1e-12
 
 
 def forward_euler_limit(omega: float, gamma: float) -> float:
-    """Return the largest stable step of forward Euler, s, from frequency and damping, 1/s.
+    """Return the largest stable step of forward Euler in s, from angular frequency and damping rate in 1/s.
 
-    Eigenvalues :math:`1 + h\\lambda` stay in the unit circle up to :math:`-2\\,\\mathrm{Re}\\lambda/|\\lambda|^2`.
+    The eigenvalues :math:`1 + h\\lambda` stay in the unit circle up to
+    :math:`h = -2\\,\\mathrm{Re}\\lambda/|\\lambda|^2`.
     """
     if gamma < omega:
         return 2.0 * gamma / omega**2
@@ -33,24 +34,25 @@ def forward_euler_limit(omega: float, gamma: float) -> float:
 
 
 def symplectic_euler_limit(omega: float, gamma: float) -> float:
-    """Return the largest stable step of symplectic Euler, s, from frequency and damping, 1/s.
+    """Return the largest stable step of symplectic Euler in s, from angular frequency and damping rate in 1/s.
 
-    Both roots of the step's characteristic polynomial stay in the circle: :math:`(\\omega h)^2 + 4\\gamma h < 4`.
+    Both roots of the step's characteristic polynomial stay in the unit circle if
+    :math:`(\\omega h)^2 + 4\\gamma h < 4`.
     """
     return 2.0 / (gamma + math.hypot(gamma, omega))
 
 
 def step_matrix(make: StepMaker, x: float | F8, ratio: float) -> F8:
-    """Return the (2, 2) matrix of one step of x = omega h on (y, v / omega) at a damping ratio.
+    """Return the (2, 2) matrix that advances (y, v / omega) by one step of x = omega h at a damping ratio.
 
     Parameters
     ----------
     make : callable
-        Equation and step to the function of one step.
+        Takes an equation and a step, and returns the function of one step.
     x : float or (n,) float64
-        Step in radians; of several the matrices come as (n, 2, 2).
+        Step in radians; for an array of steps the result is (n, 2, 2).
     ratio : float
-        gamma / omega.
+        Damping ratio gamma / omega.
 
     Examples
     --------
@@ -65,7 +67,7 @@ def step_matrix(make: StepMaker, x: float | F8, ratio: float) -> F8:
 
 
 def _growths(matrices: F8) -> F8:
-    """Spectral radii of matrices (..., 2, 2); inf where one is not finite."""
+    """Return the spectral radii of matrices (..., 2, 2); inf for a matrix that is not finite."""
     finite = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
     values = np.linalg.eigvals(np.where(finite[..., None, None], matrices, 0.0))
     return np.asarray(np.where(finite, np.abs(values).max(axis=-1), np.inf))
@@ -73,7 +75,7 @@ def _growths(matrices: F8) -> F8:
 
 @functools.lru_cache(maxsize=4096)
 def limit_by_search(make: StepMaker, ratio: float) -> float:
-    """Return the largest stable x = omega h at a damping ratio: the end of the first stable interval.
+    """Return the largest stable x = omega h at a damping ratio: the upper end of the first stable interval.
 
     Examples
     --------
@@ -88,7 +90,7 @@ def limit_by_search(make: StepMaker, ratio: float) -> float:
         grows = _growths(step_matrix(make, steps, ratio)) > 1.0 + _ROUNDING
         bad = int(np.argmax(grows))
         if not grows[bad]:
-            # The end of a finer look is the step that grew in the coarser.
+            # The upper end of a finer scan is the step that was unstable in the coarser one.
             return float(steps[-1]) if math.isfinite(high) else math.inf
         low, high = (float(steps[bad - 1]) if bad else low), float(steps[bad])
         steps = np.linspace(low, high, LOOKS)

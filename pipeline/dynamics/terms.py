@@ -1,4 +1,4 @@
-"""Which terms of the equation a tolerance requires: the rule of the effects table, for a simulation."""
+"""Selection of the terms of the equation that a tolerance requires: the rule of the effects table for simulations."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pipeline.dynamics.problem import Problem
 
 __all__ = ["SHARE", "Term", "required"]
 
-SHARE = 0.1  # of the tolerance, for all terms left out together
+SHARE = 0.1  # maximum error from all omitted terms together, as a share of the tolerance
 
 _COEFFICIENTS = {
     "viscous_drag": "gamma_per_s",
@@ -28,13 +28,13 @@ class Term:
     ----------
     name : str
     size : float
-        The most that leaving it out could change the displacement, over the starting amplitude.
+        Maximum change of the displacement that its omission could cause, relative to the starting amplitude.
     included : bool
-        Whether the equation that is solved holds it.
+        Whether the solved equation includes the term.
     why : str
-        One sentence.
+        The reason for the decision in one sentence.
     in_scene : bool
-        Whether the scene has it at all.
+        Whether the scene includes the term.
     """
 
     name: str
@@ -51,15 +51,17 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     ----------
     problem : Problem
     seconds : float
-        How long it is to be solved.
+        Duration of the solution, s.
     tolerance : float
-        Largest error over the starting amplitude.
+        Maximum error relative to the starting amplitude.
 
     Notes
     -----
-    With :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)`, leaving a term out changes the displacement over the
-    starting amplitude by at most :math:`\\gamma T + \\gamma^2 T/2\\omega`, :math:`\\beta A_0 T`, :math:`\\mu T/A_0`
-    and, through the phase, :math:`3|c|A_0^2T/8\\omega`, and within a cycle by about a radian's worth more.
+    With :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)` the omission of a term changes the displacement, relative to
+    the starting amplitude, by at most :math:`\\gamma T + \\gamma^2 T/2\\omega`, :math:`\\beta A_0 T`,
+    :math:`\\mu T/A_0` and, through the phase, :math:`3|c|A_0^2T/8\\omega`. Variations within a cycle add about one
+    radian to the time T. With a cubic term the other bounds are multiplied by the phase drift that an error of the
+    amplitude causes.
 
     Examples
     --------
@@ -87,14 +89,14 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
 
 
 def _sizes(problem: Problem, seconds: float) -> dict[str, float]:
-    """What leaving out each term that acts could change the displacement by, over the starting amplitude."""
+    """Return the maximum change of the displacement from omitting each term, relative to the starting amplitude."""
     eq, start = problem.equation, problem.amplitude_m()
     gamma, beta, mu = eq.laws()
     omega, cubic = eq.angular_frequency_per_s, abs(eq.cubic_per_m2_s2)
     time, drift = seconds + 1.0 / omega, 1.0
     found = {}
     if cubic:
-        # Under a cubic spring another amplitude is another pace, and the phase drifts for all the time that is left.
+        # With a cubic spring an error of the amplitude changes the frequency, so that a phase error accumulates.
         bend = 0.75 * cubic * (start / omega) * (start / omega)
         drift += bend / math.sqrt(1.0 + bend) * omega * time if bend < math.inf else 1e100
         found["amplitude_dependent_frequency"] = 0.375 * cubic * start * start / omega * time
@@ -108,14 +110,15 @@ def _sizes(problem: Problem, seconds: float) -> dict[str, float]:
 
 
 def _kept(sizes: dict[str, float], tolerance: float) -> set[str]:
-    """Return the terms that are kept."""
+    """Return the names of the terms to be kept."""
     room, left_out, kept = SHARE * tolerance, 0.0, set()
-    # Least first: what fits into the room together stays out. Friction always holds a bob in the end.
+    # In order of increasing size, terms are omitted as long as their sum remains within the limit. Friction is treated
+    # like the other terms, although it eventually stops every bob.
     for size, name in sorted((size if size >= 0.0 else math.inf, name) for name, size in sizes.items()):
         if left_out + size <= room:
             left_out += size
         else:
-            kept.add(name)  # with what is beyond numbers
+            kept.add(name)  # also terms whose size is infinite or NaN
     return kept
 
 

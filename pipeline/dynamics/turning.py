@@ -1,7 +1,8 @@
-"""Strang steps of a bob with friction: turning points located, and the latch that holds it there.
+"""Strang steps of a bob with friction, with located turning points at which friction can hold the bob.
 
-Turning points by secants from Hermite's guess, by hand: a whole step around one takes 13 us, one call of
-scipy.optimize.brentq on a cosine 20, and each of its evaluations is a step.
+Turning points are located by secants from a Hermite estimate, implemented here for speed. A whole step around a
+turning point takes 13 us. One call of scipy.optimize.brentq takes 20 us for a cosine, and here each of its
+evaluations would be a step.
 """
 
 from __future__ import annotations
@@ -13,20 +14,20 @@ from pipeline.dynamics.problem import Problem
 
 __all__ = ["Friction"]
 
-OVERWHELMING = 1e9  # friction over every other force: it stops the bob before anything else acts
-UNSEEN = 1e-17  # of a length: far less than its rounding
-_CLOSE = 1e-12  # of a step: the displacement does not feel it where the velocity is 0
-_MOST = 40
+OVERWHELMING = 1e9  # ratio of friction to the spring and viscous forces above which it stops the bob at once
+UNSEEN = 1e-17  # relative change of a length that is far below rounding
+_CLOSE = 1e-12  # accuracy of a turning time, relative to the step; at zero velocity its effect is negligible
+_MOST = 40  # maximum number of iterations for a turning time
 
 
 class Friction:
-    """One bob, stepped.
+    """The state of one bob with friction, advanced step by step.
 
     Parameters
     ----------
     problem : Problem
     step_s : float
-        At most a radian, so that a step holds one turning point at most.
+        Step in s; at most one radian, so that a step contains at most one turning point.
     """
 
     def __init__(self, problem: Problem, step_s: float) -> None:
@@ -39,14 +40,14 @@ class Friction:
         self._shift = eq.friction_m_per_s2 / eq.angular_frequency_per_s**2
         self._half = flow(self._omega, self._gamma, 0.5 * step_s)
         self._way = eq.direction(self.y, self.v)
-        # Beyond critical damping the bob never turns again: it is held once it no longer changes its place.
+        # With overcritical damping the bob need not turn: it counts as held when its displacement no longer changes.
         slow = self._omega * self._omega / (2.0 * self._gamma) if self._gamma > self._omega else 0.0
         self._still = UNSEEN * slow * self._shift
         if self._hold > OVERWHELMING * (abs(eq.spring(self.y)) + (self._omega + self._gamma) * abs(self.v)):
             self.v, self._way = 0.0, 0
 
     def states(self) -> Iterator[float]:
-        """Yield displacement and velocity after each step, in turn, until the bob is held."""
+        """Yield displacement and velocity alternately after each step until the bob is held."""
         while self._way:
             yield from self._straight()
             if self._still and self._moved(self._half, self._h)[1] * self._way >= 0.0:
@@ -78,7 +79,7 @@ class Friction:
         self.y, self.v = y + rest, v
 
     def _around(self) -> None:
-        """Make one step that holds a turning point."""
+        """Make one step that contains a turning point."""
         y, v = self._moved(self._half, self._h)
         spent, way = self._turning(y, v), self._way
         y, _ = self._moved(flow(self._omega, self._gamma, 0.5 * spent), spent)
@@ -88,13 +89,13 @@ class Friction:
             return
         left = self._h - spent
         lacking, rate = _lacking(self._coefficients, y, (spent, left), (way, self._way))
-        if abs(lacking) < abs(rate) * left:  # else it hardly leaves the turning point
+        if abs(lacking) < abs(rate) * left:  # otherwise the bob hardly leaves the turning point
             left += lacking / rate
         if left > 0.0:
             self.y, self.v = self._moved(flow(self._omega, self._gamma, 0.5 * left), left)
 
     def _moved(self, half: Entries, h: float) -> tuple[float, float]:
-        """Return the state after a step whose half oscillator is given, if it does not turn."""
+        """Return the state after a step h without a turning point; ``half`` is the oscillator's flow over h / 2."""
         a, b, c, d = half
         rest = -self._way * self._shift
         y, v = self.y - rest, self.v
@@ -106,7 +107,7 @@ class Friction:
         return a * y + b * v + rest, c * y + d * v
 
     def _turning(self, y: float, after: float) -> float:
-        """Return the time within the step at which the velocity passes zero: Hermite's guess, then secants."""
+        """Return the time within the step at which the velocity is zero, by secants from a Hermite estimate."""
         low, high = 0.0, self._h
         before, since = self.v, 0.0
         t = _guess(self._h, before, after, self._slope(self.y, before), self._slope(y, after))
@@ -128,7 +129,7 @@ class Friction:
         return t
 
     def _slope(self, y: float, v: float) -> float:
-        """Return the acceleration if it keeps its way."""
+        """Return the acceleration for motion in the present direction."""
         eq = self._eq
         drag = (2.0 * self._gamma + eq.drag_per_m * v * self._way) * v
         return float(-(eq.spring(y) + drag + self._way * self._hold))
@@ -137,20 +138,20 @@ class Friction:
 def _lacking(
     coefficients: tuple[float, ...], y: float, parts: tuple[float, float], ways: tuple[int, int]
 ) -> tuple[float, float]:
-    """Return what the two parts of a step lack in velocity, and the acceleration with which the bob leaves.
+    """Return the velocity error that a step lacks because a turning point splits it, and the acceleration after it.
 
-    A step h errs in velocity by -K h^3 / 24, with K from the splitting's commutators. Along the motion these errors
-    pass over into each other and little adds up. The parts t of a step that a turning point splits err by less: what
-    they lack, -K t (h^2 - t^2) / 24 each, would add up over the turning points as the third power of the step.
+    A step h has a velocity error of -K h^3 / 24, with K from the splitting's commutators. Along the motion these
+    errors nearly cancel. The two parts t of a step that a turning point splits have smaller errors. The difference,
+    -K t (h^2 - t^2) / 24 for each part, would accumulate over the turning points as the third power of the step.
 
     Parameters
     ----------
     coefficients : tuple
-        Of the equation, in its order.
+        The coefficients of the equation in the order of its fields.
     y : float
-        Where the bob turns.
+        Displacement at the turning point.
     parts, ways : tuple
-        Before it and after it: the part's time, and which way the bob moves.
+        Durations of the parts before and after the turning point, and the directions of motion in them.
     """
     omega, gamma, drag, hold, cubic = coefficients
     stiffness, viscous = omega * omega, 2.0 * gamma
@@ -165,7 +166,7 @@ def _lacking(
 
 
 def _guess(h: float, v0: float, v1: float, a0: float, a1: float) -> float:
-    """Return where a cubic through (v0, 0) and (v1, h) with slopes 1 / a0 and 1 / a1 says that v is 0."""
+    """Return the time at v = 0 of a cubic t(v) through (v0, 0) and (v1, h) with slopes 1 / a0 and 1 / a1."""
     if a0 == 0.0 or a1 == 0.0 or v0 == v1:
         return 0.5 * h
     s = v0 / (v0 - v1)

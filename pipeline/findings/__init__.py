@@ -1,1 +1,1 @@
-"""Findings: what is reported about a run, in words."""
+"""Findings: the statements about a run, in words."""

@@ -1,4 +1,4 @@
-"""Findings on damping: which laws the run supports, and which it contradicts."""
+"""Findings on damping: which laws the run admits, and which it contradicts."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from pipeline.numerics.estimate import Estimate
 
 __all__ = ["damping_findings"]
 
-# Difference of BIC that is "very strong" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773. Among laws that
-# are as likely beforehand a wrong one exceeds the true one by as much in less than exp(-5) of recordings.
+# Difference of BIC that is "very strong" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773. If two laws
+# have the same prior probability, a wrong law beats the true law by this much in fewer than exp(-5) of recordings.
 VERY_STRONG = 10.0
 
 
 def damping_findings(damping: Damping, stated: Mapping[str, Estimate]) -> Iterator[Finding]:
-    """Yield which laws fit, which are rejected and which cannot be distinguished.
+    """Yield findings on laws that fit, laws that are rejected and laws that cannot be distinguished.
 
     Parameters
     ----------
     damping : Damping
     stated : mapping of str to Estimate
-        The coefficients that the results give, with all that they are uncertain by.
+        The coefficients in the results, with all contributions to their uncertainties.
     """
     rejected = [name for name, fit in damping.fits.items() if fit.rejected]
     if damping.fits and len(rejected) == len(damping.fits):
@@ -57,7 +57,7 @@ def damping_findings(damping: Damping, stated: Mapping[str, Estimate]) -> Iterat
 
 
 def _stated_law(damping: Damping) -> Finding | None:
-    """Return what contradicts the stated law although another one fits: its misfit, or far stronger evidence."""
+    """Return the finding on a stated law that was not fitted, that chi-square rejects, or that another law beats."""
     if not damping.by_statement:
         why = damping.unfitted.get(damping.stated, "its fit failed")
         return Finding(
@@ -83,7 +83,7 @@ def _stated_law(damping: Damping) -> Finding | None:
 
 def _mixed(mixed: MixedDrag, damping: Damping, stated: Mapping[str, Estimate]) -> Finding:
     fit = mixed.fit
-    # A number has one uncertainty wherever it is shown.
+    # A coefficient has the same uncertainty here as in the results.
     given = stated if set(stated) == set(fit.joint.names[1:]) else fit.joint.estimates()
     terms = " and ".join(f"{name} = {given[name]}" for name in fit.joint.names[1:])
     alone = ", ".join(f"{words_of(damping.fits[name].law)} {_number(excess)}" for name, excess in mixed.against.items())
@@ -106,10 +106,10 @@ def _mixed(mixed: MixedDrag, damping: Damping, stated: Mapping[str, Estimate]) -
 
 
 def _rejections(damping: Damping, rejected: int) -> Finding:
-    """One finding on all laws that the run contradicts, with the reason for each."""
+    """Return one finding on all laws that are rejected or have no fit, with the reason for each."""
     by_reason: dict[str, list[str]] = {}
     for fit in damping.fits.values():
-        # As many parameters as windows leave no degree of freedom, and so no reduced chi-square.
+        # With as many parameters as windows there is no degree of freedom, and so no reduced chi-square.
         chi2 = f" ({_number(fit.reduced_chi2)})" if fit.dof > 0 else ""
         by_reason.setdefault(fit.rejection, []).append(f"{words_of(fit.law)}{chi2}")
     best = damping.best
@@ -141,7 +141,7 @@ def _rejections(damping: Damping, rejected: int) -> Finding:
 
 
 def _number(value: float) -> str:
-    """Three digits, in full."""
+    """Return a number with three digits and without an exponent."""
     if value > 1e6:
         return "over a million"
     return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"

@@ -1,4 +1,4 @@
-"""One example of each finding, as a run of a student would give it."""
+"""One example of each finding, as a student's run would give it."""
 
 from __future__ import annotations
 
@@ -106,4 +106,4 @@ EXAMPLES: Mapping[str, str] = {
     "springs_differ": "The spring constants of the runs disagree by 9 standard uncertainties.",
     "laws_differ": "The runs do not share one damping law.",
 }
-"""By code, a message; the numbers are those of one run."""
+"""A message for each code; the numbers are examples."""

@@ -1,4 +1,4 @@
-"""What is reported about a run: one sentence, what to do, and the numbers behind it."""
+"""A finding about a run: one sentence, what to do, and the numbers behind it."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Finding:
     message : str
         One sentence that a first-year student understands, with the number that matters.
     details : str
-        Statistics, alternatives and method, for those who ask.
+        Statistics, alternatives and method, for readers who want more.
     values : mapping of str to float
-        The numbers, in SI units, by names that carry them.
+        The numbers in SI units; their names include the units.
     advice : str
-        What to do; the registry's where it is left out. A note has none: it asks for nothing.
+        What to do; by default the advice in the registry. A note (severity "info") has none by default.
 
     Raises
     ------
@@ -49,6 +49,6 @@ class Finding:
 
 
 def by_severity(*groups: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return all findings sorted by severity, the gravest first; equal severities keep their order."""
+    """Return all findings sorted by severity, the most severe first; findings of equal severity keep their order."""
     rank = {"error": 0, "warning": 1, "info": 2}
     return tuple(sorted((one for group in groups for one in group), key=lambda finding: rank[finding.severity]))

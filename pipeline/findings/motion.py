@@ -1,4 +1,4 @@
-"""Findings on the motion: its period, rest position, second modes, and where the model does not describe it."""
+"""Findings on the motion: period, rest position and second modes, and where the model does not describe the motion."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ __all__ = [
     "smoothing_finding",
 ]
 
-TOLD = 0.002  # of the amplitude: smaller harmonics are in the uncertainties and need no warning
-SIDEWAYS = 0.01  # of the amplitude: smaller second modes are a note
-FEWEST = 4  # windows that a damping law needs to be tested against
+TOLD = 0.002  # minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones
+SIDEWAYS = 0.01  # share of a second mode in the amplitude above which the finding is a warning and not a note
+FEWEST = 4  # minimum number of windows for the test of a damping law
 
 
 def overdamped_finding(found: Overdamped) -> Finding:
-    """Return the finding on a motion that damping ends within a few cycles or without any.
+    """Return the finding on a motion that damping ends within a few cycles, or before one cycle is complete.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def overdamped_finding(found: Overdamped) -> Finding:
 
 
 def fit_findings(full: FullFit | None, solved: EquationFit | EquationMisfit | None) -> Iterator[Finding]:
-    """Yield how the fits of the whole motion ended.
+    """Yield findings on the result of the fits of the whole motion.
 
     Parameters
     ----------
     full : FullFit or None
-        Of the waveform.
+        The fit of the waveform.
     solved : EquationFit, EquationMisfit or None
-        Of the equation of motion.
+        The fit of the equation of motion.
     """
     if full is not None and not full.converged:
         yield Finding(
@@ -91,14 +91,14 @@ def fit_findings(full: FullFit | None, solved: EquationFit | EquationMisfit | No
 
 
 def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Finding]:
-    """Yield what the fit shows of the motion.
+    """Yield findings on the motion from its fit.
 
     Parameters
     ----------
     cycles : Cycles
     fitted : Fitted
     rest : Rest
-        With its steps.
+        Rest position, including its steps.
     """
     demodulated, phase = fitted.demodulated, fitted.phase
     unit = rest.mean.unit
@@ -120,7 +120,7 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Find
     if phase.backbone is not None:
         start = phase.damping.best.joint["A0"].value
         shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
-        # In computed data drag itself bends the phase, by the square of what it damps within a radian.
+        # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
         by_drag = (phase.damping.best.rate_at_start() / phase.angular_frequency.value) ** 2
         if abs(shift) > by_drag:
             yield Finding(
@@ -132,7 +132,7 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Find
                 "over the run; its uncertainty does not cover the period at other amplitudes.",
                 {"relative_shift": shift, "amplitude_m": start, "exponent": phase.exponent},
             )
-    # What the rest position of computed data does within its digits affects no number.
+    # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
     if rest.moves and rest.range_m > float(np.max(errors)):
         yield _rest_finding(rest, phase.damping.best.damping_rate().u)
@@ -191,13 +191,13 @@ def _mode_findings(fitted: Fitted, unit: str) -> Iterator[Finding]:
 
 
 def harmonics_finding(found: Harmonics, unit: str) -> Finding | None:
-    """Return the finding on periods that are no sinusoids; None where that is small.
+    """Return the finding on periods that are no sinusoids; None if the difference is small.
 
     Parameters
     ----------
     found : Harmonics
     unit : str
-        Of the samples.
+        Unit of the samples.
     """
     if found.share < TOLD:
         return None
@@ -225,7 +225,7 @@ def smoothing_finding(found: Smoothing, unit: str) -> Finding:
     ----------
     found : Smoothing
     unit : str
-        Of the samples.
+        Unit of the samples.
     """
     if found.lag_s:
         kind = f"a first-order lag of {found.lag_s:.2g} s"
@@ -253,13 +253,13 @@ def smoothing_finding(found: Smoothing, unit: str) -> Finding:
 
 
 def model_finding(check: ModelCheck, unit: str) -> Finding | None:
-    """Return the finding on a model that does not describe the whole run; None where it does.
+    """Return the finding on a model that does not describe the whole run; None if it does.
 
     Parameters
     ----------
     check : ModelCheck
     unit : str
-        Of the samples.
+        Unit of the samples.
     """
     if not check.contradictions:
         return None
@@ -317,7 +317,7 @@ def model_finding(check: ModelCheck, unit: str) -> Finding | None:
 
 
 def plausibility_findings(found: Plausibility, track: Track) -> Iterator[Finding]:
-    """Yield what no bob on a spring does, or no distance sensor sees.
+    """Yield findings on motions that are impossible for a bob on a spring, or not measurable by a distance sensor.
 
     Parameters
     ----------

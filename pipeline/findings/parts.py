@@ -10,7 +10,7 @@ from pipeline.windows.segments import Break, BreakKind, Segments, Span, SpanKind
 
 __all__ = ["part_findings"]
 
-SHOWN = 5  # times that one text lists
+SHOWN = 5  # maximum number of times listed in one text
 
 _WHAT = {
     BreakKind.RESTARTED: "The bob was released again",
@@ -20,12 +20,12 @@ _WHAT = {
 
 
 def part_findings(segments: Segments | None) -> Iterator[Finding]:
-    """Yield which seconds were left out, and why.
+    """Yield findings on the parts that were left out, and why.
 
     Parameters
     ----------
     segments : Segments or None
-        None: the whole recording was analysed.
+        None if the whole recording was analysed.
     """
     if segments is None:
         return

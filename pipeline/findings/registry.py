@@ -1,4 +1,4 @@
-"""The closed list of findings: for each code its severities, what it means, what causes it and what to do."""
+"""The closed list of findings: severities, meaning, cause and advice for each code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Severity = Literal["info", "warning", "error"]
 
 
 class Symptom(enum.Enum):
-    """Where a reader looks a finding up."""
+    """The heading under which a reader looks for a finding."""
 
     TIMES = "Times"
     DISTANCES = "Distances"
@@ -26,19 +26,19 @@ class Symptom(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class FindingKind:
-    """What is known of a finding before any run is looked at.
+    """The properties of a finding that are the same for all runs.
 
     Parameters
     ----------
     severities : tuple of {"info", "warning", "error"}
-        Those that it may have; the first is that of a finding from the reader of a file.
+        The severities that the finding may have; the first one is used if the reader of a file reports it.
     symptom : Symptom
     meaning, cause : str
         One sentence each.
     advice : str
-        What to do, one sentence; empty where nothing needs doing.
+        What to do, one sentence; empty if nothing needs to be done.
     figure : str
-        The report's figure that shows it: position, amplitude or phase; empty where none does.
+        The figure of the report that shows the finding: position, amplitude or phase; empty if none does.
     """
 
     severities: tuple[Severity, ...]
@@ -50,7 +50,7 @@ class FindingKind:
 
 
 UNKNOWN_CODE = "unknown_code"
-"""The code of a note that another version of springmass left in a run file and this one does not know."""
+"""The code for a note in a run file that was written by another version of springmass and is unknown to this one."""
 
 _INFO: tuple[Severity, ...] = ("info",)
 _WARNING: tuple[Severity, ...] = ("warning",)
@@ -589,7 +589,7 @@ FINDINGS: Mapping[str, FindingKind] = {
 
 
 def check_finding(code: str, severity: str) -> None:
-    """Refuse a finding that is not in the list.
+    """Raise an error if a finding is not registered with this severity.
 
     Raises
     ------

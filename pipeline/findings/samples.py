@@ -1,4 +1,4 @@
-"""Findings on samples: how many were usable, how they were measured, and at which times."""
+"""Findings on samples: how many were usable, how they were measured, and when."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from pipeline.track import U8, Track
 
 __all__ = ["clock_findings", "held_finding", "sample_findings"]
 
-MANY = 0.1  # of the samples: a tenth of false echoes is worth a warning, for the sensor is not well placed
-COARSE = 2.6  # a step this many times the noise is coarse: pure rounding noise is 1/sqrt(12) of a step, that is 3.5
-GUESSED = 3.0  # scatter that a stated error exceeds, of which no normal distribution has a sample in 300
+MANY = 0.1  # share of false echoes from which the finding is a warning: the sensor is probably badly placed
+COARSE = 2.6  # ratio of step to noise above which the step is coarse: for rounding noise alone it is sqrt(12) = 3.5
+GUESSED = 3.0  # minimum ratio of a stated error to the scatter: a normal distribution has one sample in 370 beyond it
 
 
 def sample_findings(
@@ -28,21 +28,21 @@ def sample_findings(
     *,
     by_chance: bool = False,
 ) -> Iterator[Finding]:
-    """Yield the findings on the samples, whether they oscillate or not.
+    """Yield the findings on the samples of a run, which need not oscillate.
 
     Parameters
     ----------
     conditioned : Conditioned
     flags : (n,) uint8
-        Final ones.
+        Final flags.
     noise_m : float
         Standard deviation of one sample, m.
     clusters : Clusters, optional
-        Of false echoes, where the run oscillates.
+        Clusters of false echoes, if the run oscillates.
     swing_m : (float, float), optional
-        Rest position and amplitude at the start, m, where the run oscillates.
+        Rest position and amplitude at the start, m, if the run oscillates.
     by_chance : bool
-        Whether noise explains all false echoes, so that they need no finding; they are flagged all the same.
+        Whether noise explains all false echoes, so that they need no finding; they remain flagged.
     """
     track, quantum_m = conditioned.track, conditioned.quantum_m
     counts, n, unit = count_quality(flags), len(track), track.unit
@@ -104,7 +104,7 @@ def sample_findings(
 
 
 def _distance_to_move(levels_m: Sequence[float], swing_m: tuple[float, float]) -> str:
-    """How far to move the sensor from a motion that is cut off at one end: by what lacks there, and 1 cm to spare."""
+    """Return the advice how far to move the sensor if the motion is cut off at one end, with a margin of 1 cm."""
     rest_m, amplitude_m = swing_m
     lacks = [(amplitude_m - abs(level - rest_m), "nearer" if level > rest_m else "away") for level in levels_m]
     if not lacks or len({way for _, way in lacks}) > 1 or max(lacks)[0] <= 0.0:
@@ -157,13 +157,13 @@ def held_finding(count: int, interval_s: float, unit: str) -> Finding:
 
 
 def clock_findings(track: Track, instrument: Instrument) -> Iterator[Finding]:
-    """Yield what the times show of the sensor's clock and of readings that came late.
+    """Yield findings on the clock of the sensor and on late readings.
 
     Parameters
     ----------
     track : Track
     instrument : Instrument
-        Of this track.
+        The instrument of this track.
     """
     if track.clock == "nominal":
         yield Finding(

@@ -1,4 +1,4 @@
-"""Findings on the scene: what was not stated, or stated without an uncertainty."""
+"""Findings on the scene: missing values, values without an uncertainty, and implausible values."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ __all__ = ["scene_findings"]
 
 
 def scene_findings(scene: Scene, effects: tuple[Effect, ...]) -> tuple[Finding, ...]:
-    """Return what to know of the inputs that results were derived from.
+    """Return the findings on the inputs from the scene.
 
     Parameters
     ----------
     scene : Scene
     effects : tuple of Effect
-        Say whether the spring's mass is in the model.
+        The effects table, which says whether the model includes the mass of the spring.
 
     Examples
     --------

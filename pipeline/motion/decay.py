@@ -1,6 +1,6 @@
-"""The free motion of a linearly damped bob at any strength of damping, fitted from starts that a record itself gives.
+"""The free motion of a linearly damped bob at any strength of damping, with start values taken from the record.
 
-Two parameters are searched for; rest position, displacement and velocity enter linearly and follow from them.
+The search varies two parameters; rest position, displacement and velocity enter linearly and follow from these two.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ from pipeline.track import F8
 
 __all__ = ["DecayFit", "best_decay", "critical_decay", "lone_exponential"]
 
-FAR = 20.0
-DIFFERENCE = 1e-5  # of a rate, by which it is moved for the covariance
+FAR = 20.0  # maximum change of the logarithm of a rate in the fit of a single exponential
+DIFFERENCE = 1e-5  # relative change of a rate in the difference quotients for the covariance
 
 Shape = Callable[[F8, F8], F8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecayFit:
-    """Where a fit of (o, a, v, ln g, ln w) ended.
+    """Result of a fit of (o, a, v, ln g, ln w).
 
     Parameters
     ----------
-    theta : (5,) float64
-        Critical, (4,): without the last.
+    theta : (5,) or (4,) float64
+        The parameters; with critical damping there are four, without ln w.
     covariance : (5, 5) or (4, 4) float64
     chi2 : float
     noise : float
-        Of a sample, m.
+        Standard deviation of a sample, m.
     """
 
     theta: F8
@@ -44,72 +44,74 @@ class DecayFit:
 
     @property
     def critical(self) -> bool:
-        """Whether w is g^2."""
+        """Whether the fit assumes critical damping, w = g^2."""
         return self.theta.size == 4
 
     @property
     def rate(self) -> float:
-        """g, 1/s."""
+        """The damping rate g, 1/s."""
         return math.exp(self.theta[3])
 
     @property
     def stiffness(self) -> float:
-        """w, the square of the undamped frequency, rad^2/s^2."""
+        """The square w of the undamped angular frequency, rad^2/s^2."""
         return self.rate**2 if self.critical else math.exp(self.theta[4])
 
     @property
     def square(self) -> float:
-        """q = g^2 - w, 1/s^2."""
+        """The difference q = g^2 - w, 1/s^2."""
         return self.rate**2 - self.stiffness
 
     @property
     def slowest(self) -> float:
-        """The rate at which the motion ends, 1/s: of two the slower."""
-        # g - sqrt(q) would lose digits.
+        """The rate at which the motion ends, 1/s; the slower one if there are two."""
+        # Computing g - sqrt(q) would lose digits.
         return self.stiffness / (self.rate + math.sqrt(self.square)) if self.square > 0.0 else self.rate
 
     def position(self, tau: F8) -> F8:
-        """Return the distances, (n,), m, at times since the start, s."""
+        """Return the distances (n,) in m at times ``tau`` since the start in s."""
         return np.asarray(_motion(tau, self.theta[3:]) @ self.theta[:3])
 
 
 def best_decay(tau: F8, y: F8, noise: float, rate_hz: float) -> DecayFit | None:
-    """Return the best of the fits from a grid of starts; None where none converged.
+    """Return the best of the fits from a grid of start values; None if no fit converged.
 
     Parameters
     ----------
     tau, y : (n,) float64
-        Times since the first sample, s, and distances, m.
+        Times since the first sample (in s) and distances (in m).
     noise : float
-        Of a sample, m.
+        Standard deviation of a sample, m.
     rate_hz : float
         Samples per second.
 
     Notes
     -----
-    Of :math:`\\ddot x + 2g\\dot x + w x = 0` about a rest position o, from x = a at speed v, the parameters are
-    (o, a, v, ln g, ln w), so that g and w stay positive and the valley that strong damping makes, where only w/2g is
-    known, is straight. With :math:`q = s^2 = g^2 - w` the motion is
+    The motion solves :math:`\\ddot x + 2g\\dot x + w x = 0` about a rest position o and starts from x = a with
+    velocity v. Its parameters are (o, a, v, ln g, ln w), so that g and w remain positive. With strong damping only
+    w/2g is determined, and in these parameters the resulting valley of chi-square is straight.
+    With :math:`q = s^2 = g^2 - w` the motion is
     :math:`e^{-gt}(a\\cosh st + (v + ga)\\sinh(st)/s)`: it oscillates for q < 0, is critically damped for q = 0 and
     has the two rates :math:`g \\mp \\sqrt q` for q > 0.
     """
     starts = _grid(tau, y, noise, rate_hz)
     ends = [_search(_motion, tau, y, noise, start) for start in starts]
-    # Two rates of which the record knows one make a valley without a floor; on its side there may be a minimum.
+    # If the record determines only one of two rates, chi-square has an open valley, possibly with a minimum beside it.
     minima = [end for end in ends if end.converged]
     return _described(tau, y, noise, min(minima, key=lambda end: end.cost)) if minima else None
 
 
 def critical_decay(tau: F8, y: F8, near: DecayFit) -> DecayFit | None:
-    """Return the critically damped motion near another; None where it was not found."""
+    """Return the critically damped fit started from another fit; None if it did not converge."""
     end = _search(_motion, tau, y, near.noise, near.theta[3:4])
     return _described(tau, y, near.noise, end) if end.converged else None
 
 
 def lone_exponential(tau: F8, y: F8, noise: float, rate: float) -> tuple[float, float]:
-    """Fit :math:`o + p e^{-rt}` from a rate, 1/s, and return r and chi-square.
+    """Fit :math:`o + p e^{-rt}` from a start value of the rate (in 1/s), and return r and chi-square.
 
-    Where the record shows no such rate the search runs away; it is followed for :data:`FAR` powers of e.
+    If the record shows no such rate the search diverges. The rate returned is therefore limited to a factor of e to
+    the power :data:`FAR` above or below the start value.
     """
     start = math.log(rate)
     end = _search(_exponential, tau, y, noise, np.array([start]))
@@ -117,7 +119,7 @@ def lone_exponential(tau: F8, y: F8, noise: float, rate: float) -> tuple[float, 
 
 
 def _described(tau: F8, y: F8, noise: float, end: least_squares.Fit) -> DecayFit:
-    """A fit with the linear parameters, and the covariance of all."""
+    """Return the fit with its linear parameters and the covariance of all parameters."""
     design = _motion(tau, end.values)
     linear = solve_weighted(design, y, np.ones(y.size)).values
     moved = [
@@ -129,7 +131,7 @@ def _described(tau: F8, y: F8, noise: float, end: least_squares.Fit) -> DecayFit
 
 
 def _search(shape: Shape, t: F8, y: F8, noise: float, start: F8) -> least_squares.Fit:
-    """Fit what does not enter linearly, by what the best linear parameters leave (n,)."""
+    """Fit the nonlinear parameters to the residuals (n,) that remain with the best linear parameters."""
 
     def residuals(theta: F8) -> F8:
         design = shape(t, theta)
@@ -142,10 +144,11 @@ def _search(shape: Shape, t: F8, y: F8, noise: float, start: F8) -> least_square
 
 
 def _grid(tau: F8, y: F8, noise: float, rate_hz: float) -> F8:
-    """Start values (k, 2) of (ln g, ln w): the best of a grid of oscillations, of rates near each other and apart.
+    """Return start values (k, 2) of (ln g, ln w): the best oscillations, pairs of close rates and of distinct rates.
 
-    On samples thinned with growing time, which stand for as many as lie about them. Of rates apart the slower is that
-    of the record's lone exponential, where there may be a minimum on the valley's side.
+    The grid is evaluated on samples that are thinned with time, each weighted by the number of samples it represents.
+    In pairs of distinct rates the slower rate is that of the single exponential fitted to the record, because there
+    may be a minimum beside the valley of chi-square.
     """
     rows = np.unique(np.concatenate([np.arange(min(60, tau.size)), np.geomspace(1, tau.size, 240).astype(int) - 1]))
     share = np.sqrt(np.gradient(rows.astype(np.float64)))[:, None]
@@ -166,18 +169,18 @@ def _grid(tau: F8, y: F8, noise: float, rate_hz: float) -> F8:
 
 
 def _exponential(t: F8, theta: F8) -> F8:
-    """Return a constant and a lone exponential (n, 2), for (ln r,)."""
+    """Return the columns (n, 2) of a constant and a single exponential for the parameter (ln r,)."""
     with np.errstate(all="ignore"):
         return np.stack([np.ones(t.size), np.exp(-np.exp(theta[0]) * t)], axis=1)
 
 
 def _motion(t: F8, theta: F8) -> F8:
-    """Return what each of (o, a, v) does to the distance (n, 3), for (ln g, ln w), or (ln g,) of critical damping.
+    """Return the derivatives (n, 3) of the distance by (o, a, v) for (ln g, ln w), or (ln g,) with critical damping.
 
     Notes
     -----
-    For positive q both functions are sums of two falling exponentials, so that nothing overflows; for negative q
-    cosine and sine stand in; for small arguments :math:`\\sinh(st)/s` is :math:`t + q t^3/6`.
+    For positive q both functions are sums of two decaying exponentials, so that nothing overflows. For negative q
+    they are replaced by cosine and sine. For small arguments :math:`\\sinh(st)/s` is :math:`t + q t^3/6`.
     """
     with np.errstate(all="ignore"):
         rate = np.exp(theta[0])
@@ -185,7 +188,7 @@ def _motion(t: F8, theta: F8) -> F8:
         square = rate**2 - stiffness
         root = np.sqrt(abs(square))
         if square > 0.0:
-            # g - sqrt(q) would lose digits.
+            # Computing g - sqrt(q) would lose digits.
             slow, fast = np.exp(-stiffness / (rate + root) * t), np.exp(-(rate + root) * t)
             cosine, sine = 0.5 * (slow + fast), 0.5 * (slow - fast)
         else:

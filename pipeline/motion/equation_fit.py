@@ -1,8 +1,8 @@
-"""The equation of motion: strongly damped oscillations by their equation of motion, law by law, through every sample.
+"""Equation fit: fits of the equation of motion with every drag law to all samples of a strongly damped oscillation.
 
-Amplitude laws are averages over a cycle, right to first order of the damping ratio. Where drag or friction takes a
-hundredth of the amplitude in a radian, or friction ends the motion within the record, an average over a cycle no longer
-says enough, and the equation itself is fitted.
+Amplitude laws are averages over a cycle and correct to first order in the damping ratio. If drag or friction takes a
+hundredth of the amplitude per radian, or friction ends the motion within the record, an average over a cycle is no
+longer sufficient, and the equation itself is fitted.
 """
 
 from __future__ import annotations
@@ -49,15 +49,15 @@ class Params:
     Parameters
     ----------
     least_damping : float
-        Damping ratio :math:`-\\dot A/A\\omega` at the first sample from which the equation of motion is fitted.
+        Damping ratio :math:`-\\dot A/A\\omega` at the first sample above which the equation of motion is fitted.
     always : float
-        Damping ratio from which it is fitted even where the windows, then few, show linear drag or none.
+        Damping ratio above which it is fitted even if the windows, which are then few, show linear drag or none.
     misfit : float
-        Greatest root mean square of what the richest law leaves, in units of the record's noise.
+        Maximum root mean square of the residual of the law with most parameters, in units of the record's noise.
     clip_sigmas : float
-        Residuals beyond this many standard deviations are false echoes and leave the fit.
+        Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
     most_periods : int
-        Over more of them it is not fitted where damping is weak, though the bob stops.
+        Maximum number of periods for the fit of a weakly damped motion that stops within the record.
     """
 
     most_periods: int = 250
@@ -69,11 +69,12 @@ class Params:
 
 @dataclass(frozen=True, slots=True)
 class EquationMisfit:
-    """Why no solution of the equation of motion describes a strongly damped record.
+    """The reason why the equation of motion was not fitted, or why its fit was rejected.
 
     Parameters
     ----------
     why : str
+        The reason, worded for a finding.
     """
 
     why: str
@@ -86,15 +87,16 @@ class EquationFit:
     Parameters
     ----------
     why : str
-        One sentence: how strong the damping is, and what was fitted.
+        One sentence that states the strength of the damping and what was fitted.
     damping : Damping
-        Every law's coefficients from the samples; A0 is the amplitude at the first of them
+        The coefficients of every law as fitted to the samples; A0 is the amplitude at the first sample
         (:func:`pipeline.motion.equation_model.envelope`).
     state : Joint
-        Rest position, displacement and velocity at the first sample, and the undamped angular frequency, as the
-        selected law has them.
+        Rest position, displacement and velocity at the first sample, and the undamped angular frequency, from the fit
+        of the selected law.
     waveform : Waveform
     flags : (n,) uint8
+        The final flags.
     """
 
     why: str
@@ -104,18 +106,18 @@ class EquationFit:
     flags: U8
 
     def squared_rate(self, t: F8) -> float:
-        """Return the mean by which drag lowers the square of the angular frequency over times t (n,), s, 1/s^2."""
+        """Return the mean decrease of the squared angular frequency by drag, 1/s^2, over times t (n,) in s."""
         best = self.damping.best
         return mean_squared_rate(best, best.amplitude(t - self.damping.t0), np.ones(t.size))
 
     def phase(self, demodulated: Demodulated) -> PhaseFit:
-        """Return the oscillation's frequency and phase as the stages after it take them.
+        """Return the oscillation's frequency and phase in the form that the later stages use.
 
         Notes
         -----
-        The square of the frequency is that of the undamped :math:`\\omega_0` less the mean of what drag takes over the
-        whole time, see :func:`pipeline.damping.law_fit.mean_squared_rate`: what a line through the turning points
-        shows, to second order.
+        The squared frequency is that of the undamped :math:`\\omega_0` minus the mean decrease by drag over the whole
+        time (:func:`pipeline.damping.law_fit.mean_squared_rate`). To second order it is the frequency that a line
+        through the turning points gives.
         """
         t, (_, y, v, natural) = demodulated.t, self.state.values.tolist()
         squared_rate = self.squared_rate(t)
@@ -126,7 +128,7 @@ class EquationFit:
         mu, gamma, beta = (coefficients[n].value if n in coefficients else 0.0 for n in COEFFICIENTS)
         _, start, _ = envelope(y, v, natural, mu, gamma, beta)
         middle = float(np.mean(t))
-        # The total phase goes on from the windows' own count of turns.
+        # The total phase continues the windows' count of whole turns.
         turns = round((float(demodulated.phase[0]) - start - omega * float(t[0] - self.damping.t0)) / (2.0 * math.pi))
         centre = start + 2.0 * math.pi * turns + omega * (middle - self.damping.t0)
         return PhaseFit(
@@ -144,12 +146,12 @@ class EquationFit:
         )
 
     def windows(self, demodulated: Demodulated) -> Demodulated:
-        """Return the windows with the residuals of the solution: a sinusoid per window fails where the bob stops."""
+        """Return the windows with the residuals of the solution, as sinusoids in windows fail where the bob stops."""
         noise = np.full(demodulated.noise.shape, self.waveform.rms_m)
         return replace(demodulated, flags=self.flags, residual=self.waveform.residual, noise=noise)
 
     def rest(self, demodulated: Demodulated) -> Rest:
-        """Return the rest position, one for the whole record: where friction holds the bob is another."""
+        """Return the constant rest position of the record; the place where friction holds the bob may differ."""
         rest = self.state["rest"]
         return Rest(rest, 0.0, False, demodulated.t, np.full(demodulated.t.size, rest.value))
 
@@ -163,36 +165,37 @@ def fit_equation(
     *,
     stopped: bool = False,
 ) -> EquationFit | EquationMisfit | None:
-    """Fit the equation of motion where the damping requires it.
+    """Fit the equation of motion if the damping requires it.
 
     Parameters
     ----------
     conditioned : Conditioned
     demodulated : Demodulated
     damping : Damping
-        The laws of the amplitude, from which the fits start.
+        The fits of the amplitude laws, from which the fits here start.
     params : Params, optional
     laws : pipeline.damping.select.Params, optional
-        For the choice among the laws.
+        Options for the choice among the laws.
     stopped : bool
-        Whether the bob was seen to stop within the record, as :func:`moving_part` finds.
+        Whether the bob stops within the record, as found by :func:`pipeline.samples.stopping.moving_part`.
 
     Returns
     -------
     EquationFit, EquationMisfit or None
-        None where damping is weak or no law but none and linear drag is at hand, for which the amplitude's law is
-        exact.
+        None if damping is weak, if no law with damping can be fitted, or if linear drag or no damping is selected, for
+        which the amplitude law is exact.
 
     Notes
     -----
-    Of :math:`\\ddot y = -\\omega_0^2 y - 2\\gamma\\dot y - b|\\dot y|\\dot y - f\\,\\mathrm{sign}(\\dot y)` the
-    parameters are the rest position, displacement and velocity at the first sample, :math:`\\omega_0`, and the
-    coefficients in the convention of the amplitude, :math:`\\beta = 4\\omega_0 b/3\\pi` and
-    :math:`\\mu = 2f/\\pi\\omega_0`. Solutions come from Strang splitting with located turning points
-    (:mod:`pipeline.dynamics.strang`), the least squares from :mod:`pipeline.numerics.least_squares`.
+    The equation of motion is
+    :math:`\\ddot y = -\\omega_0^2 y - 2\\gamma\\dot y - b|\\dot y|\\dot y - f\\,\\mathrm{sign}(\\dot y)`.
+    The parameters are the rest position, displacement and velocity at the first sample, :math:`\\omega_0`, and the
+    coefficients as defined for the amplitude laws, :math:`\\gamma`, :math:`\\beta = 4\\omega_0 b/3\\pi` and
+    :math:`\\mu = 2f/\\pi\\omega_0`. The equation is solved by Strang splitting with located turning points
+    (:mod:`pipeline.dynamics.strang`) and fitted by :mod:`pipeline.numerics.least_squares`.
 
-    The richest law goes first: what it leaves shows false echoes and the noise. The others are held to that noise,
-    and chosen among as the amplitude's laws are.
+    The law with most parameters is fitted first: its residual shows the false echoes and the noise. The other laws are
+    compared with this noise and selected by the same rules as the amplitude laws.
     """
     params, laws = params or Params(), laws or DampingParams()
     ratio = damping.best.rate_at_start() / demodulated.angular_frequency
@@ -236,7 +239,7 @@ def fit_equation(
 
 
 def _fittable(damping: Damping) -> list[Drag]:
-    """The laws to be fitted that have an equation of motion with damping, the richest last."""
+    """Return the laws to be fitted that have an equation of motion with damping, in order of parameter count."""
     wanted = [law for law in DRAGS if law.powers and (law.name in damping.fits or law.name in damping.unfitted)]
     return sorted(wanted, key=lambda law: len(law.powers))
 
@@ -246,7 +249,7 @@ def _required(damping: Damping, demodulated: Demodulated, ratio: float, params: 
         return True
     best = damping.best.law
     if isinstance(best, Drag) and set(best.powers) <= {1}:
-        return False  # the amplitude's law is exact
+        return False  # for these laws the amplitude law is exact
     last = damping.best.amplitude(np.array([float(np.max(demodulated.t)) - damping.t0]))
     return ratio > params.least_damping or bool(last[0] <= 0.0)
 

@@ -1,4 +1,4 @@
-"""The free motion of a bob by its equation, at any times and for any of the laws of drag: what a fit compares."""
+"""The free motion of a bob from its equation of motion, at any times and for any law of drag, as a model for fits."""
 
 from __future__ import annotations
 
@@ -15,37 +15,37 @@ from pipeline.track import F8
 __all__ = ["COEFFICIENTS", "STATE", "FreeMotion", "envelope"]
 
 STATE = ("rest", "displacement", "velocity", "angular_frequency")
-STEP = 0.08  # of the oscillation's angle: splitting and interpolation then err by less than 1e-4 of the amplitude
-REACH = 3.0  # factor by which a frequency may leave that of the start
-DIFFERENCE = 1e-6  # of each coefficient's scale, by which it is moved for a derivative
-LENGTHS = (1, 1, 1, 0, 1, 0, -1)  # powers of a length in each parameter
-KEPT = 8  # trajectories
+STEP = 0.08  # time step in radians; splitting and interpolation then err by less than 1e-4 of the amplitude
+REACH = 3.0  # maximum ratio, either way, of a frequency to its start value
+DIFFERENCE = 1e-6  # change of a coefficient in a difference quotient, relative to the coefficient's scale
+LENGTHS = (1, 1, 1, 0, 1, 0, -1)  # power of length in the unit of each parameter
+KEPT = 8  # maximum number of cached trajectories
 
 
 def envelope(y: float, v: float, omega: float, mu: float, gamma: float, beta: float) -> tuple[float, float, float]:
-    """Return amplitude and phase of a damped motion at displacement y and velocity v, and what the amplitude is off by.
+    """Return amplitude and phase of a damped motion at displacement y and velocity v, and the amplitude's error bound.
 
     Parameters
     ----------
     y, v, omega, mu, gamma, beta : float
-        In m, m/s, rad/s and the amplitude laws' units.
+        Values in m, m/s, rad/s and the units of the amplitude laws.
 
     Notes
     -----
-    The amplitude A is that of :math:`y = A\\cos\\varphi`, the smooth curve whose law the coefficients are. With
-    :math:`\\lambda = \\gamma + \\beta A + \\mu/A` and :math:`\\omega_d^2 = \\omega^2 - \\lambda^2`, under linear drag
+    The amplitude A is that of :math:`y = A\\cos\\varphi`: the smooth curve whose law has these coefficients. With
+    :math:`\\lambda = \\gamma + \\beta A + \\mu/A` and :math:`\\omega_d^2 = \\omega^2 - \\lambda^2`, linear drag gives
 
     .. math:: A\\cos\\varphi = y, \\quad A\\sin\\varphi = -(v + \\lambda y)/\\omega_d,
 
-    which is taken for all. Quadratic drag and friction take their share at other phases of a swing [1]_; to first
-    order, with :math:`\\varphi` in 0 to :math:`\\pi` and :math:`h = \\frac12\\sin 2\\varphi`, A is larger by
+    which is used for all laws. Quadratic drag and friction dissipate at other phases of a swing [1]_. To first order,
+    with :math:`\\varphi` from 0 to :math:`\\pi` and :math:`h = \\frac12\\sin 2\\varphi`, they increase A by
 
     .. math:: \\tfrac{\\beta A^2}{\\omega}\\left[\\tfrac{3\\pi}{4}\\left(\\tfrac23 - \\cos\\varphi
               + \\tfrac13\\cos^3\\varphi\\right) - \\varphi + h\\right]
               + \\tfrac{\\mu}{\\omega}\\left[\\tfrac{\\pi}{2}(1 - \\cos\\varphi) - \\varphi + h\\right].
 
-    Against the curve through the turning points of adaptive integrations this errs by up to
-    :math:`0.3\\,\\lambda(\\lambda - \\gamma)/\\omega^2` of A, not at all under linear drag.
+    Compared with the curve through the turning points of adaptive integrations, A has a relative error of up to
+    :math:`0.3\\,\\lambda(\\lambda - \\gamma)/\\omega^2`; under linear drag it is exact.
 
     References
     ----------
@@ -67,22 +67,22 @@ def envelope(y: float, v: float, omega: float, mu: float, gamma: float, beta: fl
 
 
 class FreeMotion:
-    """Displacements from the sensor against time, of parameters (o, y0, v0, omega0, mu, gamma, beta).
+    """Distances from the sensor against time for the parameters (o, y0, v0, omega0, mu, gamma, beta).
 
     Parameters
     ----------
     t : (n,) float64, s
-        Since the instant at which displacement y0 and velocity v0 are taken.
+        Time since the instant at which the displacement is y0 and the velocity v0.
     omega : float
-        About the angular frequency, rad/s: it sets the integrator's step.
+        Approximate angular frequency, rad/s, from which the integrator's step follows.
     amplitude_m : float
-        About the first amplitude, m, for the size of differences.
+        Approximate first amplitude, m, from which the step of difference quotients follows.
 
     Notes
     -----
-    Coefficients below zero, through which an unbounded fit must pass, have no equation of motion. There the motion is
-    continued from zero by its odd part, :math:`x(-c) = 2x(0) - x(c)`, which is smooth to first order: all that a
-    coefficient of a few standard uncertainties feels.
+    Negative coefficients, which an unbounded fit must be able to pass through, have no equation of motion. For them
+    the motion is continued from zero as an odd function, :math:`x(-c) = 2x(0) - x(c)`. This is smooth to first order,
+    which suffices for a coefficient within a few standard uncertainties of zero.
     """
 
     def __init__(self, t: F8, omega: float, amplitude_m: float) -> None:
@@ -96,7 +96,7 @@ class FreeMotion:
         )
 
     def position(self, theta: F8) -> F8:
-        """Return the distances (n,), m; NaN where the parameters are none of this motion."""
+        """Return the distances (n,) in m; NaN for parameters that are not finite or a frequency far from the start."""
         if not (np.all(np.isfinite(theta)) and self._omega / REACH < theta[3] < REACH * self._omega):
             return np.full(self.t.size, np.nan)
         found: F8 = theta[0] + self.trajectory(theta).at(self.t)
@@ -106,14 +106,14 @@ class FreeMotion:
         return found
 
     def derivatives(self, theta: F8, slots: list[int]) -> F8:
-        """Return the derivatives (n, p) of the distances by some of the parameters.
+        """Return the derivatives (n, p) of the distances by the parameters with indices ``slots``.
 
-        All coefficients that are not zero must be among them.
+        All nonzero coefficients must be among these parameters.
 
         Notes
         -----
-        Only coefficients are moved to see what the motion does. The motion goes on alike from any of its states, in
-        any unit of length, and in any unit of time, which gives the rest:
+        Difference quotients are used for the coefficients only. The other derivatives follow from the invariance of
+        the motion under a shift of the start along it and under changes of the units of length and time:
 
         .. math::
             (\\dot y_0\\,\\partial_{y_0} + \\ddot y_0\\,\\partial_{v_0})\\,y &= \\dot y \\
@@ -126,12 +126,12 @@ class FreeMotion:
         found = self._slopes(np.concatenate([theta[: len(STATE)], np.abs(theta[len(STATE) :])]), slots)
         if below:
             at_zero = self._slopes(np.concatenate([theta[: len(STATE)], np.maximum(theta[len(STATE) :], 0.0)]), slots)
-            # By what is below zero the continued motion has the slope of its odd counterpart.
+            # The derivative by a negative coefficient equals that at its absolute value, as the continuation is odd.
             found = np.where(np.isin(slots, below), found, 2.0 * at_zero - found)
         return found
 
     def _slopes(self, theta: F8, slots: list[int]) -> F8:
-        """Derivatives (n, p) where no coefficient is below zero."""
+        """Return the derivatives (n, p) if no coefficient is negative."""
         path = self.trajectory(theta)
         y, speed = path.at(self.t), self._velocity(path)
         columns: dict[int, F8] = {}
@@ -152,12 +152,12 @@ class FreeMotion:
         return np.stack([columns[slot] for slot in slots], axis=1)
 
     def velocity(self, theta: F8) -> F8:
-        """Return the velocities (n,), m/s."""
+        """Return the velocities (n,) in m/s."""
         return self._velocity(self.trajectory(theta))
 
     def _velocity(self, path: Trajectory) -> F8:
         pull = self._acceleration(path.problem.equation, path.y, path.v)
-        # A bob without velocity is taken to be held; one that only turns there is seen between two other states.
+        # A state with zero velocity is taken as held by friction; turning points lie between two states of the path.
         return Trajectory(path.problem, path.spacing_s, path.v, np.where(path.v == 0.0, 0.0, pull)).at(self.t)
 
     @staticmethod
@@ -166,12 +166,12 @@ class FreeMotion:
         return -equation.spring(y) - drag - equation.friction_m_per_s2 * np.sign(v)
 
     def trajectory(self, theta: F8) -> Trajectory:
-        """Return the solution about rest; of coefficients below zero their amounts count."""
+        """Return the solution about the rest position, with the absolute values of the coefficients."""
         key = theta[1:].tobytes()
         if key not in self._kept:
             _, y, v, omega, mu, gamma, beta = (float(x) for x in theta)
             equation = Equation.from_laws(omega, gamma_per_s=abs(gamma), beta_per_m_s=abs(beta), mu_m_per_s=abs(mu))
-            # A fit evaluates residuals and then derivatives at one point: the last few are kept.
+            # A fit evaluates residuals and derivatives at the same point, so the latest trajectories are cached.
             while len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[key] = STRANG.run(Problem(equation, y, v), self._spacing, self._steps)

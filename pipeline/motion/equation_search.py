@@ -1,9 +1,9 @@
-"""Search for the solution of the equation of motion that a record follows: start, false echoes, law.
+"""Search for the solution of the equation of motion that a record follows: start values, false echoes, law.
 
-1. :func:`samples_of` collects what a solution is compared with.
-2. :func:`first_solution` fits the richest law from the first start that leads to one that stands.
-3. :func:`without_echoes` fits it until the set of false echoes stays; its residual is the noise.
-4. :func:`choose_law` fits the other laws to the same samples and chooses among all.
+1. :func:`samples_of` collects the samples with which a solution is compared.
+2. :func:`first_solution` fits the law with most parameters from several start values until a solution is acceptable.
+3. :func:`without_echoes` repeats this fit until the set of false echoes is stable; the residual gives the noise.
+4. :func:`choose_law` fits the other laws to the same samples and selects one law.
 """
 
 from __future__ import annotations
@@ -36,24 +36,24 @@ COUNT = len(STATE) + len(COEFFICIENTS)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """What a solution is compared with.
+    """The samples with which a solution is compared.
 
     Parameters
     ----------
     conditioned : Conditioned
     elapsed : (n,) float64, s
-        Since the first sample used, and within the samples used.
+        Time since the first sample used, limited to the range of the samples used.
     within : (n,) bool
-        Usable samples of the moving bob: at rest they show noise alone, and in their number hide what the moving ones
-        do not fit.
+        True for usable samples of the moving bob. Samples at rest show only noise, and many of them would hide a
+        misfit of the moving samples.
     used : (n,) bool
-        Those of them that the windows used; false echoes that the solution explains come back later.
+        True for the samples of ``within`` that the windows used; false echoes that the solution explains return later.
     stopped : bool
-        Whether the bob stops within the record and stays at rest.
+        Whether the bob stops within the record and remains at rest.
     omega : float
-        About the angular frequency, rad/s.
+        Approximate angular frequency, rad/s.
     size_m, expected_m : float
-        About the first amplitude, and the noise of one sample.
+        Approximate first amplitude and expected noise of one sample, m.
     """
 
     conditioned: Conditioned
@@ -66,7 +66,7 @@ class Samples:
     expected_m: float
 
     def model(self, rows: NDArray[np.bool_] | slice = slice(None)) -> FreeMotion:
-        """Return the motion at some samples, all by default."""
+        """Return the model of the motion at selected samples, all by default."""
         return FreeMotion(self.elapsed[rows], self.omega, self.size_m)
 
     def fit(
@@ -76,7 +76,7 @@ class Samples:
         rows: NDArray[np.bool_],
         noise_m: float,
     ) -> Fit:
-        """Fit one law to some samples, in units of their noise, from all parameters (7,)."""
+        """Fit one law to selected samples in units of their noise, from start values of all parameters (7,)."""
         model, own, y = self.model(rows), slots(law), self.conditioned.track.y[rows]
 
         def residuals(values: F8) -> F8:
@@ -90,15 +90,16 @@ class Samples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cleaned:
-    """The richest law's solution and the samples that it was fitted to.
+    """The solution of the law with most parameters, and the samples to which it was fitted.
 
     Parameters
     ----------
     theta : (7,) float64
         Rest position, displacement, velocity, angular frequency and the coefficients.
     used : (n,) bool
+        True for the samples of the fit.
     noise_m, correlation : float
-        Root mean square of the residual, and the samples that count as one.
+        Root mean square of the residual, and its correlation length as a number of samples.
     """
 
     theta: F8
@@ -108,19 +109,19 @@ class Cleaned:
 
 
 def slots(law: Drag) -> list[int]:
-    """Return the places of state and coefficients of a law among all parameters."""
+    """Return the indices of a law's state and coefficients among all parameters."""
     return [*range(len(STATE)), *(len(STATE) + power for power in law.powers)]
 
 
 def full(law: Drag, values: F8) -> F8:
-    """Return all parameters (7,) from a law's, absent coefficients zero."""
+    """Return all parameters (7,) from those of a law, with zero for absent coefficients."""
     theta = np.zeros(COUNT)
     theta[slots(law)] = values
     return theta
 
 
 def samples_of(conditioned: Conditioned, demodulated: Demodulated, damping: Damping, stop: int | None) -> Samples:
-    """Collect the samples; ``stop`` is the index of the sample from which on the bob rests."""
+    """Collect the samples; ``stop`` is the index of the first sample at which the bob is at rest."""
     track, size_m = conditioned.track, abs(float(damping.best.joint.values[0]))
     within = conditioned.used & (np.arange(track.t.size) < (track.t.size if stop is None else stop))
     last = float(np.max(track.t[conditioned.used]))
@@ -141,7 +142,7 @@ def samples_of(conditioned: Conditioned, demodulated: Demodulated, damping: Damp
 def first_solution(
     samples: Samples, demodulated: Demodulated, damping: Damping, laws: Sequence[Drag], misfit: float
 ) -> F8:
-    """Return the richest law's solution (7,), from the first start that leads to one that stands, or the best.
+    """Return the solution (7,) of the law with most parameters: the first acceptable one, or else the best.
 
     Parameters
     ----------
@@ -149,15 +150,16 @@ def first_solution(
     demodulated : Demodulated
     damping : Damping
     laws : sequence of Drag
-        The richest one last.
+        The laws, the one with most parameters last.
     misfit : float
-        Greatest root mean square of what a solution leaves, in units of the noise.
+        Maximum root mean square of an acceptable solution's residual, in units of the noise.
 
     Notes
     -----
-    Where friction ends the motion the number of swings is whole, and each number has its own minimum: one that
-    does not stand leaves more than noise, or has a coefficient below zero. Starts are the best of those by the laws of
-    the amplitude, then where each kind of damping alone ends from the best of a grid.
+    If friction ends the motion, chi-square has a separate minimum for each whole number of swings. A solution is
+    unacceptable if its residual exceeds the noise or if a coefficient is negative. The first start is the best of
+    those from the amplitude laws. Each further start is the fit of one kind of damping alone, itself started from the
+    best point of a grid.
     """
     model, y = samples.model(samples.used), samples.conditioned.track.y[samples.used]
 
@@ -182,7 +184,7 @@ def first_solution(
 
 
 def _by_amplitude(demodulated: Demodulated, damping: Damping, laws: Sequence[Drag]) -> list[F8]:
-    """Starts without damping, and from the laws of the amplitude."""
+    """Return start values without damping and with the coefficients of the amplitude laws."""
     omega, first = demodulated.angular_frequency, damping.best.joint.values[0]
     angle = float(demodulated.phase[0]) - omega * (float(demodulated.t[0]) - damping.t0)
     rest = float(np.average(demodulated.offset, weights=np.maximum(demodulated.amplitude, 0.0) ** 2))
@@ -201,10 +203,10 @@ def _by_amplitude(demodulated: Demodulated, damping: Damping, laws: Sequence[Dra
 
 
 def _by_first_samples(samples: Samples, law: Drag) -> list[F8]:
-    """Starts from the first samples' parabola, with a range of strengths of the one kind of damping in a law."""
+    """Return start values from a parabola through the first samples, with a range of strengths of one damping term."""
     y, tau, omega = samples.conditioned.track.y[samples.used], samples.elapsed[samples.used], samples.omega
     rest = float(np.median(y[-max(y.size // 10, 5) :]))
-    # A parabola through samples of less than a radian, or five at least.
+    # The parabola is fitted to the samples of the first 0.8 rad, but to at least five.
     early = slice(max(int(np.count_nonzero(tau < 0.8 / omega)), 5))
     speed, level = np.polynomial.polynomial.polyfit(tau[early], y[early] - rest, 2)[1::-1]
     size = np.hypot(level, speed / omega)
@@ -217,18 +219,19 @@ def _by_first_samples(samples: Samples, law: Drag) -> list[F8]:
 
 
 def without_echoes(samples: Samples, law: Drag, start: F8, clip_sigmas: float, rounds: int = 3) -> Cleaned | None:
-    """Fit a law until the set of false echoes stays; None where it explains no sample.
+    """Fit a law until the set of false echoes is stable; return None if too few samples lie on the solution.
 
     Parameters
     ----------
     samples : Samples
     law : Drag
-        The richest one.
+        The law with most parameters.
     start : (7,) float64
+        Start values of all parameters.
     clip_sigmas : float
-        Residuals beyond this many standard deviations are false echoes.
+        Samples whose residuals exceed this many standard deviations are false echoes.
     rounds : int
-        Most fits.
+        Maximum number of fits.
     """
     theta, used, y = start, samples.used, samples.conditioned.track.y
     for _ in range(rounds):
@@ -251,16 +254,16 @@ def without_echoes(samples: Samples, law: Drag, start: F8, clip_sigmas: float, r
 def choose_law(
     samples: Samples, cleaned: Cleaned, damping: Damping, laws: Sequence[Drag], params: DampingParams
 ) -> tuple[Damping, Fit] | None:
-    """Fit every law and choose among them; None where no fit converged.
+    """Fit every law and select one; return None if no fit has a finite covariance.
 
     Parameters
     ----------
     samples : Samples
     cleaned : Cleaned
     damping : Damping
-        The laws of the amplitude.
+        The fits of the amplitude laws.
     laws : sequence of Drag
-        The richest one last.
+        The laws, the one with most parameters last.
     params : pipeline.damping.select.Params
     """
     richest = laws[-1]
@@ -284,7 +287,7 @@ def choose_law(
 def _weighed(
     cleaned: Cleaned, laws: Sequence[Drag], fits: Mapping[str, Fit], params: DampingParams
 ) -> dict[str, LawFit]:
-    """Compare each law with the noise, the amplitude at the start in place of displacement and velocity."""
+    """Compare each law with the noise; the start amplitude replaces displacement and velocity as a parameter."""
     by_name = {law.name: law for law in laws if law.name in fits}
     minima = {name: _minimum(law, fits[name]) for name, law in by_name.items()}
     least = least_chi2(minima, by_name)
@@ -296,7 +299,7 @@ def _weighed(
 
 
 def _minimum(law: Drag, fit: Fit) -> Minimum:
-    """A law's fit in the parameters of the amplitude's law."""
+    """Return a law's fit, converted to the parameters of the amplitude law."""
 
     def start(values: F8) -> F8:
         return np.array([envelope(*full(law, values)[1:].tolist())[0]])

@@ -1,4 +1,4 @@
-"""The fitted motion: amplitude, phase and rest position against time, by windows or by the equation of motion."""
+"""The fitted motion: amplitude, phase and rest position against time, from windows or from the equation of motion."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ __all__ = ["Fitted", "fit_by_equation", "fit_by_windows", "fit_waveform"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """An oscillation, as the stages after the fit take it.
+    """An oscillation in the form that the stages after the fit use.
 
     Parameters
     ----------
     demodulated : Demodulated
-        With the final flags.
+        The windows with the final flags.
     disturbances : Disturbances
-        What was taken out of the record before.
+        The disturbances that were subtracted from the record before the fit.
     damping, phase, rest, waveform
-        Of the record without it.
+        Results for the record without these disturbances.
     full : FullFit or None
-        The fit of the whole waveform, where there was one.
+        The fit of the whole waveform, if one was made.
     """
 
     demodulated: Demodulated
@@ -45,7 +45,10 @@ class Fitted:
     full: FullFit | None
 
     def in_unit(self, unit: str) -> Fitted:
-        """Return the same of a record in another unit: the stages know only that values have one, and write m."""
+        """Return this fit with the unit ``unit`` in place of m, for a record whose values are in another unit.
+
+        The stages do not know the unit of the values and label them with m.
+        """
         if unit == "m":
             return self
         fits = {name: _law_in_unit(fit, unit) for name, fit in self.damping.fits.items()}
@@ -71,7 +74,7 @@ def fit_by_windows(
     Parameters
     ----------
     demodulated, disturbances, damping
-        Outputs of the stages of those names.
+        Outputs of the stages with these names.
     params : pipeline.motion.phase.Params, optional
     """
     phase, rest = fit_phase(demodulated, damping, params), fit_rest(demodulated)
@@ -80,19 +83,19 @@ def fit_by_windows(
 
 
 def fit_waveform(fitted: Fitted, conditioned: Conditioned, params: WaveformParams) -> Fitted:
-    """Return the oscillation from a fit of the whole waveform that begins where the windows arrived.
+    """Return the oscillation from a fit of the whole waveform that starts from the windows' result.
 
     Parameters
     ----------
     fitted : Fitted
-        By windows.
+        The fit by windows.
     conditioned : Conditioned
-        The samples with all disturbances.
+        The samples including all disturbances.
     params : pipeline.motion.waveform_fit.Params
     """
     disturbances = fitted.disturbances
-    # The samples without modes, with the modes' columns, give the same fit as all samples: the columns span what was
-    # taken out.
+    # With the disturbances' columns in the model, the samples without disturbances give the same fit as the original
+    # samples, because the columns span the subtracted motion.
     full = fit_record(
         disturbances.conditioned,
         fitted.demodulated,
@@ -113,9 +116,9 @@ def fit_by_equation(solved: EquationFit, conditioned: Conditioned, demodulated: 
     Parameters
     ----------
     solved : EquationFit
-        Of the whole record, so that nothing was taken out of it.
+        The solution for the whole record, from which no disturbances were subtracted.
     conditioned, demodulated
-        Outputs of the stages of those names.
+        Outputs of the stages with these names.
     """
     demodulated = solved.windows(demodulated)
     phase, rest = solved.phase(demodulated), solved.rest(demodulated)

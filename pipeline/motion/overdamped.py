@@ -1,4 +1,4 @@
-"""Overdamped motion: records in which damping ends the motion before, or almost before, it can oscillate."""
+"""Overdamped motion: records in which damping ends the motion before it completes more than a few cycles."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ __all__ = ["Kind", "Overdamped", "Params", "find_overdamped", "spring_constant"]
 
 Kind = Literal["overdamped", "critical", "strong"]
 
-FEWEST = 20  # samples in which five parameters can be looked for
-POINTS = 300  # to which a record is averaged where models of its shape are compared
+FEWEST = 20  # minimum number of samples for a fit of five parameters
+POINTS = 300  # approximate number of block means to which a record is reduced before shapes are compared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,13 +34,13 @@ class Params:
     Parameters
     ----------
     evidence : float
-        By how much the BIC of a relaxation must beat that of any drift, step or ramp.
+        Margin by which the BIC of a relaxation must be lower than that of any drift, step or ramp.
     misfit : float
-        Greatest root mean square of what the fit leaves, in units of the record's noise.
+        Maximum root mean square of the fit's residual, in units of the record's noise.
     least_damping : float
-        Damping ratio zeta from which an oscillation counts as strongly damped; below, its cycles are analysed.
+        Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
     u_clock : float
-        Relative standard uncertainty of the clock, whatever kept the time: that of its crystal.
+        Relative standard uncertainty of the clock; the tolerance of a crystal is assumed for every clock.
     """
 
     evidence: float = 10.0
@@ -51,21 +51,22 @@ class Params:
 
 @dataclass(frozen=True, slots=True)
 class Overdamped:
-    """A motion that damping ends within a few cycles or without any.
+    """A motion that damping ends within a few cycles or before the first one.
 
     Parameters
     ----------
     why : str
-        One sentence with the rates.
+        One sentence that states the rates or the damping ratio.
     kind : {"overdamped", "critical", "strong"}
-        Two rates; one; or an oscillation whose damping ratio is large.
+        Relaxation with two rates, relaxation with one rate, or an oscillation whose damping ratio is large.
     damping_ratio : Estimate
         :math:`\\zeta = g/\\omega_0`.
     squared_frequency : Estimate
-        :math:`\\omega_0^2` of the undamped motion, rad^2/s^2: times the mass, the spring constant.
+        :math:`\\omega_0^2` of the undamped motion, rad^2/s^2; multiplied by the mass it is the spring constant.
     estimates : mapping of str to Estimate
+        All other fitted quantities by name.
     start_s : float
-        From where the motion was followed, s.
+        Time at which the fitted part of the motion begins, s.
     """
 
     why: str
@@ -77,7 +78,7 @@ class Overdamped:
 
 
 def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> Overdamped | NoOscillation | None:
-    """Fit the free motion of a linearly damped bob, and say which kind of damping it shows.
+    """Fit the free motion of a linearly damped bob and classify its damping.
 
     Parameters
     ----------
@@ -87,16 +88,17 @@ def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> O
     Returns
     -------
     Overdamped, NoOscillation or None
-        NoOscillation says that the record is a lone exponential, which a drift looks like too. None where it is no
-        relaxation: noise, a drift, a step, a ramp, a weakly damped oscillation.
+        NoOscillation if the record is a single exponential, which a drift can resemble. None if the record is no
+        relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
 
     Notes
     -----
-    :func:`pipeline.motion.decay.best_decay` covers all strengths of damping. A relaxation must leave no more than 1.5
-    times the noise, in its moving part too, beat every polynomial to the third degree, every step and every ramp by
-    ten in BIC, and be over within the record (:math:`gT > 2`). Of critical damping, two rates and an oscillation
-    the one of lowest BIC is taken, which must be lower than a lone exponential's by six. A record
-    that begins before the release is followed from where the displacement begins to fall.
+    :func:`pipeline.motion.decay.best_decay` covers all strengths of damping. A relaxation is accepted if its residual
+    is at most 1.5 times the noise, also in its moving part alone, and if it ends within the record (:math:`gT > 2`).
+    Its BIC must also be lower by ten than that of every polynomial up to degree three, every step and every ramp.
+    Critical damping and the free fit (two rates or an oscillation) are compared by BIC; the better one must have a
+    BIC lower by six than a single exponential. If a record begins before the release, the fit begins where the
+    displacement begins to fall.
     """
     params = params or Params()
     used = conditioned.used
@@ -114,7 +116,7 @@ def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> O
 
 
 def _moves(y: F8, noise: float, evidence: float) -> bool:
-    """Whether means over parts of the record differ by so much that a relaxation could explain them."""
+    """Return whether block means of the record vary enough for a relaxation to explain the variation."""
     size = max(1, y.size // POINTS)
     values = y[: y.size // size * size].reshape(-1, size).mean(axis=1)
     excess = float(np.sum((values - values.mean()) ** 2)) * size / noise**2 - values.size
@@ -122,7 +124,7 @@ def _moves(y: F8, noise: float, evidence: float) -> bool:
 
 
 def _starts(y: F8, noise: float) -> Iterator[int]:
-    """Where the motion may begin: at the first sample, or where a held displacement begins to fall."""
+    """Yield the rows at which the motion may begin: the first sample, then the release of a held displacement."""
     yield 0
     rest = float(np.median(y[-max(y.size // 10, 5) :]))
     away = np.abs(y - rest)
@@ -142,21 +144,21 @@ def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params
     if choice is None or isinstance(choice, NoOscillation):
         return choice
     kind, fit = choice
-    # Uncertainties grow with what the fit leaves beyond the noise.
+    # A residual larger than the noise increases the uncertainties.
     fit = replace(fit, covariance=fit.covariance * max(1.0, fit.chi2 / max(t.size - 5, 1)))
     found = _described(fit, kind, float(t[0]), t.size, params.u_clock, conditioned.track.unit)
     return None if kind == "strong" and found.damping_ratio.value < params.least_damping else found
 
 
 def _misses(tau: F8, y: F8, fit: DecayFit, misfit: float) -> bool:
-    """Whether the fit leaves too much of the record, or of the part in which it moves."""
+    """Return whether the residual is too large over the whole record or over its moving part."""
     squares = ((y - fit.position(tau)) / fit.noise) ** 2
     count = max(int(np.searchsorted(tau, 4.0 / fit.slowest)), 12)
     return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > misfit**2)
 
 
 def _beats_other_shapes(tau: F8, y: F8, fit: DecayFit, noise: float, evidence: float) -> bool:
-    """Whether the relaxation explains the record better than any polynomial, step or ramp does."""
+    """Return whether the relaxation explains the record better than any polynomial, step or ramp does."""
     size = max(1, tau.size // POINTS)
     whole = tau.size // size * size
     t, values, model = (x[:whole].reshape(-1, size).mean(axis=1) for x in (tau, y, fit.position(tau)))
@@ -167,19 +169,19 @@ def _beats_other_shapes(tau: F8, y: F8, fit: DecayFit, noise: float, evidence: f
 
 
 def _other_shapes(t: F8, y: F8) -> Iterator[tuple[float, int]]:
-    """Fit polynomials to the third degree, every step and every ramp.
+    """Fit polynomials up to degree three, the best step and a grid of ramps.
 
     Parameters
     ----------
     t, y : (n,) float64
-        Ascending times from 0, s, and distances, m.
+        Ascending times from 0 (in s) and distances (in m).
 
     Yields
     ------
     left : float
-        Squares that a shape leaves, m^2; of the steps, and of each degree, the best.
+        Residual sum of squares of a shape, m^2: one per degree, one for the best step and one per ramp.
     count : int
-        Its parameters.
+        Number of parameters of that shape.
     """
     x = 2.0 * t / t[-1] - 1.0
     for degree in range(4):
@@ -203,9 +205,10 @@ def _left(design: F8, y: F8) -> float:
 
 
 def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float, unit: str) -> tuple[Kind, DecayFit] | NoOscillation | None:
-    """Which kind of damping has the lowest BIC, and its fit, if a lone exponential does not do.
+    """Return the kind of damping with the lowest BIC and its fit, unless a single exponential suffices.
 
-    None where the motion ends at a rate beyond the fastest, 1/s: between two samples, where a step looks alike.
+    Return None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, where a
+    relaxation cannot be distinguished from a step.
     """
     price = math.log(tau.size)
     rate, left = lone_exponential(tau, y, fit.noise, fit.slowest)
@@ -226,7 +229,7 @@ def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float, unit: str) -> tuple[Kin
 
 
 def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float, unit: str) -> Overdamped:
-    """Return the results of a fit to ``count`` samples with a clock of this relative standard uncertainty."""
+    """Return the results of a fit to ``count`` samples; ``u_clock`` is the clock's relative standard uncertainty."""
     from uncertainties import correlated_values, ufloat, umath
 
     clock = ufloat(1.0, u_clock)
@@ -245,13 +248,13 @@ def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: f
         )
     elif kind == "overdamped":
         fast = rate + umath.sqrt(rate**2 - stiffness)
-        # Their difference would lose digits.
+        # Computing the slow rate as rate - sqrt(rate**2 - stiffness) would lose digits.
         found["relaxation_rate_slow"] = _estimate(stiffness / fast, "1/s")
         found["relaxation_rate_fast"] = _estimate(fast, "1/s")
         slow, fast = found["relaxation_rate_slow"], found["relaxation_rate_fast"]
         why = f"the motion is overdamped: it relaxes without oscillating, at {slow} and {fast}"
     else:
-        # A cosine of a and a sine of -(v + g a)/omega.
+        # The oscillation is a cosine of amplitude a plus a sine of amplitude (v + g a) / omega.
         omega = umath.sqrt(stiffness - rate**2)
         side = (v + rate * a) / omega
         turn = 2.0 * math.pi
@@ -271,11 +274,11 @@ def _estimate(quantity: Any, unit: str) -> Estimate:
 
 
 def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
-    """Return the spring constant, N/m, by name; nothing where the scene gives no bob mass.
+    """Return the spring constant (in N/m) by name; empty if the scene gives no bob mass.
 
     Notes
     -----
-    :math:`k = \\omega_0^2 M` with the undamped frequency and the mass M that oscillates: bob, the air that a disc
+    :math:`k = \\omega_0^2 M` with the undamped frequency and the oscillating mass M: the bob, the air that a disc
     carries along, and the spring's share (:func:`pipeline.bench.spring.oscillating_mass_kg`).
     """
     if scene.bob_mass_kg is None:

@@ -13,10 +13,10 @@ from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlati
 from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
 
-TABLE = 2049  # points of the integral of the amplitude
-MOST_LAG = 0.75  # rad: of friction that takes half of the amplitude within a radian
-NODES = 8  # of the quadrature of a rate below an amplitude: exact for friction, linear and quadratic drag
-EXPONENTS = (2.0, 1.0, 0.5)  # a spring that is not linear; carried air that grows with the stroke, as vortices do
+TABLE = 2049  # number of points in the tables of the lag and of the integral of the amplitude
+MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
+NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
+EXPONENTS = (2.0, 1.0, 0.5)  # 2: a nonlinear spring; 1 and 0.5: carried air that grows with the stroke through vortices
 
 __all__ = [
     "Params",
@@ -37,11 +37,11 @@ class Params:
     Parameters
     ----------
     evidence : float
-        The frequency counts as amplitude-dependent where that lowers the BIC by more than this; 10 is "very strong".
+        Minimum decrease of the BIC for the frequency to count as amplitude-dependent; 10 is "very strong" evidence.
     another_exponent : float
-        Another power of the amplitude than the square is taken where it lowers chi-square by more than this.
+        Minimum decrease of chi-square for a power of the amplitude other than the square to be used.
     rejection : float
-        Probability at which chi-square finds residuals too large though they are noise.
+        Probability that the chi-square test rejects residuals that are only noise.
     """
 
     evidence: float = 10.0
@@ -58,31 +58,32 @@ class PhaseFit:
     t0 : float
         Time of the first sample used, s.
     angular_frequency : Estimate
-        Mean over the record: slope of a straight line through the phases, rad/s.
+        Mean over the record, which is the slope of a straight line through the phases, rad/s.
     phase : Estimate
-        At ``t0``, wrapped into (-pi, pi], rad.
+        Phase at ``t0``, wrapped into (-pi, pi], rad.
     backbone : Estimate or None
-        :math:`\\kappa` of :math:`\\omega(A) = \\omega_0 + \\kappa A^p`, rad/(s m^p), where the record shows it.
+        :math:`\\kappa` of :math:`\\omega(A) = \\omega_0 + \\kappa A^p`, rad/(s m^p); None if it is not significant.
     reduced_chi2 : float
-        Of the model kept, against the noise of the windows' phases and their excess scatter.
+        Reduced chi-square of the selected model, from the noise of the windows' phases and their excess scatter.
     correlation : float
-        Windows that count as one in the residuals of the straight line.
+        Correlation length of the straight line's residuals, as a number of windows.
     residual : (w,) float64, rad
-        Phases less the straight line.
+        Phases minus the straight line.
     coefficients : (2 or 3,) float64
-        Of 1, t - middle and the backbone's column.
+        Coefficients of 1, of t - middle and, with a backbone, of its column.
     middle : float
-        Weighted middle of the record, s.
+        Weighted mean time of the record, s.
     damping : Damping
-        Whose amplitude the backbone integrates.
+        Provides the amplitude that the backbone's column integrates.
     exponent : float
-        p: 2, the first correction of any smooth spring, unless 1 or 0.5 describes the phase far better.
+        The exponent p. It is 2, the first correction of any smooth spring, unless 1 or 0.5 describes the phase much
+        better.
     lag : tuple of (g,) float64, or None
-        Times, s, and by how much the sinusoid of a period is late there, rad, see :func:`lag_of`; None where that is
-        constant.
+        Times (in s) and the delays (in rad) of a period's fitted sinusoid at these times, see :func:`lag_of`; None if
+        the delay is constant.
     squared_rate : float or None
-        By how much drag lowers the square of the angular frequency, 1/s^2; None for the mean over the windows,
-        weighted by their squared amplitudes, as :meth:`pipeline.damping.select.Damping.squared_rate` gives it.
+        Decrease of the squared angular frequency that drag causes, 1/s^2. None stands for the mean over the windows,
+        weighted by their squared amplitudes (:meth:`pipeline.damping.select.Damping.squared_rate`).
     """
 
     t0: float
@@ -100,7 +101,7 @@ class PhaseFit:
     squared_rate: float | None = None
 
     def total(self, t: F8) -> F8:
-        """Return the model's total phase at times t (n,), rad."""
+        """Return the model's total phase in rad at times t (n,) in s."""
         level, slope, *bend = self.coefficients.tolist()
         total = level + slope * (t - self.middle)
         if bend:
@@ -108,7 +109,7 @@ class PhaseFit:
         return np.asarray(total if self.lag is None else total - np.interp(t, *self.lag))
 
     def rate(self, amplitude: F8) -> F8:
-        """Return the model's angular frequency at amplitudes (n,), m, of its law, rad/s."""
+        """Return the model's angular frequency in rad/s at amplitudes (n,) in m."""
         omega = np.full(amplitude.size, self.coefficients[1])
         if self.coefficients.size == 3:
             omega += self.coefficients[2] * np.abs(amplitude) ** self.exponent
@@ -130,15 +131,16 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
 
     Notes
     -----
-    The frequency reported is the record's mean whether or not it varies. Where residuals of the straight line are
-    not white its uncertainty grows by the root of chi-square and of the correlation length, so that a bend of the
-    phase is covered by the interval and not hidden.
+    The reported frequency is the record's mean, whether or not the frequency varies. If the residuals of the straight
+    line are not white, its uncertainty is multiplied by the square root of the correlation length and, if chi-square
+    is too large, of the reduced chi-square. The interval then covers a curvature of the phase.
 
-    An ideal spring has one frequency. A spring that is not linear shifts it by the square of the amplitude; the air
-    that a disc carries grows with the stroke like its drag coefficient, and on real discs shifts it by about the root.
-    Where the square is shown, the powers 1 and 0.5 are tried in its place: as many parameters, so chi-square decides.
+    The frequency of an ideal spring is constant. A nonlinear spring shifts it in proportion to the square of the
+    amplitude. The air that a disc carries along grows with the stroke, as its drag coefficient does; on real discs
+    it shifts the frequency about in proportion to the square root of the amplitude. If the square is significant, the
+    powers 1 and 0.5 are tried in its place; the number of parameters is equal, so that chi-square decides.
 
-    By how much the sinusoid of a period is late, :func:`lag_of`, is known from the damping law and taken out before.
+    The delay of a period's fitted sinusoid (:func:`lag_of`) follows from the damping law and is removed first.
     """
     params = params or Params()
     t, lag = demodulated.t, lag_of(damping.best, damping.t0, demodulated)
@@ -151,7 +153,7 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
     kept = spread.kept
     u = spread.u[kept]
     middle = float(np.average(t[kept], weights=1.0 / u**2))
-    # The start's row comes last.
+    # The last row of the design matrices is that of the start.
     points = np.append(t, damping.t0)
     line = design = _design(points, middle, damping, None)
     straight = solve_weighted(line[:-1][kept], phase[kept], u)
@@ -192,28 +194,29 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
 
 
 def lag_of(fit: LawFit, t0: float, demodulated: Demodulated) -> tuple[F8, F8] | None:
-    """Return times from ``t0`` (2049,), s, and by how much drag makes the sinusoid of a period late there, rad.
+    """Return times from ``t0`` (2049,) in s and the delays in rad that drag causes in a period's fitted sinusoid.
 
-    None where that is constant, as of linear drag.
+    Return None if the delay is constant, as with linear drag.
 
     Parameters
     ----------
     fit : LawFit
-        Gives the amplitude, counted from ``t0``, and :math:`r(A) = -\\dot A`.
+        Provides the amplitude as a function of the time since ``t0`` and the decay rate :math:`r(A) = -\\dot A`.
     t0 : float, s
+        Time of the first sample used.
     demodulated : Demodulated
 
     Notes
     -----
-    Drag works where the bob is fast, so a period is no sinusoid, and the first harmonic of its exact waveform is late
-    against a phase that turns at a constant rate. To first order, for a force :math:`\\propto v^n` averaging gives
-    :math:`\\frac{n + 3}{2(n + 1)}\\frac{r}{\\omega A} = (\\frac12 + \\frac1{n + 1})\\frac{r}{\\omega A}`, so for any
-    sum of powers
+    Drag acts mainly while the bob is fast. A period is therefore not exactly sinusoidal, and the first harmonic of its
+    exact waveform lags behind a phase that advances at a constant rate. To first order, averaging gives the lag
+    :math:`\\frac{n + 3}{2(n + 1)}\\frac{r}{\\omega A} = (\\frac12 + \\frac1{n + 1})\\frac{r}{\\omega A}` for a force
+    :math:`\\propto v^n`. For any sum of powers it is therefore
 
     .. math:: \\frac{1}{\\omega A}\\Bigl(\\frac{r(A)}{2} + \\frac1A\\int_0^A r(a)\\,da\\Bigr).
 
-    For friction it is :math:`3\\delta/\\pi A`, with :math:`\\delta` half of what a half-cycle loses. Near the stop the
-    formula fails, and the lag is held to what it is where a radian takes half of the amplitude.
+    For friction the lag is :math:`3\\delta/\\pi A`, where :math:`2\\delta` is the loss of amplitude per half-cycle.
+    Near the stop the formula fails; the lag is limited to its value where half of the amplitude is lost per radian.
     """
     omega, last = demodulated.angular_frequency, max(float(np.max(demodulated.t)), t0 + 1e-9)
     t = np.linspace(t0, last, TABLE)
@@ -246,31 +249,31 @@ def _integral_at(t: F8, middle: float, damping: Damping, exponent: float) -> F8:
 def amplitude_integral(
     fit: LawFit, t0: float, middle: float, first: float, last: float, exponent: float
 ) -> tuple[F8, F8]:
-    """Return times from ``middle`` (2049,), s, and the integral of A^p from there, m^p s, by the trapezoidal rule.
+    """Return times relative to ``middle`` (2049,) in s and the integral of A^p from ``middle`` in m^p s.
 
-    The rule and straight lines between its points err by less than 1e-5 of the integral where A^p falls by a
-    factor of e^10 within the table.
+    The trapezoidal rule and linear interpolation between its points have a relative error below 1e-5 if A^p decays
+    by a factor of e^10 within the table.
 
     Parameters
     ----------
     fit : LawFit
-        Gives the amplitude, counted from ``t0``.
+        Provides the amplitude as a function of the time since ``t0``.
     t0, middle, first, last : float, s
-        The table runs from ``first`` to ``last``.
+        The table extends from ``first`` to ``last``.
     exponent : float
-        p.
+        The exponent p.
     """
     from scipy.integrate import cumulative_trapezoid
 
     grid = np.linspace(first - middle, last - middle, TABLE)
     power = np.abs(fit.amplitude(grid + (middle - t0))) ** exponent
-    power[~np.isfinite(power)] = 0.0  # before the part that was analysed a law may have a pole
+    power[~np.isfinite(power)] = 0.0  # before the analysed part a law may have a pole
     integral = cumulative_trapezoid(power, grid, initial=0.0)
     return grid, np.asarray(integral - np.interp(0.0, grid, integral))
 
 
 def _widening(line: Line, u: F8, spread: Scatter, params: Params) -> tuple[float, float]:
-    """Factor on the straight line's covariance, and the correlation length behind it."""
+    """Return the factor that widens the straight line's covariance, and the correlation length used for it."""
     free = line.residual.size - 2
     if free < 1:
         return 1.0, 1.0
@@ -291,7 +294,7 @@ def backbone_unit(exponent: float) -> str:
 
 
 def words_on_exponent(exponent: float) -> str:
-    """Return what the frequency shifts with."""
+    """Return the words for the power of the amplitude in proportion to which the frequency shifts."""
     return {2.0: "the square of the amplitude", 1.0: "the amplitude", 0.5: "the root of the amplitude"}[exponent]
 
 
@@ -301,7 +304,7 @@ def _backbone(bent: Line, spread: Scatter, free: int, exponent: float) -> Estima
 
 
 def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFit:
-    """One window: its frequency is the spectrum's, known to a share of the record's own line width."""
+    """Return the fit of a single window: its frequency is that of the spectrum, uncertain by half a line width."""
     t, omega = float(demodulated.t[0]), demodulated.angular_frequency
     phase = float(demodulated.phase[0]) + omega * (damping.t0 - t)
     reach = max(2.0 * (t - damping.t0), 1e-9)
@@ -321,6 +324,6 @@ def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFi
 
 
 def wrapped(angle: float) -> float:
-    """Return an angle within (-pi, pi], rad."""
+    """Return the angle in rad wrapped into (-pi, pi]."""
     turned = math.remainder(angle, 2.0 * math.pi)
     return math.pi if turned == -math.pi else turned

@@ -1,4 +1,4 @@
-"""Smoother: position, velocity and acceleration of a noisy oscillator at every sample, without differences."""
+"""Smoother: position, velocity and acceleration of a noisy oscillator at every sample, without differencing."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from pipeline.windows.disturbances import Disturbances
 
 __all__ = ["Params", "Smoothed", "smooth"]
 
-LONGEST = 100_000  # periods, beyond which noise is taken for white
-LEAST_WEIGHT = 0.01  # of the likeliest memory's (or law's) likelihood, that another must have to count
+LONGEST = 100_000  # maximum record length in periods; in longer records the noise is assumed to be white
+LEAST_WEIGHT = 0.01  # minimum likelihood, relative to that of the likeliest memory, for a memory to be included
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,11 +30,11 @@ class Params:
     Parameters
     ----------
     nodes_per_period : int
-        Of the walk; between them it is interpolated.
+        Nodes of the random walk per period; the walk is interpolated between them.
     most_nodes : int
-        Longer records have nodes further apart.
+        Maximum number of nodes; longer records have nodes further apart.
     memories : int
-        Trial values of the memory, from one period to thirty times the record, for the likelihood.
+        Number of trial values of the memory, from one period to thirty times the record length.
     """
 
     nodes_per_period: int = 4
@@ -51,15 +51,15 @@ class Smoothed:
     t : (n,) float64, s
         The track's times.
     position, u_position : (n,) float64, m
-        From the sensor, sideways modes left out.
+        Distance from the sensor without sideways modes.
     velocity, u_velocity : (n,) float64, m/s
-        Of the oscillation about the rest position.
+        Velocity of the oscillation about the rest position.
     acceleration, u_acceleration : (n,) float64, m/s^2
     noise_m : float
         Standard deviation of one sample about the smoothed motion, m.
     memory_s : float
-        How long a stretch, before and after, speaks on a sample at the largest amplitude, s: the likeliest, with the
-        likeliest law.
+        Time before and after a sample over which other samples contribute to its estimate, at the largest amplitude,
+        s. It is the likeliest value with the likeliest law.
     """
 
     t: F8
@@ -75,13 +75,13 @@ class Smoothed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Carried:
-    """The fitted oscillation at some times: what the walk is a factor of."""
+    """The fitted oscillation at some times, which the random walk multiplies."""
 
-    gain: F8  # amplitude over the largest
+    gain: F8  # amplitude divided by the largest amplitude
     cosine: F8
     sine: F8
     rate: F8  # angular frequency, rad/s
-    decay: F8  # logarithmic, 1/s
+    decay: F8  # logarithmic decay rate of the amplitude, 1/s
 
     @classmethod
     def at(cls, t: F8, phase: PhaseFit, law: LawFit, last: float) -> _Carried:
@@ -89,14 +89,14 @@ class _Carried:
         largest = float(np.max(law.amplitude(np.array([0.0, last - phase.t0]))))
         if not largest > 0.0:
             raise AnalysisError("the damping law leaves no amplitude to smooth: record while the bob swings")
-        # A law may end at zero; the walk carries on from a thousandth.
+        # The law's amplitude may reach zero; the gain is kept at a thousandth of the maximum or more.
         amplitude = np.maximum(amplitude, 1e-3 * largest)
         decay = -law.law.rate(amplitude, law.joint.values) / amplitude
         angle, rate = phase.total(t), phase.rate(phase.damping.best.amplitude(t - phase.t0))
         return cls(amplitude / largest, np.cos(angle), np.sin(angle), rate, decay)
 
     def rows(self) -> tuple[F8, F8, F8]:
-        """Position, velocity and acceleration of a walk of 1 in either dimension, (2, n) each."""
+        """Return position, velocity and acceleration for a unit walk in either dimension, shape (2, n) each."""
         position = self.gain * np.array([self.cosine, -self.sine])
         quadrature = self.gain * np.array([self.sine, self.cosine])
         velocity = -self.decay * position - self.rate * quadrature
@@ -112,19 +112,19 @@ def smooth(
     disturbances: Disturbances | None = None,
     params: Params | None = None,
 ) -> Smoothed:
-    """Estimate the motion at every sample from all samples, each weighted by what it can know.
+    """Estimate the motion at every sample from all samples, each weighted by its information.
 
     Parameters
     ----------
     track : Track
-        As it came. Flagged samples are predicted, not used; times may be irregular.
+        The recorded track. Flagged samples are predicted, not used; times may be irregular.
     demodulated : Demodulated
-        For its flags.
+        Provides the flags.
     phase : PhaseFit
-        Carries the damping law.
+        Provides the frequency, the phase and the damping law.
     rest : Rest
     disturbances : Disturbances, optional
-        Modes that were taken out.
+        Modes to be subtracted from the record.
     params : Params, optional
 
     Returns
@@ -139,26 +139,27 @@ def smooth(
 
     Notes
     -----
-    The oscillator :math:`\\ddot x + 2\\lambda\\dot x + (\\omega^2 + \\lambda^2) x = f` is driven by white noise f, with
-    :math:`\\omega(t)` and :math:`\\lambda(t)` of the fitted phase and law. In the frame that turns and decays with it,
-    :math:`x = g(t)\\,\\mathrm{Re}(z e^{i\\varphi(t)})`, its state z is a random walk in two dimensions, over half a
-    period the same in both. Kalman filter and Rauch-Tung-Striebel smoother of that walk are solved in one go
-    (:class:`pipeline.numerics.random_walk.Chain`); then :math:`\\dot x = g\\,\\mathrm{Re}((i\\omega - \\lambda) z
-    e^{i\\varphi})`, and
-    :math:`\\ddot x` has the factor squared. Nothing is differenced: noise at frequencies that an oscillator cannot
-    follow never enters.
+    The oscillator :math:`\\ddot x + 2\\lambda\\dot x + (\\omega^2 + \\lambda^2) x = f` is driven by white noise f.
+    Its :math:`\\omega(t)` and :math:`\\lambda(t)` are those of the fitted phase and law. In the frame that rotates and
+    decays with it, :math:`x = g(t)\\,\\mathrm{Re}(z e^{i\\varphi(t)})`, the state z is a random walk in two
+    dimensions. Averaged over half a period, its steps have the same variance in both dimensions. The Kalman filter and
+    the Rauch-Tung-Striebel smoother of this walk are solved together
+    (:class:`pipeline.numerics.random_walk.Chain`). Then :math:`\\dot x = g\\,\\mathrm{Re}((i\\omega - \\lambda) z
+    e^{i\\varphi})`, and :math:`\\ddot x` has the factor squared. Nothing is differenced, so that noise at frequencies
+    that an oscillator cannot follow never enters.
 
-    The strength of the force, hence the memory, is averaged over by its likelihood, and the noise comes with it. A
-    record that follows its law to the end has the memory of all its samples: then this is the global fit. What
-    frequency and law are uncertain by is added to z, a shape for each of their parameters, whose sizes are estimated
-    along; so the ends, with one side missing, carry their larger uncertainty.
-    A short record admits several laws, which part most at its ends. So each of them, up to the selected one's number
-    of parameters, is smoothed about, and they too are averaged by their likelihood.
-    Where noise is correlated samples count by its spectral density near the oscillation's frequency.
-    Clock and speed of sound, which scale everything alike, are not in these uncertainties.
+    The result is averaged over the strength of the force, and therefore over the memory, by likelihood; each strength
+    has its own noise estimate. In a record that follows its law to the end the memory covers all samples, and the
+    result equals the global fit. The uncertainty of frequency and law is added to z as one shape per parameter,
+    whose size is estimated too. The ends of the record, which have samples on one side only, therefore have larger
+    uncertainties.
+    A short record admits several laws, which differ most at its ends. Smoothing is therefore repeated with each
+    admissible law that has no more parameters than the selected one, and the results are averaged by likelihood.
+    If noise is correlated, samples are weighted by its spectral density near the oscillation's frequency.
+    The uncertainties exclude those of clock and speed of sound, which scale all values by a common factor.
     """
     params = params or Params()
-    # Beyond the part that was analysed neither law nor phase says anything about the motion.
+    # Outside the analysed part neither law nor phase describes the motion.
     known = np.isfinite(track.t) & ((demodulated.flags & Quality.OUTSIDE) == 0)
     used = known & np.isfinite(track.y) & ((demodulated.flags & UNUSABLE) == 0)
     if np.count_nonzero(used) < 8:
@@ -172,7 +173,7 @@ def smooth(
     colour, each = None, list[_Followed]()
     for law in phase.damping.considered.values():  # the selected one first
         if len(law.law.parameters) > len(best.law.parameters):
-            continue  # it holds simpler ones, and would only say again what these leave open
+            continue  # it contains the simpler laws, and its spread would only repeat their parameter uncertainties
         carried = _Carried.at(t, phase, law, last)
         walk = _Walk.of(t, swing, carried, phase.angular_frequency.value, params)
         colour = colour or walk.colour(t, swing, carried, track.rate_hz)
@@ -190,17 +191,18 @@ def smooth(
 
 
 def _freedom(t: F8, phase: PhaseFit, law: LawFit, last: float) -> F8:
-    """Return how the walk's nodes may move together (2, a, w), since law and frequency are not known exactly.
+    """Return the common shifts of the walk's nodes, (2, a, w), that uncertain law and frequency parameters cause.
 
-    In phase as the law's amplitude moves with its parameters, at right angles to that by powers of time, one for each
-    coefficient of the phase. What only turns or scales the motion is left out: any walk may begin where it likes.
+    The in-phase shapes are the derivatives of the law's amplitude by its parameters. The quadrature shapes are powers
+    of time, one for each coefficient of the phase. Shapes that only rotate or scale the whole motion are left out,
+    because the starting value of the walk is free.
     """
     x = _centred(t)
     turning = np.array([x**power for power in range(1, max(phase.coefficients.size, 2))])
     gain = _Carried.at(t, phase, law, last).gain
     _, slopes = law.law.curve(np.clip(t, phase.t0, last) - phase.t0, law.joint.values)
     slopes = slopes / np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
-    # A law says the same in any unit of length: the plain scale is a sum of its slopes.
+    # A law is independent of the unit of length, so that a change of scale is a linear combination of its slopes.
     slopes -= np.outer(gain, gain @ slopes) / (gain @ gain)
     growing = (np.linalg.svd(slopes, full_matrices=False)[0] / gain[:, None])[:, : slopes.shape[1] - 1].T
     growing = growing if len(growing) else x[None, :]
@@ -210,15 +212,15 @@ def _freedom(t: F8, phase: PhaseFit, law: LawFit, last: float) -> F8:
 
 
 def _centred(t: F8) -> F8:
-    """Return times from -1/2 to 1/2."""
+    """Return the times centred on their mean and scaled to a range of 1."""
     return np.asarray((t - t.mean()) / max(float(np.ptp(t)), 1e-300))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Followed:
-    """What smoothing about one law gave: position about rest, velocity and acceleration (3, n), and their variances.
+    """Result of smoothing with one law: position about rest, velocity and acceleration (3, n), and their variances.
 
-    ``likelihood`` is its logarithm, up to a constant that laws share.
+    ``likelihood`` is the logarithm of the law's likelihood, up to a constant common to all laws.
     """
 
     mean: F8
@@ -229,7 +231,7 @@ class _Followed:
 
 
 def _averaged(each: list[_Followed]) -> tuple[F8, F8]:
-    """Return means and variances over the laws."""
+    """Return means and variances averaged over the laws by likelihood."""
     likelihoods = np.array([followed.likelihood for followed in each])
     weights = np.exp(likelihoods - likelihoods.max())
     weights /= weights.sum()
@@ -241,7 +243,7 @@ def _averaged(each: list[_Followed]) -> tuple[F8, F8]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Walk:
-    """Samples gathered at the walk's nodes."""
+    """Samples summed into the nodes of the random walk."""
 
     t: F8
     information: F8
@@ -269,10 +271,11 @@ class _Walk:
         return cls(middle, information, score, gain, float(swing @ swing), t.size, period)
 
     def colour(self, t: F8, swing: F8, carried: _Carried, rate_hz: float) -> tuple[float, float | None]:
-        """Return by how much noise is stronger near the oscillation than on the whole, in variance, and the noise, m.
+        """Return the noise density near the oscillation relative to the mean density, and the noise in m.
 
-        The density is read off half and twice the frequency, on what the shortest memory leaves, so that motion which
-        wanders does not pass for noise. Records too short or too long to show it give 1 and None.
+        The density is the geometric mean of those at half and twice the frequency. It is estimated from the residual
+        with the shortest memory, so that a wandering motion is not mistaken for noise. Records too short or too long
+        for this estimate give 1 and None.
         """
         if t.size < 64 or float(t[-1] - t[0]) > LONGEST * self.period:
             return 1.0, None
@@ -285,15 +288,15 @@ class _Walk:
         return max(1.0, density * blocks.samples / max(trial.noise_m**2, 1e-300)), trial.noise_m
 
     def seen_through(self, colour: tuple[float, float | None]) -> _Walk:
-        """Return the walk with what was seen weakened by coloured noise.
+        """Return the walk with its information reduced for coloured noise.
 
-        Else intervals would be those of as many independent samples.
+        Otherwise the intervals would be those of as many independent samples.
         """
         excess, noise_m = colour
         return replace(self, information=self.information / excess, score=self.score / excess, noise_m=noise_m)
 
     def smooth(self, freedom: F8, carried: _Carried, at: F8, rate_hz: float, params: Params) -> _Followed:
-        """Smooth with every memory that the record admits and average them by their likelihood.
+        """Smooth with every trial memory and average the likely ones by their likelihood.
 
         ``carried`` is the fitted oscillation at the times ``at`` of the result.
         """
@@ -323,10 +326,10 @@ class _Walk:
         )
 
     def bond(self, memory_s: float, rate_hz: float) -> F8:
-        """Reciprocal variances of the walk's steps, noise of one sample being 1.
+        """Return the reciprocal variances of the walk's steps in units of the noise of one sample.
 
-        A walk of variance r per second seen with information J per second remembers :math:`1/\\sqrt{rJ}`.
-        The force is the same throughout, so that the walk's steps grow as the amplitude falls.
+        A walk with variance r per second, observed with information J per second, has the memory
+        :math:`1/\\sqrt{rJ}`. The force has constant strength, so that the walk's steps grow as the amplitude decays.
         """
         r = 2.0 / (rate_hz * memory_s**2)
         return np.asarray(self.gain[1:] * self.gain[:-1] / (r * np.diff(self.t)))
@@ -334,15 +337,15 @@ class _Walk:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trial:
-    """The walk smoothed with one memory, and moves of all its nodes together, of sizes that are not known before.
+    """The walk smoothed with one memory, together with common shifts of all its nodes by unknown coefficients.
 
-    These are eliminated by their Schur complement; ``cost`` is minus twice the logarithm of the likelihood that
-    is left, up to a constant, the noise as known before or else at its best value.
+    The coefficients are eliminated by their Schur complement. ``cost`` is minus twice the logarithm of the remaining
+    likelihood, up to a constant, at the given noise or, without one, at its best value.
     """
 
     chain: Chain
     mean: F8
-    beyond: F8  # (2, a, w): what a move of size 1 does to the walk and itself together
+    beyond: F8  # (2, a, w): a unit shift plus the walk's response to it
     inverse: F8
     noise_m: float
     cost: float
@@ -369,7 +372,7 @@ class _Trial:
         return cls(chain, mean, beyond, inverse, noise_m, 2.0 * dof * math.log(noise_m) + determinants)
 
     def covariance(self) -> F8:
-        """Return the covariances of walk and moves together, (2, 2, w), in units of the noise squared."""
+        """Return the covariances of the walk and the shifts combined, (2, 2, w), in units of the noise squared."""
         spread = self.chain.solve(covariance=True).covariance
         assert spread is not None
         return np.asarray(spread + np.einsum("iaw,ab,jbw->ijw", self.beyond, self.inverse, self.beyond))

@@ -1,4 +1,4 @@
-"""Two modes of like strength: a motion of two oscillations together, both of which can be named."""
+"""Two modes of similar strength: a motion that consists of two oscillations, both of which can be measured."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pipeline.track import F8
 
 __all__ = ["Params", "TwoModes", "find_two_modes"]
 
-ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # of the values: what a still record scatters by
+ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,15 +27,16 @@ class Params:
     Parameters
     ----------
     left : float
-        Share of the variance that two modes may leave.
+        Maximum share of the variance that remains in the residual of two modes.
     weaker : float
-        Of the stronger mode's amplitude; with less the stronger one is the oscillation.
+        Minimum ratio of the weaker mode's amplitude to the stronger one's; below it only one oscillation counts.
     beats, periods : float
-        Beats and periods of the slower mode that the record must have to distinguish two modes from one that changes.
+        Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
+        distinguished from one that changes.
     most : int
-        Longer records are not fitted.
+        Maximum number of samples; longer records are not fitted.
     thin : float
-        Sample intervals that a sample may stand for on average.
+        Maximum mean spacing of the samples, in units of their median spacing.
     """
 
     left: float = 0.1
@@ -48,14 +49,15 @@ class Params:
 
 @dataclass(frozen=True, slots=True)
 class TwoModes:
-    """Two oscillations that run together.
+    """Two simultaneous oscillations.
 
     Parameters
     ----------
     why : str
-        One sentence that names them.
+        One sentence that states the periods and amplitudes of both modes.
     estimates : mapping of str to Estimate
-        ``first_mode_period``, ``first_mode_amplitude`` at the first sample, and the second's; the stronger is first.
+        ``first_mode_period`` and ``first_mode_amplitude`` (at the first sample), and likewise for the second mode.
+        The first mode is the stronger one.
     """
 
     why: str
@@ -63,7 +65,7 @@ class TwoModes:
 
 
 def find_two_modes(conditioned: Conditioned, params: Params | None = None) -> TwoModes | None:
-    """Return the two modes that a record consists of; None where two do not describe it.
+    """Return the two modes that a record consists of; None if two modes do not describe it.
 
     Parameters
     ----------
@@ -72,9 +74,10 @@ def find_two_modes(conditioned: Conditioned, params: Params | None = None) -> Tw
 
     Notes
     -----
-    Least squares of :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` through all samples used,
-    from the strongest line of the spectrum and that of what the first leaves. Covariances are by the residuals, with
-    their correlation. Longer records, and samples strewn thinly over their time, are not searched.
+    :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted by least squares to all samples
+    used. It starts from the strongest line of the spectrum and from the strongest line of the residual of the first.
+    Covariances are scaled by the residuals, including their correlation. Records above the limits of
+    :class:`Params` in length or mean spacing are not searched.
     """
     params = params or Params()
     used = conditioned.used & np.isfinite(conditioned.track.t)
@@ -105,7 +108,7 @@ def find_two_modes(conditioned: Conditioned, params: Params | None = None) -> Tw
     ):
         return None
     slow, fast = sorted(omegas)
-    # What keeps step with the other is no mode but its shape: a signal that switches, say.
+    # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.
     if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * span < math.pi:
         return None
     widened = float(fit.residual @ fit.residual) / max(y.size - 9, 1) * correlation_length(fit.residual)
@@ -125,17 +128,17 @@ def find_two_modes(conditioned: Conditioned, params: Params | None = None) -> Tw
 
 
 def _strongest(tau: F8, values: F8) -> float:
-    """Angular frequency of the strongest line, rad/s, of samples that need not be equally spaced."""
+    """Return the angular frequency of the strongest line, rad/s; the samples need not be equally spaced."""
     step = float(np.median(np.diff(tau)))
     grid = np.arange(int(tau[-1] / step) + 1) * step
     power = np.abs(np.fft.rfft(np.interp(grid, tau, values), 8 * grid.size)) ** 2
-    least = 8  # slower than one period per record is drift
+    least = 8  # lines below one period per record count as drift
     peak = least + int(np.argmax(power[least:]))
     return 2.0 * math.pi * peak / (8 * grid.size * step)
 
 
 def _linear(tau: F8, values: F8, omegas: tuple[float, ...]) -> F8:
-    """Parameters of undamped modes of these frequencies: rest position, then a, b, omega and g of each."""
+    """Return the parameters of undamped modes of given frequencies: rest position, then a, b, omega, g of each mode."""
     waves = [wave(omega * tau) for omega in omegas for wave in (np.cos, np.sin)]
     solved = np.linalg.lstsq(np.stack([np.ones_like(tau), *waves], axis=1), values, rcond=None)[0]
     each = [[solved[1 + 2 * i], solved[2 + 2 * i], omega, 0.0] for i, omega in enumerate(omegas)]
@@ -143,7 +146,7 @@ def _linear(tau: F8, values: F8, omegas: tuple[float, ...]) -> F8:
 
 
 def _model(x: F8, tau: F8) -> tuple[F8, F8]:
-    """The motion (n,) and its derivatives (n, 1 + 4 m) by the parameters of m modes."""
+    """Return the motion (n,) of m modes and its derivatives (n, 1 + 4 m) by their parameters."""
     total, slopes = np.full(tau.size, x[0]), [np.ones_like(tau)]
     for a, b, omega, g in x[1:].reshape(-1, 4):
         fall = np.exp(-np.clip(g * tau, -20.0, 200.0))

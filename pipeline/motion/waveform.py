@@ -1,4 +1,4 @@
-"""Waveform: the rest position against time, and the record as rest position, damping law and phase predict it."""
+"""Waveform: the rest position against time, and the record predicted from rest position, damping law and phase."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ class Rest:
     Parameters
     ----------
     mean : Estimate
-        Over the record, m.
+        Mean over the record, m.
     drift_m : float
-        Peak to peak of the smooth curve through the windows' rest positions, m.
+        Peak-to-peak range of the smooth curve through the windows' rest positions, m.
     drifts : bool
-        Whether the curve is far better than a constant.
+        Whether the curve fits much better than a constant.
     t, curve : (w,) float64, s, m
-        The curve at the windows' centres, steps left out.
+        Times of the windows' centres, and the curve at these times without the steps.
     steps : tuple of Step
-        What the rest position jumps by, in order of time.
+        Steps of the rest position in order of time.
     """
 
     mean: Estimate
@@ -47,27 +47,27 @@ class Rest:
 
     @property
     def moves(self) -> bool:
-        """Whether it is anything but constant."""
+        """Whether the rest position drifts or has steps."""
         return self.drifts or bool(self.steps)
 
     @property
     def range_m(self) -> float:
-        """Peak to peak of drift and steps together, m."""
+        """Peak-to-peak range of drift and steps together, m."""
         curve = self.curve if self.drifts else np.zeros(self.t.size)
         return float(np.ptp(curve + staircase(self.steps, self.t)))
 
     def at(self, t: F8) -> F8:
-        """Return the rest position at times t (n,), m."""
+        """Return the rest position in m at times t (n,) in s."""
         if not self.moves:
             return np.full(t.size, self.mean.value)
         level = np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self._before())
         return np.asarray(level + staircase(self.steps, t))
 
     def stepping(self, steps: tuple[Step, ...]) -> Rest:
-        """Return the same with steps that had been taken out of the record before.
+        """Return the rest position including steps that had been subtracted from the record before the fit.
 
-        The mean becomes that of the whole record; the uncertainty of each step's height enters by the share of the
-        record that follows it.
+        The mean becomes that of the whole record. The uncertainty of each step's height contributes to its uncertainty
+        in proportion to the product of the shares of the record before and after the step.
         """
         if not steps:
             return self
@@ -81,20 +81,20 @@ class Rest:
         return replace(self, mean=mean, steps=steps)
 
     def _before(self) -> float:
-        """Rest position before the first step."""
+        """Return the rest position before the first step."""
         return self.mean.value - float(np.mean(staircase(self.steps, self.t)))
 
 
 def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.0) -> Rest:
-    """Fit a constant and a polynomial to the windows' rest positions and keep the constant unless it fails.
+    """Fit a constant and a polynomial to the windows' rest positions, and decide by BIC whether they drift.
 
     Parameters
     ----------
     demodulated : Demodulated
     degree : int
-        Of the polynomial, fewer where windows are few.
+        Maximum degree of the polynomial; it is lower if there are few windows.
     evidence : float
-        By how much the polynomial must lower the BIC.
+        Minimum decrease of the BIC for the polynomial to count as a drift.
     """
     t, offset = demodulated.t, demodulated.offset
     u = np.maximum(np.sqrt(demodulated.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
@@ -120,9 +120,9 @@ class Waveform:
     position : (n,) float64, m
         Rest position + A(t) cos(phase(t)).
     moving : callable
-        Gives :attr:`velocity`, which figures alone ask for.
+        Computes :attr:`velocity` on first use, as only figures need it.
     residual : (n,) float64, m
-        Distance less position; NaN where unmeasured.
+        Distance minus position; NaN where no distance was measured.
     rms_m : float
         Root mean square of the residual over the samples used, m.
     """
@@ -138,30 +138,31 @@ class Waveform:
         return self.moving()
 
     def with_disturbances(self, disturbances: Disturbances) -> Waveform:
-        """Return the waveform of the whole record, from that of the record without its disturbances."""
+        """Return the waveform with disturbances added that had been subtracted from the record before the fit."""
         return replace(self, position=self.position + disturbances.position) if disturbances else self
 
 
 def reconstruct(track: Track, demodulated: Demodulated, phase: PhaseFit, rest: Rest) -> Waveform:
-    """Put rest position, amplitude and phase together again.
+    """Compute the waveform from rest position, amplitude and phase.
 
     Parameters
     ----------
     track : Track
     demodulated : Demodulated
-        For its flags.
+        Provides the flags.
     phase : PhaseFit
-        Carries the damping law.
+        Provides the phase and the damping law.
     rest : Rest
 
     Returns
     -------
     Waveform
-        Its residual holds noise and everything that the model leaves out; compare ``rms_m`` with the noise.
+        Its residual contains the noise and everything that the model does not describe; compare ``rms_m`` with the
+        noise.
     """
     law = phase.damping.best
     used = (demodulated.flags & UNUSABLE) == 0
-    # A law holds where it was fitted: before and after the samples used its last values stand.
+    # A law is valid only where it was fitted: before the first and after the last sample used it is held constant.
     last = float(np.max(track.t, where=used, initial=-np.inf))
     elapsed = np.clip(track.t, phase.t0, last) - phase.t0
     amplitude = law.amplitude(elapsed)

@@ -1,4 +1,4 @@
-"""Full fit: one robust least-squares fit of the whole waveform, from where the windows arrived."""
+"""Full fit: one robust least-squares fit of the whole waveform, started from the result of the windows."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from pipeline.windows.demodulate import Demodulated
 
 __all__ = ["FullFit", "Params", "fit_record"]
 
-FEW_WINDOWS = 4  # below which the amplitudes of windows select no law
+FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,17 +37,17 @@ class Params:
     Parameters
     ----------
     clip_sigmas : float
-        Residuals beyond this many standard deviations are false echoes and leave the fit.
+        Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
     rounds : int
-        Most rounds of clipping and fitting again.
+        Maximum number of rounds of clipping and refitting.
     steady : float
-        Share of the samples that may still come or go at the end. At the limit of 4 sigmas and with either sign they
-        move an estimate by 4 sqrt(steady) of its standard uncertainty, 0.04.
+        Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas
+        and with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
     steps : int
-        Most evaluations of the model in one fit.
+        Maximum number of evaluations of the model in one fit.
     besides : tuple of str
-        Laws that are fitted besides the selected one and the admissible ones, though the windows contradict them:
-        everyone compares with the one exponential.
+        Laws that are fitted in addition to the selected and the admissible ones, even if the windows contradict them.
+        The default is the single exponential, the usual reference for comparisons.
     """
 
     clip_sigmas: float = 4.0
@@ -59,25 +59,25 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FullFit:
-    """What the whole waveform says, in the form of the stages that it refines.
+    """Results of the fit of the whole waveform, in the form of the stages that it refines.
 
     Parameters
     ----------
     converged : bool
-        Where it is False the stages' own results stand and nothing below but ``tried`` means anything.
+        Whether the selected law's fit converged. If not, all fields below except ``tried`` come from earlier stages.
     tried : str
-        How the selected law's fit ended, in words for a finding.
+        How the selected law's fit ended, worded for a finding.
     damping : Damping
-        The laws that were admissible and the linear one, with parameters of the full fit; the others as before.
+        The selected, the admissible and the linear law with the parameters of the full fit; the other laws unchanged.
     phase : PhaseFit
     rest : Rest
     waveform : Waveform
     flags : (n,) uint8
-        Final ones.
+        The final flags.
     noise_m : float
         Root mean square of the residual over the samples used, m.
     widening : mapping of str to float
-        By what factor each uncertainty exceeds that of white residuals.
+        Factor by which each uncertainty exceeds that from white residuals.
     """
 
     converged: bool
@@ -103,12 +103,12 @@ class _Solved:
 
     @property
     def dof(self) -> float:
-        """Samples less parameters, the linear ones too."""
+        """Number of samples minus number of parameters, linear ones included."""
         return max(float(np.count_nonzero(self.rows) - self.size), 1.0)
 
     @property
     def size(self) -> int:
-        """Number of parameters."""
+        """Number of parameters, linear ones included."""
         return int(self.fit.values.size + self.record.basis.shape[1])
 
     @property
@@ -117,12 +117,12 @@ class _Solved:
         return math.sqrt(self.fit.cost / self.dof)
 
     def amplitude(self) -> F8:
-        """Amplitude at every sample of the record (n,), m."""
+        """Return the amplitude at every sample of the record (n,) in m."""
         return self.state.amplitude(self.record.elapsed)
 
     @functools.cached_property
     def position(self) -> F8:
-        """Distance at every sample of the record (n,), m, less the record's level."""
+        """Distance at every sample of the record minus the record's level, (n,) in m."""
         linear = self.record.basis @ self.model.linear(self.state.values)
         return np.asarray(linear + self.state.position(self.record.elapsed, self.record.tau))
 
@@ -144,9 +144,9 @@ def fit_record(
     ----------
     conditioned : Conditioned
     demodulated, damping, phase, rest, waveform
-        Outputs of the stages of those names: start values, and what stands if the fit fails.
+        Outputs of the stages with these names: the start values, and the results if the fit fails.
     extra : (n, k) float64, optional
-        Columns that enter linearly besides the rest position: cosine and sine of a sideways mode, steps.
+        Columns that enter linearly in addition to the rest position: cosine and sine of a sideways mode, and steps.
     params : Params, optional
 
     Returns
@@ -155,25 +155,26 @@ def fit_record(
 
     Notes
     -----
-    The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^p\\bigr)` with
-    time counted from the middle of the record, where frequency and phase are not correlated. A drifting rest position
-    and further columns enter linearly and are projected out (:class:`pipeline.motion.waveform_model.WaveformModel`);
-    a constant one is a parameter like the others.
+    The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^p\\bigr)`, where
+    :math:`\\tau` is the time from the middle of the record; there frequency and phase are uncorrelated. A drifting
+    rest position and further columns enter linearly and are projected out
+    (:class:`pipeline.motion.waveform_model.WaveformModel`). A constant rest position is a parameter like the others.
 
-    Residuals beyond four standard deviations (from their median) leave, and the fit is repeated until the samples
-    stay (:class:`pipeline.motion.waveform_model.Chooser`). Beneath a clipped plateau samples are taken or left by
-    the model, not by their own noise: those that the model sees within 3.5 standard deviations of where samples count
-    as clipped are left out, and nothing is biased.
+    Samples whose residuals exceed four standard deviations, as estimated from the median absolute deviation, are
+    excluded. The fit is repeated until the set of samples no longer changes
+    (:class:`pipeline.motion.waveform_model.Chooser`). Near a clipped plateau samples are excluded by the model's value
+    and not by their own noise, to avoid bias. The margin is 3.5 standard deviations from the level above which samples
+    count as clipped.
 
-    Where residuals are not white the covariance is that of the sums of score over whole periods, correlation
-    between neighbours included, if it exceeds the white one significantly.
+    If residuals are not white the covariance is that of the score summed over whole periods, including correlation
+    between neighbouring periods, if it exceeds the white covariance significantly.
     """
     params = params or Params()
     record = Record.of(conditioned, demodulated, phase, rest, extra)
     chooser = Chooser(conditioned, demodulated, record, params.clip_sigmas)
     area_of = functools.partial(_area, record, damping.best, phase)
     if demodulated.t.size < FEW_WINDOWS and not damping.by_statement:
-        phase = replace(phase, lag=None)  # no damping and linear drag, which alone are tried, have none
+        phase = replace(phase, lag=None)  # only no damping and linear drag are tried, whose lag is constant
         damping, start = _select_short(record, chooser.by_windows, demodulated, damping, phase, params)
     else:
         theta = damping.best.joint.values
@@ -217,7 +218,7 @@ def _state(
 
 
 def _area(record: Record, fit: LawFit, phase: PhaseFit, theta: F8) -> tuple[F8, F8]:
-    """Return the backbone's column with these parameters of the law."""
+    """Return the backbone's column for the parameters ``theta`` of the law."""
     last = phase.t0 + float(record.elapsed.max())
     fit = replace(fit, joint=replace(fit.joint, values=theta))
     return amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last, phase.exponent)
@@ -234,7 +235,7 @@ def _solve(record: Record, state: State, rows: Rows, params: Params) -> _Solved:
 
 
 def _solve_by_amplitude(model: WaveformModel, state: State, options: least_squares.Params) -> least_squares.Fit:
-    """Fit with the law's lengths in units of the first amplitude: a factor and a power of metres are nearly one."""
+    """Fit with lengths in units of the first amplitude; in metres a free power and its factor are nearly degenerate."""
     own, count = state.law, state.theta.size
     length = abs(float(state.theta[0])) or 1.0
 
@@ -260,13 +261,13 @@ def _solve_by_amplitude(model: WaveformModel, state: State, options: least_squar
 def _settled(
     record: Record, chooser: Chooser, state: State, area_of: Callable[[F8], tuple[F8, F8]], params: Params
 ) -> _Solved | str:
-    """Fit, and again where other samples than those lie on the model, until they stay; or say how that failed."""
+    """Fit repeatedly until the samples that lie on the model no longer change; return a text if that fails."""
     rows, state = chooser.settled(state, chooser.by_windows)
     for _ in range(params.rounds):
         if np.count_nonzero(rows) < 2 * (state.values.size + record.basis.shape[1]):
             return f"only {np.count_nonzero(rows)} samples lie on the model"
         if state.area is not None:
-            # The backbone's column was that of the windows' amplitudes.
+            # The backbone's column so far belongs to the previous amplitudes.
             state = replace(state, area=area_of(state.theta))
         solved = _solve(record, state, rows, params)
         if not solved.fit.converged:
@@ -281,7 +282,7 @@ def _settled(
 def _select_short(
     record: Record, rows: Rows, demodulated: Demodulated, damping: Damping, phase: PhaseFit, params: Params
 ) -> tuple[Damping, State]:
-    """A record of so few periods shows damping or none: both are fitted to the waveform, and BIC decides."""
+    """Select no damping or linear drag for a record of few periods: fit both to the waveform and compare by BIC."""
     fits: dict[str, LawFit] = {}
     states: dict[str, State] = {}
     amplitude = float(demodulated.amplitude[0])
@@ -295,7 +296,7 @@ def _select_short(
             continue
         states[name] = solved.state
         count = float(np.count_nonzero(rows))
-        # Sums of squares are compared at the noise of the fuller model, as a test of chi-square would.
+        # The noise is unknown, so that the BIC uses the logarithm of the mean squared residual.
         joint = joint_of(law, solved.state.theta, np.zeros((theta.size, theta.size)))
         bic = count * math.log(max(solved.fit.cost, 1e-300) / count) + solved.size * math.log(count)
         fits[name] = LawFit(law, joint, 1.0, solved.dof, bic, True, "")
@@ -308,7 +309,7 @@ def _select_short(
 
 
 def _covariance(solved: _Solved, demodulated: Demodulated) -> tuple[F8, F8]:
-    """Covariance of the parameters, and the factors by which residuals that are not white widened it."""
+    """Return the covariance of the parameters, and the factors by which non-white residuals widen uncertainties."""
     inverse, u = solved.fit.covariance, np.sqrt(np.diag(solved.fit.covariance)) * solved.noise_m
     factors = np.ones(u.size)
     count = solved.record.tau.size
@@ -323,7 +324,7 @@ def _covariance(solved: _Solved, demodulated: Demodulated) -> tuple[F8, F8]:
             ratio = float(squares.sum())
             independent = ratio**2 / max(float(squares @ squares), 1e-300)
             significant = ratio > 1.0 + 3.3 * math.sqrt(2.0 / max(independent, 1.0))
-            # The last is the rest position's constant, which a beat takes to and fro.
+            # The last parameter is the constant rest position, in which a beat causes oscillating deviations.
             beats = beating_length(pull) if solved.state.constant and k == u.size - 1 else None
             length = correlation_length(pull) if beats is None else beats
             factors[k] = math.sqrt((ratio if significant else 1.0) * length)
@@ -337,7 +338,7 @@ def _with_joint(fit: LawFit, solved: _Solved, covariance: F8) -> LawFit:
 
 
 def _flags(conditioned: Conditioned, chooser: Chooser, solved: _Solved) -> NDArray[np.uint8]:
-    """Flags with those of the samples that left the fit."""
+    """Return the flags, with the samples excluded from the fit flagged as clipped or false echoes."""
     flags = conditioned.flags.copy()
     out = ((flags & UNUSABLE) == 0) & ~solved.rows
     crest = out & chooser.on_plateau(solved.position)
@@ -349,7 +350,7 @@ def _flags(conditioned: Conditioned, chooser: Chooser, solved: _Solved) -> NDArr
 def _refined_phase(
     phase: PhaseFit, damping: Damping, demodulated: Demodulated, state: State, covariance: F8
 ) -> PhaseFit:
-    """Return the phase with the full fit's values; the frequency reported is the record's mean here too."""
+    """Return the phase with the full fit's values; the reported frequency is again the record's mean."""
     first = state.theta.size
     covariance = covariance[first : first + state.turning.size, first : first + state.turning.size]
     before = np.array([phase.t0 - phase.middle])
@@ -375,7 +376,7 @@ def _refined_phase(
 
 
 def _refined_rest(solved: _Solved, rest: Rest, middle: float, covariance: F8) -> Rest:
-    """Return the rest position with the full fit's constant or curve."""
+    """Return the rest position with the constant or curve of the full fit."""
     if solved.state.constant:
         mean = solved.record.level + float(solved.state.values[-1])
         return replace(rest, mean=Estimate(mean, math.sqrt(covariance[-1, -1]), "m"), curve=np.full(rest.t.size, mean))
@@ -384,7 +385,7 @@ def _refined_rest(solved: _Solved, rest: Rest, middle: float, covariance: F8) ->
 
 
 def _refined_waveform(solved: _Solved, track: Track) -> Waveform:
-    """Return the model at every sample; its velocity is that of the oscillation, without drift and extra columns."""
+    """Return the model at every sample; its velocity excludes drift and extra columns."""
     state, amplitude = solved.state, solved.amplitude()
     position = solved.record.level + solved.position
     moving = functools.partial(_velocity, state, amplitude, solved.record.tau)

@@ -1,4 +1,4 @@
-"""The whole record as one function of few parameters, as a least-squares fit takes it, and the samples it takes."""
+"""The model of the whole record for a least-squares fit, and the choice of the samples to be fitted."""
 
 from __future__ import annotations
 
@@ -20,34 +20,34 @@ __all__ = ["Chooser", "Record", "Rows", "State", "WaveformModel"]
 
 Rows = NDArray[np.bool_]
 
-DEPENDENT = 1e-13  # share of the largest eigenvalue, below which columns say the same
-ROUNDS = 20  # most, of choosing samples on a tangent
-TANGENT = 1.1  # greatest ratio of the squares that a model leaves to those that its tangent predicts
+DEPENDENT = 1e-13  # eigenvalue, relative to the largest, below which columns count as linearly dependent
+ROUNDS = 20  # maximum number of rounds of choosing samples with the linearised model
+TANGENT = 1.1  # maximum ratio of a model's residual sum of squares to that predicted by its linearisation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Record:
-    """The samples of one record, its time centred.
+    """The samples of one record with time measured from its middle.
 
     Parameters
     ----------
     elapsed : (n,) float64, s
-        Since the first sample used, held within the samples used: a law holds where it was fitted.
+        Time since the first sample used, limited to the range of the samples used, where the law was fitted.
     tau : (n,) float64, s
-        From the middle of the record.
+        Time from the middle of the record.
     y : (n,) float64, m
-        Distance less ``level``; 0 where unmeasured.
+        Distance minus ``level``; 0 where no distance was measured.
     level : float, m
-        Taken off all distances, so that sums do not cancel.
+        Level subtracted from all distances to avoid cancellation in sums.
     order : int
-        Of the polynomial that the rest position follows; 0 where it is constant.
+        Degree of the polynomial that the rest position follows; 0 if it is constant.
     reach : float, s
-        Greatest distance from the middle; scales the polynomial.
+        Maximum of the absolute ``tau``; it scales the argument of the polynomial.
     basis : (n, k) float64
-        Columns about orthonormal that span what enters linearly: the polynomials of a rest position that drifts, and
-        further ones such as a sideways mode's.
+        Nearly orthonormal columns that span all linear terms: the polynomials of a drifting rest position, and
+        further columns such as those of a sideways mode.
     turn : (k', k) float64
-        The basis is those columns times this.
+        Matrix by which the k' original columns are multiplied to give the basis.
     """
 
     elapsed: F8
@@ -63,7 +63,7 @@ class Record:
     def of(
         cls, conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit, rest: Rest, extra: F8 | None
     ) -> Record:
-        """Centre a record; ``extra`` (n, k) float64 are columns that enter linearly besides the rest position."""
+        """Centre a record; ``extra`` (n, k) float64 are linear columns in addition to the rest position."""
         track = conditioned.track
         known = np.isfinite(track.y) & np.isfinite(track.t)
         t = np.where(np.isfinite(track.t), track.t, phase.middle)
@@ -77,7 +77,7 @@ class Record:
         return cls(elapsed, tau, np.where(known, track.y, level) - level, level, order, reach, basis, turn)
 
     def curve(self, tau: F8, linear: F8) -> F8:
-        """Return the drifting rest position at times from the middle (m,), m, for coefficients (k,) of the basis."""
+        """Return the drifting rest position in m at times ``tau`` (m,), for coefficients (k,) of the basis."""
         coefficients = (self.turn @ linear)[: self.order + 1]
         return np.asarray(self.level + _polynomials(tau / self.reach, self.order) @ coefficients)
 
@@ -87,9 +87,10 @@ def _polynomials(x: F8, order: int) -> F8:
 
 
 def _orthonormal(columns: F8) -> tuple[F8, F8]:
-    """Return orthonormal columns that span the same, to rounding, and the matrix that makes them.
+    """Return orthonormal columns with the same span to within rounding, and the matrix that transforms to them.
 
-    By eigenvectors of the normal matrix, 0.5 ms for 28 columns of 12,000 rows; the singular values take 20 ms.
+    The eigenvectors of the normal matrix take 0.5 ms for 28 columns of 12,000 rows; a singular value decomposition
+    takes 20 ms.
     """
     normal = columns.T @ columns
     scale = _lengths(normal)
@@ -100,7 +101,7 @@ def _orthonormal(columns: F8) -> tuple[F8, F8]:
 
 
 def _lengths(normal: F8) -> F8:
-    """Return the lengths (k,) of the columns whose products are given, (k, k); next to nothing where they are zero."""
+    """Return the lengths (k,) of columns from their normal matrix (k, k); 1e-300 for zero columns."""
     return np.asarray(np.maximum(np.sqrt(np.diag(normal)), 1e-300))
 
 
@@ -112,18 +113,18 @@ class State:
     ----------
     law : Law
     values : (q,) float64
-        The law's; phase in the middle (rad) and angular frequency (rad/s); with ``area`` the backbone
-        (rad/(s m^p)) of :math:`\\omega(A) = \\omega_0 + \\kappa A^p`; and the rest position less the record's level, m,
-        where it is constant.
+        The law's parameters, the phase in the middle (rad) and the angular frequency (rad/s). With ``area`` the
+        backbone (rad/(s m^p)) of :math:`\\omega(A) = \\omega_0 + \\kappa A^p` follows. If the rest position is
+        constant, it comes last, minus the record's level (m).
     constant : bool
-        Whether the rest position is.
+        Whether the rest position is constant.
     area : tuple of (g,) float64, or None
-        Times from the middle and the integral of A^p, m^p s; with a backbone only.
+        Times from the middle (s) and the integral of A^p (m^p s); only with a backbone.
     exponent : float
-        p.
+        The exponent p.
     lag : tuple of (g,) float64, or None
-        Times from the middle, s, and by how much the sinusoid of a period is late there, rad. It is that of the
-        windows' law: what the parameters change of it is of second order.
+        Times from the middle (s) and the delays of a period's fitted sinusoid at these times (rad). They are fixed at
+        those of the windows' law, because their change with the parameters is of second order.
     """
 
     law: Law
@@ -146,7 +147,7 @@ class State:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What each value is."""
+        """Name of each value."""
         turning = ("phase", "angular_frequency", "backbone")[: self.turning.size]
         return (*self.law.parameters, *turning, *(("rest",) if self.constant else ()))
 
@@ -155,26 +156,26 @@ class State:
         return replace(self, law=law, values=np.concatenate([theta, self.values[self.theta.size :]]))
 
     def angle(self, tau: F8) -> F8:
-        """Return the total phase at times from the middle, rad."""
+        """Return the total phase in rad at times ``tau`` from the middle."""
         steady = self.steady_angle(tau)
         return steady if self.lag is None else np.asarray(steady - np.interp(tau, *self.lag))
 
     def steady_angle(self, tau: F8) -> F8:
-        """Return the total phase without the lag, rad."""
+        """Return the total phase without the lag in rad."""
         angle = self.turning[0] + self.turning[1] * tau
         return np.asarray(angle if self.area is None else angle + self.turning[2] * np.interp(tau, *self.area))
 
     def amplitude(self, elapsed: F8) -> F8:
-        """Return the amplitude (m,), m."""
+        """Return the amplitude in m at times ``elapsed`` (m,)."""
         return self.law.curve(elapsed, self.theta)[0]
 
     def position(self, elapsed: F8, tau: F8) -> F8:
-        """Return the distances (m,) at times from the first sample and the middle, less level and linear columns, m."""
+        """Return the distances (m,) in m without level and linear columns, at given values of both time scales."""
         swing = self.amplitude(elapsed) * np.cos(self.angle(tau))
         return np.asarray(swing + self.values[-1] if self.constant else swing)
 
     def evaluate(self, elapsed: F8, tau: F8) -> tuple[F8, F8]:
-        """Return the distances as :meth:`position` does and their derivatives by the values, (m, q)."""
+        """Return the distances of :meth:`position` and their derivatives (m, q) by the values."""
         amplitude, slopes = self.law.curve(elapsed, self.theta)
         angle = self.angle(tau)
         cosine = np.cos(angle)
@@ -193,24 +194,24 @@ class State:
 
 
 class WaveformModel:
-    """Residuals of some samples and their derivatives, with what enters linearly projected out.
+    """Residuals of selected samples and their derivatives, with the linear columns projected out.
 
     Parameters
     ----------
     record : Record
     state : State
-        Says what the parameters are.
+        Defines the parameters.
     rows : (n,) bool
-        The samples.
+        True for the selected samples.
 
     Attributes
     ----------
     residuals, jacobian : callable
-        (q,) to (m,), m: model less distance; and to its derivatives (m, q).
+        Functions of the values (q,): the residuals, model minus distance (m,) in m, and their derivatives (m, q).
 
     Notes
     -----
-    For a projector :math:`P = 1 - B(B^TB)^{-1}B^T` that does not depend on the parameters, the residuals are
+    The projector :math:`P = 1 - B(B^TB)^{-1}B^T` does not depend on the parameters. The residuals are therefore
     :math:`P(f - y)` and their derivatives :math:`P\\,\\partial f`: variable projection [1]_ without its second term.
 
     References
@@ -224,7 +225,7 @@ class WaveformModel:
         self._state, self._y = state, record.y[index]
         self._elapsed, self._tau, self._basis = record.elapsed[index], record.tau[index], record.basis[index]
         self._inverse = np.linalg.pinv(self._basis.T @ self._basis, hermitian=True)
-        # A search asks three times for the derivatives at its start and twice for those at its end.
+        # A search evaluates the derivatives three times at its start and twice at its end.
         self.residuals, self.jacobian = least_squares.evaluated_once(self._evaluate)
 
     def linear(self, values: F8) -> F8:
@@ -241,22 +242,22 @@ class WaveformModel:
 
 
 class Chooser:
-    """Chooses the samples of one record: those within the noise of its model, and no cut crest.
+    """Chooses the samples of one record that lie within the noise of its model and not on a clipped crest.
 
     Parameters
     ----------
     conditioned : Conditioned
     demodulated : Demodulated
-        For the flags and the noise of the windows.
+        Provides the flags and the noise of the windows.
     record : Record
-        The same samples, as the fit takes them.
+        The same samples in the form that the fit uses.
     clip_sigmas : float
-        Residuals beyond this many standard deviations are false echoes.
+        Samples whose residuals exceed this many standard deviations are false echoes.
 
     Notes
     -----
-    Samples and fit depend on each other. They are settled on the model's tangent, where a round costs one product of
-    matrices: the windows' values are near the end, so that the tangent errs by far less than the noise.
+    Samples and fit depend on each other. They are iterated with the linearised model, where a round costs one matrix
+    product. The windows' values are close to the solution, so that the error of linearisation is far below the noise.
     """
 
     def __init__(self, conditioned: Conditioned, demodulated: Demodulated, record: Record, clip_sigmas: float) -> None:
@@ -267,7 +268,7 @@ class Chooser:
         usable = (conditioned.flags & UNUSABLE) == 0
         self.by_windows: Rows = usable & ((demodulated.flags & UNUSABLE) == 0)
         echo = (demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0
-        # Samples that a window's narrow spread or a neighbour's spike put out may come back; those in clusters may not.
+        # Samples excluded by a window's narrow spread or a neighbouring spike may return; those in clusters may not.
         run = np.convolve(echo, np.ones(3), "same") == 3
         cluster = np.convolve(run, np.ones(3), "same") > 0
         flagged = (conditioned.track.flags & UNUSABLE) != 0
@@ -275,13 +276,13 @@ class Chooser:
         self._candidates = (usable | (echo & ~flagged & ~others)) & ~cluster
 
     def settled(self, state: State, before: Rows) -> tuple[Rows, State]:
-        """Return the samples (n,) that lie on the model fitted to them, and that fit, on the tangent about a state.
+        """Return the samples (n,) that lie on the model fitted to them, and the fitted state, by linearisation.
 
-        Both as given where the state is so far from the end that the tangent does not predict what the model leaves,
-        or where the law has a pole within the record, so that there is no tangent.
+        Both arguments are returned unchanged if the linearisation does not predict the model's residuals, because the
+        state is too far from the solution, or if the law has a pole within the record.
         """
         record, rows = self._record, before
-        with np.errstate(invalid="ignore", over="ignore"):  # a pole gives infinities, which are looked for
+        with np.errstate(invalid="ignore", over="ignore"):  # a pole gives infinities, which are detected below
             position, slopes = state.evaluate(record.elapsed, record.tau)
         if not (np.isfinite(position).all() and np.isfinite(slopes).all()):
             return before, state
@@ -290,7 +291,7 @@ class Chooser:
         scale = _lengths(normal)
         units = np.outer(scale, scale)
         for _ in range(ROUNDS):
-            # Few samples are out: their part is taken off the whole record's normal equations.
+            # As few samples are excluded, their part is subtracted from the normal equations of the whole record.
             out = slope[~rows]
             inverse = np.linalg.pinv((normal - out.T @ out) / units, rcond=DEPENDENT, hermitian=True)
             step = inverse @ ((right - out.T @ left[~rows]) / scale) / scale
@@ -306,14 +307,14 @@ class Chooser:
         return (rows, moved) if good else (before, state)
 
     def near(self, left: F8, rows: Rows) -> Rows:
-        """Return the samples within the noise of a model that leaves (n,), m."""
+        """Return the samples within the noise of a model with residuals ``left`` (n,) in m."""
         spread = mad_sigma(left[self._candidates])
         near = self._candidates & ~self.on_plateau(self._record.y - left)
         if spread > 1.5 * self._noise_m:
-            # What the model leaves is not noise alone: the verdict so far on each sample stands.
+            # The residuals contain more than noise, so that samples excluded so far remain excluded.
             return np.asarray(near & rows)
         return np.asarray(near & (np.abs(left) <= self._clip_sigmas * max(spread, self._least_m)))
 
     def on_plateau(self, position: F8) -> Rows:
-        """Return where a model (n,), m less the record's level, is too near a level at which distances are cut."""
+        """Return where a model (n,), in m minus the record's level, is too close to a clipping level."""
         return self._conditioned.near_plateau(position + self._record.level, self._noise_m)

@@ -16,23 +16,24 @@ __all__ = ["Estimate", "Joint", "UpperLimit", "format_limit", "format_value", "i
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Estimate:
-    """A value with its standard uncertainty; it calculates as a number does.
+    """A value with its standard uncertainty; it can be used in calculations like a number.
 
     Parameters
     ----------
     value : float
-        In ``unit``.
+        Value, in ``unit``.
     u : float
-        Standard uncertainty (coverage factor 1), in ``unit``; 0 where the value is taken as exact.
+        Standard uncertainty (coverage factor 1), in ``unit``; 0 for a value that is taken as exact.
     unit : str
         SI unit as printed, "" for a ratio.
     variable : uncertainties.UFloat, optional
-        What the estimate was calculated from; left out, it depends on nothing else. No part of its value.
+        Variable that the estimate was calculated from. If it is omitted, the estimate depends on no other.
+        It is ignored when estimates are compared.
 
     Notes
     -----
     Results of arithmetic are :class:`uncertainties.UFloat` in SI units, or plain numbers where nothing is uncertain.
-    Estimates of one analysis know what they were calculated from, so that their correlations are kept.
+    Estimates of one analysis record which variables they depend on, so that their correlations are kept.
 
     Examples
     --------
@@ -49,7 +50,7 @@ class Estimate:
     variable: Any = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        # ``dataclasses.replace`` passes on the variable of the old value, which would give wrong results.
+        # ``dataclasses.replace`` passes the old value's variable on, which would give wrong results.
         if self.variable is not None and not self._describes(self.variable):
             object.__setattr__(self, "variable", None)
 
@@ -62,11 +63,11 @@ class Estimate:
 
     @property
     def ufloat(self) -> Any:
-        """The estimate for calculations: an ``uncertainties.UFloat``, or only the value if it is exact."""
+        """The estimate for calculations: an ``uncertainties.UFloat``, or the bare value if it is exact."""
         if self.variable is None:
             from uncertainties import ufloat
 
-            # Kept, so that an estimate is always the same variable: x - x is 0 and not 0 +- 1.4 u.
+            # Cached, so that an estimate is always the same variable: x - x is 0 and not 0 +- 1.4 u.
             object.__setattr__(self, "variable", ufloat(self.value, self.u) if self.u > 0 else self.value)
         return self.variable
 
@@ -122,9 +123,9 @@ LIMIT = 0.95
 
 @dataclass(frozen=True, slots=True, repr=False)
 class UpperLimit(Estimate):
-    """An estimate of something that is not negative and that the record does not determine: its u exceeds its value.
+    """An estimate of a non-negative quantity that the record does not determine: its u exceeds its value.
 
-    It is written as an upper limit; value and standard uncertainty stay those of the unbounded estimate.
+    It is written as an upper limit. Its value and its standard uncertainty remain those of the unbounded estimate.
 
     Examples
     --------
@@ -134,21 +135,21 @@ class UpperLimit(Estimate):
 
     @classmethod
     def of(cls, estimate: Estimate) -> Estimate:
-        """Return an estimate as it is where the record determines it, else as an upper limit."""
+        """Return the estimate unchanged if the record determines it, and as an upper limit otherwise."""
         if not estimate.u > abs(estimate.value):
             return estimate
         return cls(estimate.value, estimate.u, estimate.unit, estimate.variable)
 
     @property
     def limit(self) -> float:
-        """The value below which what is not negative lies with a probability of 95 %, in ``unit``.
+        """The value below which the non-negative quantity lies with a probability of 95 %, in ``unit``.
 
         Notes
         -----
-        Of a normal distribution of mean x and deviation u, cut at zero, it is
-        :math:`x + u\\,\\Phi^{-1}(1 - 0.05\\,\\Phi(x/u))`: positive whatever x is, and at least the one-sided limit of
-        the uncut one, so it covers in at least 95 % of runs. S. Navas et al. (Particle Data Group), Phys. Rev. D 110
-        (2024) 030001, section 40.4.1.
+        For a normal distribution with mean x and standard deviation u, truncated at zero, the limit is
+        :math:`x + u\\,\\Phi^{-1}(1 - 0.05\\,\\Phi(x/u))`. It is positive for every x. It is never below the one-sided
+        limit of the untruncated distribution, so it covers the true value in at least 95 % of runs. S. Navas et al.
+        (Particle Data Group), Phys. Rev. D 110 (2024) 030001, section 40.4.1.
         """
         from scipy.special import ndtr, ndtri
 
@@ -162,7 +163,7 @@ class UpperLimit(Estimate):
 
 
 def format_limit(limit: float) -> str:
-    """Write a positive upper limit to two digits, rounded up.
+    """Write a positive upper limit to two significant digits, rounded up.
 
     Examples
     --------
@@ -210,7 +211,7 @@ class Joint:
 
     @property
     def correlation(self) -> F8:
-        """(p, p) float64: coefficients of correlation, 1 on the diagonal; 0 beside a parameter that is exact."""
+        """(p, p) float64: correlation coefficients, 1 on the diagonal; 0 between an exact parameter and any other."""
         u = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         scale = np.where(u > 0, u, 1.0)
         found = self.covariance / np.outer(scale, scale)
@@ -219,7 +220,7 @@ class Joint:
 
 
 def format_value(value: float, u: float, unit: str = "") -> str:
-    """Write a value to the digits that its uncertainty allows: two digits of u, the value to match.
+    """Write u to two significant digits and the value to the same decimal place.
 
     Examples
     --------
@@ -237,7 +238,7 @@ def format_value(value: float, u: float, unit: str = "") -> str:
         return f"{value:g} +- {u:g}{tail}"
     if u <= 0:
         return f"{value:.6g}{tail}"
-    # The exponent that u has once it is rounded to two digits: 0.0999 is 0.10, not 0.0999.
+    # The exponent of u after rounding to two digits: 0.0999 becomes 0.10.
     exponent = int(f"{u:.1e}".split("e")[1])
     scale = max(abs(value), u)
     if not 1e-4 <= scale < 1e6:
@@ -252,7 +253,7 @@ def format_value(value: float, u: float, unit: str = "") -> str:
 
 
 def in_brackets(text: str) -> str:
-    """Write the uncertainty of :func:`format_value` in brackets: its digits count in the value's last places.
+    """Write the uncertainty of :func:`format_value` in brackets, in units of the value's last digit.
 
     Examples
     --------

@@ -1,10 +1,11 @@
-"""Least squares for residuals that are not linear in their parameters: MINPACK's, with its end certified.
+"""Non-linear least squares by MINPACK, with certified convergence.
 
-The search is Levenberg-Marquardt by ``scipy.optimize.leastsq``. Its own tests of convergence ask how small a step or a
-gain is; on NIST's reference data such tests call up to 23 of 54 wrong ends a success (``tests/reference/fitters.py``).
-Here a fit has converged only where Bates and Watts' relative offset says that it is a minimum and the singular values
-of the Jacobian say that the data determine every parameter. ``tests/reference/test_nist.py`` shows six digits from 53
-of the 54 starts and no false success. A second search, by a trust region, reached the last one and took twice the code.
+The search is the Levenberg-Marquardt algorithm of ``scipy.optimize.leastsq``. Its own convergence tests ask how small a
+step or a gain is. On NIST's reference data, fitters with such tests report success at a wrong end for up to 23 of
+54 starts (``tests/reference/fitters.py``). Here a fit has converged only if Bates and Watts' relative offset shows a
+minimum and the singular values of the Jacobian show that the data determine every parameter.
+``tests/reference/test_nist.py`` shows six correct digits from 53 of the 54 starts and no false success. A second
+search, by a trust region, solved the remaining start as well but took twice the code.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ __all__ = ["Fit", "Params", "central_differences", "evaluated_once", "minimise"]
 T = TypeVar("T")
 
 EPS = float(np.finfo(np.float64).eps)
-CENTRAL_STEP = EPS ** (1.0 / 3.0)  # a central difference errs least here
+CENTRAL_STEP = EPS ** (1.0 / 3.0)  # relative step at which a central difference has its minimum error
 LEAST_GAIN = 1e-15
-LEAST_STEP = 1e-12  # of the parameters; below it the search picks among rounding errors
-LOST = 1e-10  # share of its largest derivative under which a parameter has no influence any more
-DEPENDENT = 1e-10  # singular value, relative to the largest, at which two parameters are one to a central difference
-OUT_OF_STEPS = 5  # MINPACK's word for it
-STALLED = 1e-3  # in standard uncertainties: what may remain where the search finds no further step
+LEAST_STEP = 1e-12  # relative step of the parameters; below it the search follows rounding errors
+LOST = 1e-10  # fraction of its largest derivative below which a parameter has no influence any more
+DEPENDENT = 1e-10  # relative singular value below which central differences cannot distinguish two parameters
+OUT_OF_STEPS = 5  # MINPACK's return code for it
+STALLED = 1e-3  # remaining distance allowed where the search finds no further step, in standard uncertainties
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,11 +41,11 @@ class Params:
     Parameters
     ----------
     precision : float
-        Stop where the step still to be taken is this share of the parameters' standard uncertainties, as the
-        residuals show them. The default adds 0.005 % to a standard uncertainty; 1e-8 is for reference values.
+        Stop when the remaining step is this fraction of the parameters' standard uncertainties, as estimated from the
+        residuals. The default adds 0.005 % to a standard uncertainty; 1e-8 is for reference values.
     steps : int
-        Most trial steps, each one evaluation of the residuals. Of the fits that converged on 96 recordings half took 4
-        and all but two at most 40.
+        Maximum number of trial steps; each takes one evaluation of the residuals. Of the fits that converged on
+        96 recordings, half took 4 steps and all but two took at most 40.
     """
 
     precision: float = 0.01
@@ -53,23 +54,23 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Where a fit ended.
+    """The result of a fit.
 
     Parameters
     ----------
     values : (p,) float64
     covariance : (p, p) float64
-        :math:`(J^T J)^{-1}`, for residuals in units of their standard uncertainties; times ``cost / (n - p)`` where
-        these are known up to a factor. NaN where the data do not determine the parameters.
+        :math:`(J^T J)^{-1}`, for residuals in units of their standard uncertainties. Multiply it by
+        ``cost / (n - p)`` if the uncertainties are known only up to a factor. NaN if the fit has not converged.
     residual : (n,) float64
-        At ``values``.
+        Residuals at ``values``.
     cost : float
         Sum of squared residuals.
     converged : bool
     tried : str
-        What was done and how it ended, in words for a finding.
+        What was done and how it ended, worded for a finding.
     steps : int
-        Evaluations of the residuals.
+        Number of evaluations of the residuals.
     """
 
     values: F8
@@ -82,7 +83,7 @@ class Fit:
 
 
 class _NoDerivativeError(ArithmeticError):
-    """The model has no finite derivative at ``theta``, where the search arrived."""
+    """The model has no finite derivative at ``theta``, which the search has reached."""
 
     def __init__(self, theta: F8) -> None:
         super().__init__(f"no finite derivative at {_shown(theta)}")
@@ -98,34 +99,35 @@ def minimise(
     jacobian: Callable[[F8], F8] | None = None,
     params: Params | None = None,
 ) -> Fit:
-    """Find the parameters that make the sum of squared residuals least.
+    """Find the parameters that minimise the sum of squared residuals.
 
     Parameters
     ----------
     residuals : callable
-        (p,) float64 to (n,) float64: model less data over the standard uncertainty. May return what is not finite
-        where the model has no value; such steps are not taken.
+        Maps (p,) float64 to (n,) float64: the difference of model and data over the standard uncertainty. It may
+        return non-finite values where the model has no value; such steps are not taken.
     start : (p,) array_like
     jacobian : callable, optional
-        (p,) to (n, p): derivatives of the residuals. Left out, central differences, good to some ten digits.
+        Maps (p,) to (n, p): derivatives of the residuals. The default is central differences, which are accurate to
+        about ten digits.
     params : Params, optional
 
     Returns
     -------
     Fit
-        Look at ``converged`` before its numbers are used.
+        Check ``converged`` before using its numbers.
 
     Raises
     ------
     ValueError
-        If there are fewer residuals than parameters, or none: no data determine them, which the caller knows before.
+        If there are fewer residuals than parameters, or no parameters. The caller can rule this out beforehand.
 
     Notes
     -----
-    A step that leaves the relative offset ``precision`` lowers the sum of squares by the share
+    Where the relative offset is ``precision``, the remaining step lowers the sum of squares by the fraction
     :math:`\\mathrm{precision}^2 p/(n-p)`, which is the search's tolerance. The end is judged by the offset itself [1]_:
-    the length of the residuals' projection on the columns of the Jacobian against that of the residuals, which no unit
-    and no scale of the parameters changes; or by the rounding error of the residuals.
+    the length of the residuals' projection on the columns of the Jacobian, relative to the length of the residuals.
+    It does not depend on the units or scales of the parameters. An offset within rounding error is accepted too.
 
     References
     ----------
@@ -154,13 +156,13 @@ def minimise(
 def _searched(
     residuals: Callable[[F8], F8], jacobian: Callable[[F8], F8], theta: F8, residual: F8, params: Params
 ) -> Fit:
-    """Go downhill from a start with its residuals, and judge where that ended."""
+    """Search downhill from a start with known residuals, and judge the end point."""
     from scipy.optimize import leastsq
 
     largest, start = np.zeros(theta.size), theta.tobytes()
 
     def values(at: F8) -> F8:
-        # A copy: MINPACK works in the array that it gets first.
+        # A copy, because MINPACK overwrites the first array that it receives.
         return residual.copy() if at.tobytes() == start else residuals(at)
 
     @_remembering
@@ -178,13 +180,13 @@ def _searched(
         slope = slopes(x)
     except _NoDerivativeError as error:
         return _failed(error.theta, np.asarray(residuals(error.theta), np.float64), str(error), 1)
-    # Where the search finds no further step its end may be less precise than one that ran out of steps.
+    # Where the search finds no further step, its end may be less precise than where it runs out of steps.
     precision = params.precision if code == OUT_OF_STEPS else max(params.precision, STALLED)
     return _judged(x, report["fvec"], slope, largest, report["nfev"], precision)
 
 
 def _judged(values: F8, residual: F8, slope: F8, largest: F8, steps: int, precision: float) -> Fit:
-    """Say whether an end is a minimum that the data determine."""
+    """Decide whether an end point is a minimum at which the data determine all parameters."""
     cost, count = float(residual @ residual), values.size
     norms = _lengths(slope)
     noise = np.sqrt(cost * count / max(residual.size - count, 1))
@@ -205,19 +207,19 @@ def _judged(values: F8, residual: F8, slope: F8, largest: F8, steps: int, precis
 
 
 def evaluated_once(both: Callable[[F8], tuple[F8, F8]]) -> tuple[Callable[[F8], F8], Callable[[F8], F8]]:
-    """Return residuals and their Jacobian as two functions, where one evaluation gives both.
+    """Split a function that evaluates residuals and Jacobian together into two functions.
 
     Parameters
     ----------
     both : callable
-        (p,) to (n,) and (n, p). What it gave for the last parameters is kept.
+        Maps (p,) to (n,) and (n, p). Its result for the last parameters is cached.
     """
     at = _remembering(both)
     return lambda theta: at(theta)[0], lambda theta: at(theta)[1]
 
 
 def central_differences(function: Callable[[F8], F8], theta: F8) -> F8:
-    """Return the derivatives (n, p) of a function (p,) to (n,); the step is relative, and absolute about zero."""
+    """Return the derivatives (n, p) of a function from (p,) to (n,); steps are relative, and absolute near zero."""
     columns = []
     for i, value in enumerate(theta.tolist()):
         above, below = theta.copy(), theta.copy()
@@ -229,7 +231,7 @@ def central_differences(function: Callable[[F8], F8], theta: F8) -> F8:
 
 
 def _remembering(function: Callable[[F8], T]) -> Callable[[F8], T]:
-    """Keep what a function gave for its last parameters: MINPACK's wrapper asks for the start's twice."""
+    """Cache a function's result for its last parameters, because MINPACK's wrapper evaluates the start twice."""
     last: list[tuple[bytes, T]] = []
 
     def at(theta: F8) -> T:
@@ -242,7 +244,7 @@ def _remembering(function: Callable[[F8], T]) -> Callable[[F8], T]:
 
 
 def _lengths(slope: F8) -> F8:
-    """Lengths of the columns (p,) of a Jacobian (n, p): a sum of squares, five times as fast as numpy's norm."""
+    """Return the lengths (p,) of the columns of a Jacobian (n, p), five times as fast as numpy's norm."""
     return np.asarray(np.sqrt(np.einsum("np,np->p", slope, slope)))
 
 

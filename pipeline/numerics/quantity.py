@@ -1,4 +1,4 @@
-"""Words and units of what a record holds: stages count in its unit, sentences and figures say which."""
+"""Names and units of the values in a record: stages calculate in its unit, sentences and figures state the unit."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ __all__ = ["SHOWN", "Shown", "amount", "in_unit", "noun", "plural"]
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """How values of one unit are called and written.
+    """Name and display unit of the values in one unit.
 
     Parameters
     ----------
     noun : str
-        Of one value.
+        Name of one value.
     unit : str
-        In which sentences and figures write it.
+        Unit in which sentences and figures write the value.
     factor : float
-        From the record's unit to that one.
+        Factor from the record's unit to ``unit``.
     """
 
     noun: str
@@ -37,7 +37,7 @@ SHOWN = {
     "V": Shown("voltage", "V", 1.0),
     "1": Shown("value", "", 1.0),
 }
-"""By the one unit that each of :data:`pipeline.track.UNITS` has."""
+"""Names and display units by the units of :data:`pipeline.track.UNITS`."""
 
 _SIMPLER = {
     "m/s": {"m/s": "m/s^2", "m/s^2": "m/s^3", "1/(m s)": "1/m"},
@@ -45,7 +45,7 @@ _SIMPLER = {
     "m/s^2": {"m/s": "m/s^3", "m/s^2": "m/s^4", "1/(m s)": "s/m"},
     "1": {"m/s": "1/s", "m/s^2": "1/s^2", "1/(m s)": "1/s", "m^(1-n)/s": "1/s"},
 }
-"""Units for a length, by the unit that takes the place of m, where powers of s cancel or nothing is left."""
+"""Simplified units where powers of s or all of m cancel, by the record's unit and the unit written for metres."""
 
 
 def amount(value: float, unit: str, form: str = ".2g") -> str:
@@ -54,11 +54,12 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
     Parameters
     ----------
     value : float
-        In ``unit``.
+        Value, in ``unit``.
     unit : str
-        Of the record.
+        Unit of the record.
     form : str
-        Of the number in mm; a number of fixed decimals has four digits in other units, whose size nobody knows.
+        Format of the number in mm. In other units, where typical sizes are unknown, four significant digits replace
+        a fixed number of decimals.
 
     Examples
     --------
@@ -72,12 +73,12 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
 
 
 def noun(unit: str) -> str:
-    """Return what a value of a record in this unit is called."""
+    """Return the noun for a value of a record in this unit."""
     return SHOWN[unit].noun
 
 
 def plural(unit: str) -> str:
-    """Return what values of a record in this unit are called.
+    """Return the plural noun for values of a record in this unit.
 
     Examples
     --------
@@ -89,7 +90,7 @@ def plural(unit: str) -> str:
 
 
 def in_unit(form: str, unit: str) -> str:
-    """Return a unit that was written for a length in metres for a record in another unit.
+    """Convert a unit that was written for records in metres to a record in another unit.
 
     Examples
     --------

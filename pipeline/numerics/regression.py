@@ -1,4 +1,4 @@
-"""Weighted regression on the windows' points: scatter beyond the stated noise, and correlation, accounted for."""
+"""Weighted regression on the windows' points, allowing for scatter beyond the stated noise and for correlation."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ __all__ = [
     "solve_weighted",
 ]
 
-OPPOSITE, SLOWEST = 0.5, 4  # correlation half a period and a whole one later; points of half the shortest period
-LAGS = 16  # looked at together: most residuals have lost themselves by then
+OPPOSITE, SLOWEST = 0.5, 4  # correlation required at half and whole periods; fewest points of a quarter record
+LAGS = 16  # lags computed together; most residuals are uncorrelated beyond these
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,7 @@ class Line:
     ----------
     values : (p,) float64
     covariance : (p, p) float64
-        From the stated standard uncertainties, nothing scaled.
+        From the stated standard uncertainties, without scaling.
     residual : (n,) float64
     chi2 : float
     """
@@ -53,18 +53,18 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scatter:
-    """How points scatter about any smooth curve, whatever law they follow.
+    """Scatter of points about a smooth curve, independent of the law that they follow.
 
     Parameters
     ----------
     u : (n,) float64
-        Standard uncertainty of each point with the excess added in quadrature.
+        Standard uncertainty of each point, with the excess added in quadrature.
     excess : float
-        What the points scatter beyond their own noise: beats, sideways swing, steps.
+        Scatter of the points beyond their own noise: beats, sideways swing, steps.
     kept : (n,) bool
-        False for single points more than five standard uncertainties off the curve.
+        False for single points more than five standard uncertainties from the curve.
     correlation : float
-        Points that count as one, :math:`1 + 2\\sum\\rho_k \\ge 1`.
+        Number of points that count as one, :math:`1 + 2\\sum\\rho_k \\ge 1`.
     """
 
     u: F8
@@ -74,9 +74,10 @@ class Scatter:
 
 
 def smooth_columns(t: F8, degree: int) -> F8:
-    """Return Legendre's polynomials (n, degree + 1) over times (n,), two at least, in ascending order; to be read only.
+    """Return the Legendre polynomials (n, degree + 1) over ascending times (n,) as a read-only array.
 
-    Amplitudes, phases and rest positions have the same times: they are worked out once.
+    There must be at least two times. Amplitudes, phases and rest positions share their times, so the polynomials are
+    calculated once.
     """
     return _smooth_columns(t.tobytes(), degree)
 
@@ -90,9 +91,9 @@ def _smooth_columns(times: bytes, degree: int) -> F8:
 
 
 def beyond(basis: F8, columns: F8) -> F8:
-    """Return what columns (n, k) hold beyond an orthonormal basis (n, p), orthogonal to it."""
+    """Return the component of columns (n, k) orthogonal to an orthonormal basis (n, p)."""
     left = columns - basis @ (basis.T @ columns)
-    # A second projection takes out what rounding left of the basis where columns nearly lie in it.
+    # Where columns nearly lie in the basis, a second projection removes what rounding has left.
     return np.asarray(left - basis @ (basis.T @ left))
 
 
@@ -106,7 +107,7 @@ def solve_weighted(design: F8, y: F8, u: F8) -> Line:
 
     Notes
     -----
-    Where columns depend on each other the solution is the shortest one, in columns of unit length.
+    Where columns are linearly dependent, the result is the minimum-norm solution for columns scaled to unit length.
     """
     weight = 1.0 / u
     left, root, _ = decompose(design * weight[:, None])
@@ -117,27 +118,27 @@ def solve_weighted(design: F8, y: F8, u: F8) -> Line:
 
 
 def decompose(matrix: F8, least: float = 1e-13) -> tuple[F8, F8, bool]:
-    """Return the factors of the pseudo-inverse of a matrix of more rows than columns, which may have any units.
+    """Return factors of the pseudo-inverse of a matrix with more rows than columns and any units.
 
     Parameters
     ----------
     matrix : (n, p) float64
     least : float
-        Singular value of the columns scaled to unit length, relative to the largest, up to which it counts as zero.
+        Relative singular value, of the columns scaled to unit length, up to which it counts as zero.
 
     Returns
     -------
     left : (n, k) float64
-        Orthonormal columns that span the matrix's.
+        Orthonormal columns that span the column space of the matrix.
     root : (p, k) float64
-        Times its transpose it is :math:`(J^T J)^{-1}`, times that of ``left`` the pseudo-inverse.
+        Multiplied by its transpose it gives :math:`(J^T J)^{-1}`; by that of ``left``, the pseudo-inverse.
     independent : bool
-        Whether no singular value counted as zero.
+        Whether no singular value counts as zero.
     """
     scale = np.sqrt(np.einsum("np,np->p", matrix, matrix))
     scale[scale == 0.0] = 1.0
     left, singular, right = np.linalg.svd(matrix / scale, full_matrices=False)
-    # Singular values come in falling order.
+    # Singular values come in descending order.
     seen = int(np.count_nonzero(singular > least * singular[0]))
     return left[:, :seen], (right[:seen] / singular[:seen, None]).T / scale[:, None], seen == scale.size
 
@@ -153,7 +154,7 @@ def covariance_of(jacobian: F8) -> F8:
     Returns
     -------
     (p, p) float64
-        Infinite where the points do not determine every parameter: a pseudo-inverse would call it known.
+        Infinite where the points do not determine every parameter; a pseudo-inverse would be finite there.
     """
     unknown = np.full((jacobian.shape[1],) * 2, np.inf)
     if not np.all(np.isfinite(np.linalg.norm(jacobian, axis=0))):
@@ -163,19 +164,20 @@ def covariance_of(jacobian: F8) -> F8:
 
 
 def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
-    """Measure the points' scatter about a smooth curve that no damping law restricts.
+    """Measure the scatter of points about a smooth curve that is independent of any damping law.
 
     Parameters
     ----------
     t, y, u : (n,) float64
         Points and their standard uncertainties.
     degree : int
-        Of the polynomial; fewer where points are few (one coefficient for four points).
+        Degree of the polynomial; lower for few points (one coefficient per four points).
 
     Notes
     -----
-    The excess is what must be added in quadrature so that the median absolute residual is the Gaussian one,
-    corrected for the coefficients taken. With fewer than eight points nothing is measured and ``u`` stands.
+    The excess, added in quadrature, makes the uncertainties agree with the spread of the residuals, which is corrected
+    for the number of coefficients. The spread is the smaller of the median's and the root mean square. With fewer than
+    eight points nothing is measured and ``u`` is kept.
     """
     n = t.size
     degree = min(degree, n // 4 - 1)
@@ -189,7 +191,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
         weight = 1.0 / total[kept]
         values = np.linalg.lstsq(design[kept] * weight[:, None], y[kept] * weight, rcond=None)[0]
         residual = y - design @ values
-        # The smaller of two measures: the median is deaf to outliers, the root mean square knows flat patterns.
+        # The smaller of two measures: the median is robust against outliers, the root mean square suits flat patterns.
         typical = mad_sigma(residual)
         believed = residual[kept]
         spread = share * min(typical, math.sqrt(float(believed @ believed) / believed.size))
@@ -206,16 +208,17 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
 
 
 def smooth_curve(t: F8, y: F8, spread: Scatter, *, degree: int = 6) -> tuple[Legendre, float]:
-    """Return a polynomial through points, and by how much its BIC is lower than that of their mean.
+    """Return a polynomial through points, and the amount by which its BIC is below that of the mean.
 
     Parameters
     ----------
     t, y : (n,) float64
         Times in ascending order, and values.
     spread : Scatter
-        Of the points; those that are correlated count as fewer.
+        Scatter of the points; correlated points count as fewer.
     degree : int
-        Lower for few points (one coefficient for four points): only the mean under eight points.
+        Degree of the polynomial; lower for few points (one coefficient per four points). Below eight points only the
+        mean is taken.
     """
     kept = spread.kept
     values, weight = y[kept], 1.0 / spread.u[kept]
@@ -232,7 +235,7 @@ def smooth_curve(t: F8, y: F8, spread: Scatter, *, degree: int = 6) -> tuple[Leg
 
 def _excess(residual: F8, u: F8, spread: float) -> float:
     typical = median(u)
-    # Under twice its own error a difference of variances is none: the median deviation is known to 1.17/sqrt(2n).
+    # A difference below twice its own error is not significant: the median deviation is known to 1.17/sqrt(2n).
     doubt = 1.0 + 2.0 * 1.17 / math.sqrt(2.0 * residual.size)
     if spread <= typical * doubt:
         return 0.0
@@ -240,7 +243,7 @@ def _excess(residual: F8, u: F8, spread: float) -> float:
 
 
 def correlation_length(residual: F8) -> float:
-    """How many consecutive points count as one: :math:`1 + 2\\sum_k \\rho_k` up to the first insignificant lag."""
+    """Return how many points count as one: :math:`1 + 2\\sum_k \\rho_k` before the first insignificant lag."""
     n = residual.size
     if n < 8:
         return 1.0
@@ -251,7 +254,7 @@ def correlation_length(residual: F8) -> float:
     total, least = 1.0, 2.0 * power / math.sqrt(n)
     for first in range(1, n // 3, LAGS):
         stop = min(first + LAGS, n // 3)
-        # A few lags together, what lies beyond the end taken as 0.
+        # Several lags together, padded with zeros beyond the end.
         ahead = np.concatenate([centred[first:], np.zeros(stop - 1)])
         for product in np.correlate(ahead, centred, "valid").tolist():
             if product < least:
@@ -261,12 +264,12 @@ def correlation_length(residual: F8) -> float:
 
 
 def beating_length(residual: F8) -> float | None:
-    """How many points count as one where residuals swing at some period; None where they do not.
+    """Return how many points count as one if the residuals oscillate at some period, and None otherwise.
 
-    A beating mode does that to the rest positions of periods. Half a period later they are the opposite, a whole one
-    later the same again, by the share r of their power; of noise that remembers they are neither. Over c periods in n
-    points the mean of a wave is off by :math:`\\sin(\\pi c)/(\\pi c)` of its size, whatever its phase, so that its
-    share counts :math:`n/(\\pi c)^2` and the rest, white, once.
+    A beating mode makes the windows' rest positions oscillate. Their autocorrelation is about -r after half a period
+    and r after one period, where r is the wave's share of their power. Autocorrelated noise shows neither. The mean of
+    a wave over c periods, in n points, is off by at most :math:`\\sin(\\pi c)/(\\pi c)` of its amplitude. So the share
+    r counts :math:`n/(\\pi c)^2` times, and the white remainder once.
     """
     n = residual.size
     centred = residual - residual.mean()
@@ -276,7 +279,7 @@ def beating_length(residual: F8) -> float | None:
     spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
     rho = np.fft.irfft(spectrum, 2 * n)[:n] / power / (1.0 - np.arange(n) / n)
     half = int(np.argmin(rho[: n // 4 + 1]))
-    # Both ends of what is looked at are no turn.
+    # A minimum at either end of the range is no turning point.
     if not 2 < half < n // 4 or rho[half] > -OPPOSITE:
         return None
     share = min(float(np.max(rho[2 * half - 1 : 2 * half + 2])), 1.0)

@@ -1,4 +1,4 @@
-"""Robust statistics: what a median says of a normal spread."""
+"""Robust statistics: standard deviations of normal distributions, estimated from medians."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4)
 
 
 def median(x: NDArray[np.number[Any]]) -> float:
-    """Return the median of (n,) numbers, NaN not among them.
+    """Return the median of (n,) numbers without NaN.
 
-    Of 160 values in 3 us, of 12,000 in 30; ``numpy.median``, which sees to axes, masks and NaN, takes 20 and 55.
+    This takes 3 us for 160 values and 30 us for 12,000. ``numpy.median``, which handles axes, masks and NaN, takes
+    20 us and 55 us.
     """
     half = x.size // 2
     ordered = np.partition(x, half)

@@ -1,8 +1,8 @@
-"""Lines: single frequencies in what a smooth model of an oscillation leaves, found at a stated false-alarm rate.
+"""Lines: single frequencies in the residual of a smooth model of an oscillation, at a stated false-alarm rate.
 
-The periodograms of libraries state that rate for white noise alone: at a rate of 0.01 such a threshold finds a line in
-every one of 200 records of noise with a correlation of 0.9 from block to block, this in at most two of a hundred
-(``tests/unit/pipeline/numerics/test_spectrum.py``).
+The periodograms of libraries state this rate for white noise only. At a rate of 0.01 their threshold finds a line in
+each of 200 records of noise with a correlation of 0.9 from block to block. The search here finds one in at most two of
+a hundred records (``tests/unit/pipeline/numerics/test_spectrum.py``).
 """
 
 from __future__ import annotations
@@ -31,31 +31,33 @@ __all__ = [
 ]
 
 AR_ORDER = 4  # highest order of the autoregression that describes the residual's correlation
-OVERSAMPLING = 4  # of the spectrum; the dearest loss between two of its points is 5 % of a line's power
-CONTINUUM = 2.5  # independent trials per natural bin, because the frequency is sought between bins too
-NEAR, FAR = 2, 7  # natural bins beside a line that show how much power there is without it
-VARYING = 3  # degree of the polynomial that a line's amplitude and phase may follow while its noise is looked at
-FREEDOM = 6.0  # of that power, in complex amplitudes: twelve bins, which the taper makes half as many
+OVERSAMPLING = 4  # of the spectrum; between two of its points a line loses at most 5 % of its power
+CONTINUUM = 2.5  # independent trials per natural bin, because frequencies between bins are searched too
+NEAR, FAR = 2, 7  # distances from a line, in natural bins, between which the noise power is measured
+VARYING = 3  # degree of the polynomials for a line's amplitude and phase while the noise beside it is measured
+FREEDOM = 6.0  # complex degrees of freedom of the noise power: twelve bins, halved by the taper
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blocks:
-    """Means of consecutive samples on an even grid: all that lines of a few times the main frequency need.
+    """Means of consecutive samples on an even grid, fine enough for lines at a few times the main frequency.
 
     Parameters
     ----------
     t : (b,) float64, s
-        Mean times of the samples used, less ``origin``; the middle of the block where none was.
+        Mean times of the samples used, counted from ``origin``; the middle of a block without samples.
     y : (b,) float64, m
-        Mean values; 0 where none was used.
+        Mean values; 0 in a block without samples.
     weight : (b,) float64
-        Root of the number of samples used.
+        Square root of the number of samples used.
     step : float, s
+        Length of a block.
     samples : float
-        Per full block.
+        Number of samples per full block.
     origin : float, s
+        Start of the first block.
     taper : (b,) float64
-        Hann's window times the share of samples used, scaled so that white noise keeps its variance per block.
+        Hann window times the share of samples used, scaled so that white noise keeps its variance per block.
     """
 
     t: F8
@@ -67,7 +69,7 @@ class Blocks:
     taper: F8
 
     def unweighted(self, rows: F8) -> F8:
-        """Divide rows (b,) that were multiplied by the weights by them; 0 where a block holds no sample."""
+        """Divide weighted rows (b,) by the weights; 0 for blocks without samples."""
         return np.divide(rows, self.weight, out=np.zeros_like(rows), where=self.weight > 0)
 
     @classmethod
@@ -94,20 +96,20 @@ class Blocks:
         return self.t.size * self.step
 
     def attenuation(self, frequency_hz: float) -> float:
-        """By how much averaging over a block lessens a line."""
+        """Return the factor by which averaging over a block attenuates a line."""
         x = math.pi * frequency_hz * self.step / self.samples
         return math.sin(self.samples * x) / (self.samples * math.sin(x)) if x > 0 else 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Where a line is sought.
+    """The frequencies at which a line is searched.
 
     Parameters
     ----------
     low_hz, high_hz : float
     holes : tuple of (float, float)
-        Frequency and half-width, Hz, of what the model holds already.
+        Centres and half-widths, Hz, of the ranges that the model already covers.
     """
 
     low_hz: float
@@ -115,7 +117,7 @@ class Band:
     holes: tuple[tuple[float, float], ...]
 
     def inside(self, frequency_hz: F8) -> NDArray[np.bool_]:
-        """Return which frequencies (k,) belong to the band."""
+        """Return for each frequency (k,) whether it belongs to the band."""
         mask = (frequency_hz >= self.low_hz) & (frequency_hz <= self.high_hz)
         for centre, half in self.holes:
             mask &= np.abs(frequency_hz - centre) > half
@@ -130,11 +132,11 @@ class Peak:
     ----------
     frequency_hz : float
     density : float, m^2
-        Variance of one full block's noise at that frequency.
+        Variance of the noise of one full block at that frequency.
     evidence : float
-        Half the reduction of chi-square by the line; exponentially distributed if there is no line.
+        Half the reduction of chi-square by the line; without a line it is exponentially distributed.
     false_alarm : float
-        Probability that noise shows as strong a line anywhere in the band.
+        Probability that noise produces a line as strong anywhere in the band.
     """
 
     frequency_hz: float
@@ -144,7 +146,7 @@ class Peak:
 
 
 def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
-    """Return frequencies (k,), Hz, and power (k,), m^2: the expectation for white noise is its variance per block."""
+    """Return frequencies (k,), Hz, and power (k,), m^2; white noise has its variance per block as its expectation."""
     size = 1 << (OVERSAMPLING * y.size - 1).bit_length()
     lines = np.fft.rfft(blocks.taper * y, size)
     frequency = np.asarray(np.fft.rfftfreq(size, blocks.step), np.float64)
@@ -152,21 +154,21 @@ def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
 
 
 def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance: float) -> bool:
-    """Return whether any line could come out significant; one look at the spectrum spares most records the search.
+    """Return whether any line could be significant; this quick test spares most records the full search.
 
     Parameters
     ----------
     blocks : Blocks
-        Their means are the residual.
+        Blocks whose means are the residual.
     band : Band
     fixed_hz : tuple of float
-        Frequencies that are tested by themselves, Hz.
+        Frequencies that are tested individually, Hz.
     chance : float
-        False-alarm probability at which lines are accepted, here and there.
+        False-alarm probability at which lines are accepted, for the band and for the fixed frequencies alike.
 
     Notes
     -----
-    Half the evidence that acceptance takes is let through, over the median density of the band.
+    A record passes with half the evidence needed for acceptance, relative to the median density of the band.
     """
     frequency, power = spectrum(blocks, blocks.y)
     inside = band.inside(frequency)
@@ -175,7 +177,7 @@ def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance
     usual = median(power[inside]) / math.log(2.0)
     trials = _trials(inside, float(frequency[1]), blocks)
     fixed = np.min(np.abs(np.subtract.outer(fixed_hz, frequency)), axis=0) <= 1.0 / blocks.seconds
-    # The taper costs a third of a line's power.
+    # The taper reduces a line's power by a third.
     least, least_fixed = (0.5 * evidence_for(chance, n) / 1.5 * usual for n in (trials, float(len(fixed_hz))))
     return bool(np.any(power[inside] > least) or np.any(power[fixed] > least_fixed))
 
@@ -185,15 +187,15 @@ def _trials(inside: NDArray[np.bool_], spacing_hz: float, blocks: Blocks) -> flo
 
 
 def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
-    """Find the strongest line, and the probability that pure noise shows one as strong.
+    """Find the strongest line, and the probability that pure noise produces one as strong.
 
     Parameters
     ----------
     blocks : Blocks
     left : (b,) float64
-        What a linear model leaves of the blocks' values, multiplied by their weights.
+        Residual of the blocks' values about a linear model, multiplied by their weights.
     basis : (b, p) float64
-        Orthonormal columns of that model: what a line shares with them does not count.
+        Orthonormal columns of that model. The component of a line within their span does not count.
     band : Band
 
     Returns
@@ -203,11 +205,11 @@ def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
 
     Notes
     -----
-    Candidates come from the spectrum over that of a first-order autoregression. The line's evidence is half the
-    fall of chi-square that its cosine and sine bring beyond the model, over the noise's density at its frequency: the
-    larger of an autoregression's and of what the neighbouring frequencies hold, both with the line taken out. A line of
-    noise is then exponentially distributed but for the density's own error, which the heavier tail of
-    :math:`(1 + z/\\nu)^{-\\nu}` stands for [1]_.
+    The candidate is the maximum of the spectrum divided by that of a first-order autoregression. The line's evidence is
+    half the reduction of chi-square by its cosine and sine beyond the model, over the noise density at its frequency.
+    This density is the larger of an autoregression's and the neighbouring frequencies', both without the line. The
+    evidence of a noise line would be exponentially distributed if the density were exact. The heavier tail
+    :math:`(1 + z/\\nu)^{-\\nu}` accounts for the density's own error [1]_.
 
     References
     ----------
@@ -224,28 +226,29 @@ def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
     f = float(frequency[inside][int(np.argmax(shaped))])
     angle = 2.0 * math.pi * f * blocks.t
     pair = np.stack([np.cos(angle), np.sin(angle)]) * blocks.weight
-    # The line itself first; then what it may vary by, which must not pass for noise beside it.
+    # First the line itself, then its slow variations, which must not pass for noise beside it.
     powers = np.polynomial.legendre.legvander(2.0 * blocks.t / blocks.seconds - 1.0, VARYING)
     rows = (powers.T[:, None] * pair).reshape(-1, angle.size)
     line = beyond(basis, (rows / np.linalg.norm(rows, axis=1)[:, None]).T)
-    if np.linalg.norm(line[:, :2], -2) < 0.2:  # its least singular value: the model holds it already
+    if np.linalg.norm(line[:, :2], -2) < 0.2:  # smallest singular value: the model already contains the line
         return None
     noise = blocks.unweighted(left - line @ np.linalg.lstsq(line, left)[0])
     density = spectral_density(blocks, noise, f, band, smooth_density(noise, f * blocks.step))
-    # Rows are weighted by samples, the density is one full block's.
+    # Rows are weighted by their numbers of samples; the density is that of one full block.
     own = line[:, :2] @ np.linalg.lstsq(line[:, :2], left)[0]
     evidence = 0.5 * float(own @ own) / (density * blocks.samples)
     return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
 
 
 def false_alarm(evidence: float, trials: float) -> float:
-    """Return the probability that one of ``trials`` lines of noise reaches this evidence.
+    """Return the probability that at least one of ``trials`` noise lines reaches this evidence.
 
     Parameters
     ----------
     evidence : float
-        Half the fall of chi-square, over a density known from some ten neighbouring frequencies only.
+        Half the reduction of chi-square, over a density that is known only from about ten neighbouring frequencies.
     trials : float
+        Number of independent frequencies.
 
     Examples
     --------
@@ -271,7 +274,7 @@ def evidence_for(chance: float, trials: float) -> float:
 
 
 def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band, smooth: float) -> float:
-    """Variance of one block's noise at a frequency, m^2: an autoregression's or its neighbours', the larger.
+    """Return the noise variance of one block at a frequency, m^2: the larger of the smooth and the local one.
 
     Parameters
     ----------
@@ -280,9 +283,9 @@ def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band, smo
         The residual without the line.
     frequency_hz : float
     band : Band
-        Neighbours outside it say nothing.
+        Only neighbours inside it count.
     smooth : float, m^2
-        As :func:`smooth_density` has it there.
+        Result of :func:`smooth_density` at this frequency.
     """
     frequency, power = spectrum(blocks, y)
     reach = FAR / blocks.seconds
@@ -293,9 +296,9 @@ def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band, smo
 
 
 def smooth_density(y: F8, turns: float) -> float:
-    """Return the spectral density of an autoregression fitted to y (n,), at a frequency in turns per step.
+    """Return the spectral density, at a frequency in cycles per step, of an autoregression fitted to y (n,).
 
-    Its mean over all frequencies is the variance, so that white noise has its variance everywhere.
+    Its mean over all frequencies is the variance, so the density of white noise equals its variance everywhere.
     """
     coefficients, variance = _autoregression(y, AR_ORDER)
     waves = (c * cmath.exp(-2j * math.pi * lag * turns) for lag, c in enumerate(coefficients, start=1))
@@ -303,7 +306,7 @@ def smooth_density(y: F8, turns: float) -> float:
 
 
 def _autoregression(y: F8, highest: int) -> tuple[list[float], float]:
-    """Coefficients (p) and innovation variance of the order that the BIC prefers, by Levinson's recursion."""
+    """Return coefficients (p) and innovation variance of the order with the lowest BIC, by Levinson's recursion."""
     n = y.size
     covariances = [float(y[lag:] @ y[: n - lag]) / n for lag in range(min(highest, n - 1) + 1)]
     coefficients, variance = list[float](), max(covariances[0], 1e-300)
@@ -321,7 +324,7 @@ def _autoregression(y: F8, highest: int) -> tuple[list[float], float]:
 
 
 def _density(coefficients: list[float], variance: float, turns: F8) -> F8:
-    """Spectral density at frequencies in turns per block: its mean over all of them is the variance."""
+    """Return the spectral density at frequencies in cycles per block; its mean over all of them is the variance."""
     real, imaginary = np.ones(turns.size), np.zeros(turns.size)
     for lag, coefficient in enumerate(coefficients, start=1):
         real -= coefficient * np.cos(2.0 * math.pi * lag * turns)

@@ -1,7 +1,7 @@
-"""Threads: linear algebra inside an analysis runs on one thread, afterwards on as many as before.
+"""Threads: linear algebra runs on one thread during an analysis, and afterwards on as many as before.
 
-The matrices of an analysis have few columns. A second thread gains nothing on them, and where other programs keep
-the cores busy each of hundreds of decompositions waits for it: 5 to 11 s where one thread takes 0.15 s.
+The matrices of an analysis have few columns, so a second thread gains nothing. Where other programs keep the cores
+busy, each of hundreds of decompositions waits for the second thread: 5 to 11 s instead of 0.15 s on one thread.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ __all__ = ["one_thread"]
 
 
 class _OneThread(ContextDecorator):
-    """Holds numpy's and scipy's linear algebra to one thread, in a ``with`` block or as a decorator.
+    """Restrict numpy's and scipy's linear algebra to one thread, in a ``with`` block or as a decorator.
 
     Notes
     -----
-    The number of threads is the process's. Where analyses run side by side the first to begin sets it and the last to
-    end puts it back.
+    The number of threads applies to the whole process. Where analyses run concurrently, the first to begin sets it and
+    the last to end restores it.
     """
 
     def __init__(self) -> None:
@@ -48,8 +48,8 @@ one_thread = _OneThread()
 
 @functools.cache
 def _libraries() -> Any:
-    """Return the loaded linear algebra libraries; looking for them takes a millisecond, so it is done once."""
-    # scipy brings another library: loaded later, it would not be found.
+    """Return the loaded linear algebra libraries; the search takes a millisecond, so it is done once."""
+    # scipy brings its own library, which the search would miss if it were loaded later.
     import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
 
@@ -57,6 +57,6 @@ def _libraries() -> Any:
 
 
 def _let_go() -> None:
-    """Let any thread set the number: threadpoolctl allows it to the first that does, until its block ends."""
+    """Let any thread set the limit, which threadpoolctl otherwise reserves for the first one until its block ends."""
     with _libraries().limit():
         pass

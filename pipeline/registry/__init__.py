@@ -1,4 +1,5 @@
-"""Every name that a result can carry, each kind in one place: findings, effects, estimates, inputs of the budgets.
+"""The names in the results: effects, estimates, inputs of the budgets and damping laws.
 
-A producer that uses a name that is not listed here raises an error, so no table of a report can lack it.
+A result with a name that is not registered here raises an error, so the tables of a report always have its label. The
+names of findings are in :mod:`pipeline.findings.registry`.
 """

@@ -1,4 +1,4 @@
-"""The effects that the table of effects can list, with their labels."""
+"""The effects in the table of effects, with their labels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EFFECTS: Mapping[str, str] = {
 
 
 def check_effect(name: str) -> None:
-    """Refuse an effect that is not in the list.
+    """Raise an error if the name of an effect is not registered.
 
     Raises
     ------

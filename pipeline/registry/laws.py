@@ -1,4 +1,4 @@
-"""The names of the damping laws that ship: what a scene, an option or a table may state."""
+"""The names of the built-in damping laws, for scenes, options and tables."""
 
 from __future__ import annotations
 
@@ -15,4 +15,4 @@ LAW_NAMES = (
     "linear+quadratic+friction",
     "power",
 )
-"""In the order in which they are tried; :data:`pipeline.damping.laws.LAWS` holds the law of each."""
+"""The names in the order in which the laws are tried; :data:`pipeline.damping.laws.LAWS` contains the laws."""

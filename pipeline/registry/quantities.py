@@ -1,4 +1,4 @@
-"""Estimates and the inputs of their uncertainty budgets: label, symbols and unit of each, by name."""
+"""The estimates and the inputs of their uncertainty budgets, with labels, symbols and units."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ class Quantity:
     Parameters
     ----------
     name : str
-        In JSON, tables of numbers and Python.
+        Name in JSON, tables of numbers and Python.
     label : str
-        In words.
+        Name in words.
     symbol, page_symbol, tex_symbol : str
-        In ASCII, in Unicode (an index stands after a space) and as the inside of ``$...$``.
+        Symbol in ASCII, in Unicode (with an index after a space), and in TeX without the ``$``.
     unit : str
-        SI unit; where ``of_record``, that for a recorded length, which other recorded quantities replace.
+        SI unit; if ``of_record``, the unit for a recorded length, in which :meth:`unit_in` replaces the metre.
     of_record : bool
-        Whether the unit depends on what was recorded.
+        Whether the unit depends on the recorded quantity.
     in_table : bool
-        Whether Table 1 shows it.
+        Whether Table 1 shows the estimate.
     by_law : bool
-        Whether Table 1 says by which law it is stated: the law of damping decides on its value.
+        Whether Table 1 names the damping law of the estimate, because its value depends on the law.
     """
 
     name: str
@@ -60,13 +60,13 @@ class Input:
     Parameters
     ----------
     label : str
-        In words.
+        Name in words.
     symbol : str
-        In ASCII; "" where the input is a group of parameters or a possible error without a symbol.
+        Symbol in ASCII; "" for a group of parameters, or for a possible error without a symbol.
     unit : str
         As :attr:`Quantity.unit`; "" for a ratio or a group.
     of_record : bool
-        Whether the unit depends on what was recorded.
+        Whether the unit depends on the recorded quantity.
     """
 
     label: str
@@ -95,7 +95,7 @@ _QUANTITIES = (
     Quantity("relaxation_rate_slow", "slow relaxation rate", "r_1", "r 1", "r_1", "1/s"),
     Quantity("relaxation_rate_fast", "fast relaxation rate", "r_2", "r 2", "r_2", "1/s"),
     Quantity("quality_factor", "quality factor", "Q", "Q", "Q", "", by_law=True),
-    # Of whatever moves: an angle's is in rad/s, whether the angle or its rate was recorded.
+    # The velocity of the motion; it is in rad/s if an angle or its rate was recorded.
     Quantity("velocity_rms", "velocity, root mean square", "v_rms", "v rms", r"v_\mathrm{rms}", "m/s"),
     Quantity("reynolds_number", "Reynolds number", "Re", "Re", r"\mathit{Re}", ""),
     Quantity("reynolds_number_start", "Reynolds number at the start", "Re_0", "Re 0", r"\mathit{Re}_0", ""),
@@ -108,17 +108,17 @@ _QUANTITIES = (
     Quantity("n", "that power", "n", "n", "n", "", by_law=True),
 )
 QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
-"""Every estimate by name, in the order of Table 1."""
+"""All estimates by name, in the order of Table 1."""
 
 INPUTS: Mapping[str, Input] = {
-    # Estimated from the recording.
+    # Inputs estimated from the recording.
     "angular_frequency": Input("scatter of the phases", "omega", "rad/s"),
     "phase": Input("scatter of the phases", "phi0", "rad"),
     "rest_position": Input("scatter of the rest position", "y0", "m", of_record=True),
     "noise": Input("scatter of the samples", "sigma", "m", of_record=True),
     "damping_law": Input("scatter of the amplitudes"),
     "choice_of_law": Input("choice among admissible laws"),
-    # Stated in the scene, or a property of the instrument.
+    # Inputs from the scene, or properties of the instrument.
     "clock_rate": Input("rate of the clock", "r"),
     "bob_mass": Input("mass of the bob", "m", "kg"),
     "spring_mass": Input("mass of the spring", "m_s", "kg"),
@@ -137,7 +137,7 @@ INPUTS: Mapping[str, Input] = {
     "sensor_median_samples": Input("running median of the sensor"),
     "sensor_median_cut": Input("crests cut by a running median"),
     "sensor_lag": Input("lag of the sensor", "tau", "s"),
-    # What the recording contradicts in its own model.
+    # Contradictions between the recording and its model.
     "model_misfit": Input("what differs from a sinusoid in every period"),
     "choice_of_fit": Input("difference between the fits of windows and of the whole waveform"),
     "held_samples": Input("distances held by the sensor"),
@@ -145,11 +145,11 @@ INPUTS: Mapping[str, Input] = {
     "implausible_motion": Input("motion that no bob on a spring makes"),
     "implausible_distance": Input("distances that no sensor measures"),
 }
-"""Every input of :mod:`pipeline.results.derive` by name."""
+"""All inputs of :mod:`pipeline.results.derive` by name."""
 
 
 def check_quantity(name: str) -> None:
-    """Refuse an estimate that is not in the list.
+    """Raise an error if the name of an estimate is not registered.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def check_quantity(name: str) -> None:
 
 
 def check_input(name: str) -> None:
-    """Refuse an input of a budget that is not in the list.
+    """Raise an error if the name of a budget input is not registered.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Results: from a fitted motion to numbers with uncertainties and sentences.
+"""Results: from a fitted motion to numbers with uncertainties, and sentences about them.
 
-In: what the rooms before found, and the scene. Out: estimates with budgets, effects, findings, curves, comparisons.
-A newcomer may add an estimate in ``derive``, an effect in ``effects``, a finding in ``findings`` with its code in
-docs/reference/findings.md; codes never change meaning.
+Input: the results of the earlier stages, and the scene. Output: estimates with budgets, effects, curves and
+comparisons. A new estimate is added in ``derive`` and a new effect in ``effects``. A new finding is added in
+``pipeline.findings``, with its code in docs/reference/findings.md; codes never change meaning.
 """

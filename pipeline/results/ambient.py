@@ -1,4 +1,4 @@
-"""Ambient: the air of a scene as uncertain inputs, and what depends on it."""
+"""Ambient: the air of a scene as uncertain inputs, and the quantities that depend on it."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ __all__ = ["Ambient"]
 
 
 class Ambient:
-    """Density, viscosity and distance scale, each made of the same temperature, pressure and humidity.
+    """Density, viscosity and distance scale, calculated from the same temperature, pressure and humidity.
 
     Parameters
     ----------
     scene : Scene
     inputs : Inputs
-        The variables are added there.
+        The inputs, to which the variables are added.
     u_temperature_k : float
         Standard uncertainty of a temperature stated without one, K.
 
     Notes
     -----
-    The uncertainties of the formulas are inputs of value 1. One variable for the temperature: where it
-    moves density and speed of sound together, a result sees both.
+    The uncertainties of the formulas are inputs with the value 1. Density and speed of sound share one variable for the
+    temperature, so results include their correlation.
     """
 
     def __init__(self, scene: Scene, inputs: Inputs, *, u_temperature_k: float) -> None:
@@ -55,15 +55,15 @@ class Ambient:
         return function_of(air_viscosity, self._temperature, self._pressure) * self._viscosity_formula
 
     def scale(self, instrument: Instrument) -> Any:
-        """Return the factor on all distances: 1, with what the speed of sound or a calibration leaves uncertain.
+        """Return the factor on all distances: 1, with the uncertainty of the speed of sound or of a calibration.
 
         Notes
         -----
-        A calibrated scale has the calibration's uncertainty and no other. Else the speed of sound is uncertain with
-        temperature, pressure, humidity and its formula; and where the record was made with another speed than the
-        scene's air has, the difference, which is not corrected, is the half-width of a rectangle. A bench whose air
-        has no stated temperature has a room's, 20 +- 3 degC. Where neither a bench is told of nor a speed of sound of
-        the record, nothing says that the distances are an echo's: their scale is taken as it stands.
+        A calibrated scale has only the uncertainty of the calibration. Otherwise the uncertainty of the speed of sound
+        comes from temperature, pressure, humidity and its formula. If the record used another speed of sound than that
+        of the scene's air, the difference is not corrected; it is the half-width of a rectangular distribution. If the
+        scene states no air temperature, that of a room is used, 20 +- 3 degC. If neither the scene describes a bench
+        nor the record states a speed of sound, the distances need not come from echoes, and their scale is exact.
         """
         if instrument.u_scale > 0:
             return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")

@@ -1,7 +1,7 @@
-"""Uncertainty budgets: which input contributes what share of a result's variance.
+"""Uncertainty budgets: the share of each input in the variance of a result.
 
-Inputs become variables of the ``uncertainties`` package, each marked with its name, so that a result made of them by
-ordinary arithmetic knows what it came from, correlations included.
+Inputs become variables of the ``uncertainties`` package, tagged with their names. So a result calculated from them by
+ordinary arithmetic contains its dependence on each input, including correlations.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ __all__ = ["COVERAGE", "Budget", "Contribution", "Inputs", "Kind", "estimate_of"
 Kind = Literal["A", "B"]
 
 COVERAGE = 0.9545
-"""Probability with which the expanded uncertainty covers; its factor is 2.00 where the degrees of freedom are many."""
-MANY = 1e6  # degrees of freedom that no factor's fifth digit tells from infinitely many
+"""Coverage probability of the expanded uncertainty; the coverage factor is 2.00 for many degrees of freedom."""
+MANY = 1e6  # degrees of freedom from which they count as infinite: the coverage factor agrees to five digits
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,19 +33,19 @@ class Contribution:
     Parameters
     ----------
     name : str
-        Of the input.
+        Name of the input.
     kind : {"A", "B"}
-        "A" from the record's own scatter, which a longer record averages away; "B" from anything else.
+        "A" for scatter of the record, which a longer record reduces by averaging; "B" for other sources.
     input : Estimate or None
         Value and standard uncertainty of the input; None for a group of correlated parameters.
     sensitivity : float or None
         Derivative of the result by the input; None for a group.
     u : float
-        What the input contributes to the result's standard uncertainty, in the result's unit.
+        Contribution of the input to the standard uncertainty of the result, in the result's unit.
     share : float
-        Of the result's variance; the shares of a budget add up to 1.
+        Share of the input in the variance of the result; the shares of a budget add up to 1.
     dof : float
-        Degrees of freedom from which u is known; infinite where it was not estimated from scatter.
+        Degrees of freedom of u; infinite if u was not estimated from scatter.
     """
 
     name: str
@@ -59,14 +59,16 @@ class Contribution:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """The uncertainty of one result, input by input.
+    """The uncertainty of one result, with the contribution of each input.
 
     Parameters
     ----------
     quantity : str
+        Name of the result.
     estimate : Estimate
+        Value and standard uncertainty of the result.
     contributions : tuple of Contribution
-        The greatest share first; empty for an exact result.
+        Contributions in descending order of their shares; empty for an exact result.
     """
 
     quantity: str
@@ -74,23 +76,23 @@ class Budget:
     contributions: tuple[Contribution, ...]
 
     def u_of(self, kind: Kind) -> float:
-        """Return the part of the standard uncertainty that inputs of one kind contribute, in the result's unit."""
+        """Return the part of the standard uncertainty from inputs of one kind, in the result's unit."""
         return math.hypot(*(c.u for c in self.contributions if c.kind == kind))
 
     @property
     def dof(self) -> float:
         """Effective degrees of freedom: :math:`\\nu = u^4 / \\sum_i u_i^4/\\nu_i` (Welch-Satterthwaite).
 
-        JCGM 100:2008, G.4.1; infinite beyond a million.
+        The formula is from JCGM 100:2008, G.4.1. More than a million degrees of freedom count as infinite.
         """
         below = sum(c.share**2 / c.dof for c in self.contributions)
         return 1.0 / below if below > 1.0 / MANY else math.inf
 
     @property
     def coverage_factor(self) -> float:
-        """Factor k on u: Student's t of :attr:`dof` that covers :data:`COVERAGE`, 2.00 where these are infinite.
+        """Coverage factor k on u: quantile of Student's t for :attr:`dof` and :data:`COVERAGE`; 2.00 if infinite.
 
-        As in EA-4/02 M:2022, appendix E.
+        It is calculated as in EA-4/02 M:2022, appendix E.
         """
         from scipy.special import ndtri, stdtrit
 
@@ -126,23 +128,23 @@ class Inputs:
         self._single: dict[str, Estimate] = {}
 
     def add(self, name: str, estimate: Estimate, kind: Kind, dof: float = math.inf) -> Any:
-        """Return an input as a variable; a plain number where it is exact.
+        """Return an input as a variable, or as a plain number if it is exact.
 
         Parameters
         ----------
         name : str
-            One of :data:`pipeline.registry.quantities.INPUTS`, used once.
+            One of :data:`pipeline.registry.quantities.INPUTS`; each name may be used only once.
         estimate : Estimate
         kind : {"A", "B"}
         dof : float
-            Degrees of freedom from which its uncertainty was estimated; 1 at least.
+            Degrees of freedom of the uncertainty; values below 1 count as 1.
 
         Raises
         ------
         ValueError
             If the name was used before, or is not registered.
         AnalysisError
-            If the uncertainty is negative or no number.
+            If the uncertainty is negative or not finite.
         """
         from uncertainties import ufloat
 
@@ -155,12 +157,12 @@ class Inputs:
         return ufloat(estimate.value, estimate.u, name) if estimate.u > 0 else estimate.value
 
     def add_joint(self, name: str, joint: Joint, kind: Kind, dof: float = math.inf) -> list[Any]:
-        """Return parameters estimated together as correlated variables; they are one line in every budget.
+        """Return jointly estimated parameters as correlated variables, which are one line in every budget.
 
         Parameters
         ----------
         name : str
-            Of the group.
+            Name of the group.
         joint : Joint
         kind : {"A", "B"}
         dof : float
@@ -172,10 +174,10 @@ class Inputs:
         return list(correlated_values(joint.values.tolist(), joint.covariance, [name] * joint.values.size))
 
     def add_alternatives(self, name: str, weights: Mapping[str, float], kind: Kind) -> dict[str, Any]:
-        """Return a variable of mean 0 and variance w for each alternative; they are one line in every budget.
+        """Return a variable z_i of mean 0 and variance w_i for each alternative; they are one line in every budget.
 
-        A result x that would be x_i under the alternative i is x + sum_i (x_i - x) z_i, whose variance holds
-        sum_i w_i (x_i - x)^2, with the same sign for all results that an alternative moves together.
+        If a result x would be x_i under the alternative i, it is written as x + sum_i (x_i - x) z_i. Its variance then
+        includes sum_i w_i (x_i - x)^2, and results that an alternative changes together are correlated.
         """
         from uncertainties import ufloat
 
@@ -183,17 +185,20 @@ class Inputs:
         return {key: ufloat(0.0, math.sqrt(w), name) if w > 0 else 0.0 for key, w in weights.items()}
 
     def budget(self, quantity: str, x: Any, unit: str) -> Budget:
-        """Return the budget of a result made of these inputs.
+        """Return the budget of a result calculated from these inputs.
 
         Parameters
         ----------
         quantity : str
+            Name of the result.
         x : number or variable
+            The result.
         unit : str
+            Unit of the result.
         """
         from uncertainties import UFloat
 
-        # Ordered by name: sums of floats depend on their order, and a mapping's order on addresses.
+        # Sorted by name, because sums of floats depend on their order, and the order of the mapping on addresses.
         by_input = x.derivatives if isinstance(x, UFloat) else {}
         parts = sorted((of.tag, abs(float(slope) * of.std_dev), float(slope)) for of, slope in by_input.items())
         if not any(error for _, error, _ in parts):
@@ -206,7 +211,7 @@ class Inputs:
         whole = sum(variances.values())
         lines = []
         for name, variance in sorted(variances.items(), key=lambda item: (-item[1], item[0])):
-            if variance > 1e-12 * whole:  # less is rounding where a dependence cancels
+            if variance > 1e-12 * whole:  # smaller values are rounding errors of dependences that cancel
                 given = self._single.get(name)
                 slope = None if given is None else slopes[name]
                 u, share = math.sqrt(variance), variance / whole
@@ -221,19 +226,19 @@ class Inputs:
 
 
 def estimate_of(x: Any, unit: str) -> Estimate:
-    """Return value and standard uncertainty of a variable, or of an exact number."""
+    """Return a variable or an exact number as an estimate with its standard uncertainty."""
     from uncertainties import nominal_value, std_dev
 
     return Estimate(float(nominal_value(x)), float(std_dev(x)), unit, x)
 
 
 def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
-    """Return estimates with their covariance, as far as they know what they were calculated from.
+    """Return estimates with their covariance, from the inputs that they were calculated from.
 
     Parameters
     ----------
     estimates : mapping of str to Estimate
-        Of one analysis, or scripts' own.
+        Estimates of one analysis, or estimates calculated in a script.
 
     Examples
     --------
@@ -242,8 +247,8 @@ def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
     [[1.0, -1.0], [-1.0, 1.0]]
     """
     each = list(estimates.values())
-    # One row an estimate, one column a variable: the package's own matrix goes through all pairs of pairs. What is
-    # exact varies with nothing.
+    # One row for each estimate and one column for each variable; the package's own function is slower, because it loops
+    # over all pairs of variables of all pairs of estimates. Exact estimates depend on no variable.
     components = [estimate.ufloat.derivatives if estimate.u > 0 else {} for estimate in each]
     column = {variable: k for k, variable in enumerate(dict.fromkeys(v for slopes in components for v in slopes))}
     parts = np.zeros((len(each), len(column)))
@@ -256,7 +261,7 @@ def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
 
 
 def function_of(formula: Callable[..., float], *xs: Any) -> Any:
-    """Return a formula of variables as a variable, its derivatives by central differences."""
+    """Return the value of a formula of variables as a variable, with derivatives by central differences."""
     from uncertainties import wrap
 
     return wrap(formula)(*xs)

@@ -1,8 +1,8 @@
-"""Classic: the lab report's own method, reproduced exactly, kept to compare against.
+"""Classic: the method of the lab report, reproduced exactly for comparison.
 
-Do not use its results. Against the Cramer-Rao bound of a 10 s record at 0.3 mm noise its period errs 183 times, its
-amplitude 42 times; its damping constant is biased by -12 % at 2.39 mm noise and its stated interval covers 0 % of the
-truths. The bias of each number is named where the number is made.
+Do not use its results. For a 10 s record with 0.3 mm noise, the error of its period is 183 times the Cramer-Rao bound
+and that of its amplitude 42 times. At 2.39 mm noise its damping constant is biased by -12 %, and its stated interval
+never covers the true value. :func:`classic` describes the bias of each number.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from pipeline.track import F8, UNUSABLE, Track
 
 __all__ = ["Classic", "classic", "sliding_amplitude"]
 
-STATED_ERROR_M = 0.00239  # the report's error of one distance, from the file's error column
-READING_S = 0.01  # the report's error of a time read off the graph, one sample
+STATED_ERROR_M = 0.00239  # error of one distance in the report, from the error column of the file
+READING_S = 0.01  # error of a time read from the graph in the report, one sample
 CYCLES = 7
 WINDOW_S = 1.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Classic:
-    """The report's Table 1, by the report's arithmetic.
+    """Table 1 of the report, calculated as in the report.
 
     Parameters
     ----------
     estimates : dict of str to Estimate
-        period, frequency, angular_frequency, amplitude, damping_rate, and with masses, disc and velocity
-        spring_constant, velocity_rms and reynolds_number.
+        period, frequency, angular_frequency, amplitude and damping_rate. Also spring_constant if the mass of the bob is
+        stated, velocity_rms if velocities are recorded, and reynolds_number if the disc is stated as well.
     window_t, window_amplitude : (m,) float64, s, m
         The sliding amplitude.
     crests_t, crests_y : (8,) float64, s, m
-        The sampled maxima: the period is from the first to the last of them.
+        The sampled maxima: seven periods pass from the first to the last.
     extremes : ((t, y), (t, y))
-        The least and the greatest distance: half of what lies between them is the amplitude.
+        The smallest and the largest distance: the amplitude is half of their difference.
     chi2 : float
-        Sum of squared deviations of the sliding amplitude from the exponential over the stated error squared.
+        Sum of squared deviations of the sliding amplitude from the exponential, over the square of the stated error.
     """
 
     estimates: dict[str, Estimate]
@@ -55,18 +55,18 @@ class Classic:
     chi2: float
 
     def exponential(self) -> F8:
-        """Return the exponential that the report fits, at the windows' times, m."""
+        """Return the exponential fitted as in the report, m, at the times of the windows."""
         since = self.window_t - self.window_t[0]
         return np.asarray(self.window_amplitude[0] * np.exp(-self.estimates["damping_rate"].value * since))
 
 
 def classic(track: Track, scene: Scene | None = None) -> Classic:
-    """Evaluate a run as the report did.
+    """Evaluate a run as in the report.
 
     Parameters
     ----------
     track : Track
-        Flagged samples are left out only where they carry no distance; the report knew no false echoes.
+        The run. Samples that are flagged as unusable before the analysis are left out; false echoes are not sought.
     scene : Scene, optional
 
     Returns
@@ -76,26 +76,26 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
     Raises
     ------
     AnalysisError
-        If fewer than eight sampled maxima are there, or the record is shorter than one window.
+        If there are fewer than eight sampled maxima, or the record is shorter than one window.
     TrackError
-        If the track is no length.
+        If the track does not contain lengths.
 
     Notes
     -----
     Period (eqs. 13, 18): time from one sampled maximum to the seventh after it, over seven, with
-    :math:`u = 0.01/7` s. Two samples decide where a thousand could, so it errs 58 to 183 times the bound.
+    :math:`u = 0.01/7` s. Only two of about a thousand samples determine it, so its error is 58 to 183 times the bound.
 
-    Amplitude (eq. 17): :math:`(y_\\mathrm{max} - y_\\mathrm{min})/2`. Extremes of noisy samples lie outside the motion:
-    biased by +0.56 mm at 0.3 mm noise and by +5.4 mm at 2.39 mm, and every false echo enters. Uncertainty
-    :math:`u/\\sqrt 2` of the stated 2.39 mm.
+    Amplitude (eq. 17): :math:`(y_\\mathrm{max} - y_\\mathrm{min})/2`, with the uncertainty :math:`u/\\sqrt 2` for the
+    stated error u of 2.39 mm. Extremes of noisy samples lie outside the motion: the bias is +0.56 mm at 0.3 mm noise
+    and +5.4 mm at 2.39 mm, and false echoes enter it.
 
-    Amplitude against time (eq. 22): half the range over 1.5 s, stamped at the window's start, at every sample: about
-    1.2 sigma too large, early by part of a window, and 150 neighbouring points share their samples, so a fit to them
-    misstates its interval.
+    Amplitude against time (eq. 22): half the range over 1.5 s, at the time of the window's start, for every sample. It
+    is about 1.2 sigma too large, and assigned to a time that is too early by part of a window. About 150 neighbouring
+    points share samples, so a fit to the points has a wrong interval.
 
-    Damping (eqs. 24, 27): unweighted :math:`A_0 e^{-\\gamma t}` with :math:`A_0` fixed at the first window's amplitude:
-    one point's error becomes the slope's, and an exponential is assumed where drag is mixed. Together the bias is
-    -12 % at 2.39 mm noise.
+    Damping (eqs. 24, 27): unweighted fit of :math:`A_0 e^{-\\gamma t}` with :math:`A_0` fixed at the amplitude of the
+    first window. The error of this one point becomes an error of the slope, and the fit assumes an exponential although
+    drag is mixed. Together the bias is -12 % at 2.39 mm noise.
     """
     track.demand_length("the classic method")
     scene = scene or Scene()
@@ -131,13 +131,14 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
 
 
 def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
-    """Return half the range over [t, t + window], at every sample that has a whole window after it.
+    """Return half the range over [t, t + window] at every sample that is followed by a whole window.
 
     Parameters
     ----------
     t, y : (n,) float64, s, m
-        t increases.
+        Times in increasing order, and distances.
     window_s : float
+        Length of the window, s.
 
     Returns
     -------
@@ -158,7 +159,7 @@ def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
             "record longer"
         )
     count = y.size - width + 1
-    # A filter's window lies about its sample: the first whole one about sample width // 2.
+    # The window of a filter is centred on its sample: the first whole window on sample width // 2.
     whole = slice(width // 2, width // 2 + count)
     half_range = 0.5 * (maximum_filter1d(y, width) - minimum_filter1d(y, width))
     return t[:count], half_range[whole]
@@ -175,7 +176,7 @@ def _crests(t: F8, y: F8) -> list[int]:
         after = falls[falls > rise]
         if after.size:
             crest = int(rise) + int(np.argmax(y[rise : after[0]]))
-            # Noise at the crossing makes runs of a few samples; an eye sees one crest.
+            # Noise at a crossing makes short runs above the middle; they belong to one crest.
             if not crests or t[crest] - t[crests[-1]] > 0.2:
                 crests.append(crest)
     if len(crests) <= CYCLES:
@@ -186,7 +187,7 @@ def _crests(t: F8, y: F8) -> list[int]:
 
 
 def _exponential(t: F8, amplitude: F8) -> tuple[float, float]:
-    """Fit only gamma by unweighted least squares; return it with the uncertainty from the covariance of the fit."""
+    """Fit only gamma by unweighted least squares; return gamma and its uncertainty from the covariance of the fit."""
     start = float(amplitude[0])
 
     def residuals(theta: F8) -> F8:
@@ -202,9 +203,9 @@ def _exponential(t: F8, amplitude: F8) -> tuple[float, float]:
 
 
 def _add_velocity(estimates: dict[str, Estimate], velocity: F8, scene: Scene) -> None:
-    """Add root mean square of the recorded velocity and Reynolds number (eqs. 25, 26), constants as in the report."""
+    """Add the rms of the recorded velocity and the Reynolds number (eqs. 25, 26), with the report's constants."""
     rms = math.sqrt(float(np.mean(velocity**2)))
-    # Eq. 25 as evaluated: its "deviation" of v^2, 0.03266 m^2/s^2, is the mean, and it divides by N, not by the root.
+    # Eq. 25 as evaluated: its "deviation" of v^2, 0.03266 m^2/s^2, is the mean, and it divides by N, not by sqrt(N).
     u_rms = rms / (2.0 * velocity.size)
     estimates["velocity_rms"] = Estimate(rms, u_rms, "m/s")
     if scene.disc_diameter_m is not None:

@@ -20,29 +20,29 @@ from pipeline.track import F8
 
 __all__ = ["Comparison", "SpringRun", "compare_springs"]
 
-NEARER = 0.01  # of the tension: so much less with two runs exchanged is no chance
-SOLVED = 0.5  # of what the spring's mass was uncertain by before: what runs leave of it when they tell it
-LARGEST_SPRING = 0.6  # of the lightest bob: a spring that heavy is seen to be, and weighed
+NEARER = 0.01  # maximum tension with two runs exchanged, over that without: chance does not reduce it so much
+SOLVED = 0.5  # maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it
+LARGEST_SPRING = 0.6  # maximum mass of a spring, over the lightest bob: a heavier spring is noticed and weighed
 GAUSS_NEWTON_STEPS = 30
-SUSPECTS = 8  # runs whose pairs are exchanged in turn: those farthest from what most agree on
+SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those farthest from the majority
 
 
 @dataclass(frozen=True, slots=True)
 class SpringRun:
-    """What one run says of its spring.
+    """The result of one run for its spring.
 
     Parameters
     ----------
     name : str
     angular_frequency : Estimate
-        Of the undamped motion, rad/s, from the record's scatter alone: the clock's part is common to runs and stated
-        apart.
+        Angular frequency of the undamped motion, rad/s. Its uncertainty is only that from scatter of the record; that
+        of the clock may be common to several runs and is separate.
     mass_kg : Estimate
-        Mass that moves only in this run: bob, disc, air carried along, kg.
+        Oscillating mass without the spring, kg: bob, disc and air carried along.
     u_clock : float
         Relative standard uncertainty of the clock's rate.
     clock : str
-        Runs with one name here share one clock, error and all.
+        Name of the clock; runs with the same name share the clock and its error.
     """
 
     name: str
@@ -53,12 +53,12 @@ class SpringRun:
 
     @classmethod
     def of(cls, name: str, derived: Derived, *, clock: str = "") -> SpringRun:
-        """Take what an analysis derived.
+        """Make a run from the results of an analysis.
 
         Raises
         ------
         AnalysisError
-            If its scene gave no bob mass, or an angle's no spring.
+            If the scene states no mass of the bob, or if an angle was recorded and the scene states no spring.
         """
         if derived.own_mass_kg is None or derived.effective_mass_kg is None:
             raise AnalysisError(f"{name}: a comparison of springs needs [bob] mass_kg in the scene")
@@ -67,7 +67,7 @@ class SpringRun:
         omega = derived.statistical["angular_frequency"]
         parts = derived.budgets["angular_frequency"].contributions
         u_clock = math.hypot(*(c.u for c in parts if c.name == "clock_rate")) / omega.value
-        # Of the spring without damping, as the run's own constant has it.
+        # The frequency without damping, from the run's own spring constant.
         k = derived.estimates["spring_constant"].value
         natural = math.sqrt(k / derived.effective_mass_kg.value)
         return cls(name, Estimate(natural, omega.u, "rad/s"), derived.own_mass_kg, u_clock, clock)
@@ -81,31 +81,33 @@ class Comparison:
     ----------
     names : tuple of str
     spring_constant : Estimate
-        Generalised mean, N/m, shared errors included.
+        Generalised mean, N/m, including shared errors.
     spring_mass : Estimate
-        Of the spring itself, kg: as stated and as the runs allow, or what they solve for.
+        Mass of the spring, kg: the stated mass combined with the runs, or the mass that the runs determine.
     spring_mass_stated : bool
-        Whether the bench weighed it. Where it did not, the runs' masses give it together with the constant.
+        Whether the mass of the spring was stated. If it was not, the runs may determine it together with the constant.
     each : tuple of Estimate
-        Of the runs with that spring, N/m, shared errors included.
+        Spring constant of each run, N/m, including shared errors.
     own_u : tuple of float
-        Of the runs, what they do not share, N/m.
+        Part of the standard uncertainty of each run that it does not share with the others, N/m.
     pulls : tuple of float
-        Difference of each run to the mean over the difference's own standard uncertainty.
+        Difference between each run and the mean, over the standard uncertainty of this difference.
     chi2 : float
-        Of the runs about their mean.
+        Chi-square of the runs about their mean, and of the spring's mass about the stated value.
     dof : int
-        Runs less the constant, and less the spring's mass where they solve for it: 0 tests nothing.
+        Number of runs less one for the constant, and less one more if they determine the spring's mass; 0 if nothing is
+        tested.
     agree : bool
-        Whether chi-square lies within its 99.7 % quantile, and the spring's mass where springs' masses lie.
+        Whether chi-square is below its quantile, and a mass of the spring that the runs determine is plausible.
     largest_deviation : float
-        Greatest difference of two runs over its standard uncertainty, in which shared errors cancel.
+        Largest difference between two runs over its standard uncertainty, in which shared errors cancel.
     exchanged : tuple of str
-        Names of two runs whose masses, or periods, exchanged make all agree where they do not as they stand;
-        empty otherwise.
+        Names of two runs, if all runs agree, or agree far better, after the masses (or the periods) of these two are
+        exchanged; otherwise empty.
     exchanged_chi2 : float or None
-        Of the runs with those two exchanged.
+        Chi-square of the runs after this exchange.
     message : str
+        The result in words.
     """
 
     names: tuple[str, ...]
@@ -137,40 +139,43 @@ def compare_springs(
     Parameters
     ----------
     runs : sequence of SpringRun
-        Two at least.
+        At least two runs.
     spring_mass_kg : Estimate, optional
-        Of the spring, kg, the same in every run; left out it is not known, and solved for as far as the runs allow.
+        Mass of the spring in all runs, kg. If it is not stated, it is fitted as far as the runs determine it.
     mass_correlation : float
-        Of the errors of any two runs' own masses, 0 to 1: 1 where one balance's calibration is all that is uncertain.
+        Correlation between the errors of the masses of two runs, 0 to 1. It is 1 if the only uncertainty is that of the
+        calibration of one balance.
     probability : float
-        Of the chi-square quantile that still counts as agreement.
+        Probability of the chi-square quantile up to which the runs count as in agreement.
 
     Raises
     ------
     ValueError
         If fewer than two runs are given, or the correlation lies outside 0 to 1.
     AnalysisError
-        If a mass or a frequency is not positive, or an uncertainty negative or no number.
+        If a mass or a frequency is not positive, or an uncertainty is negative or not finite.
 
     Notes
     -----
-    Generalised least squares for the constant k and the spring's mass s in
-    :math:`k = \\omega_i^2 M(s, m_i)`, M the mass that oscillates
-    (:func:`pipeline.bench.spring.oscillating_mass_kg`), with the covariance of the left over right sides
-    :math:`V_{ij} = \\delta_{ij} u_i^2 + 4 u_{c,i} u_{c,j} k^2 + r\\,\\omega_i^2\\omega_j^2 u(m_i) u(m_j)`: errors
-    that runs share, of the clock (where two share it) and of the balance, stand off its diagonal, move all constants
-    together and so hardly enter the test. The stated mass of the spring is one observation more. One that nobody
-    stated is observed as :func:`pipeline.bench.spring.unstated_spring_kg` of the lightest bob, so wide that runs of
-    different masses overrule it; it takes a degree of freedom then, and two runs solve for it without testing it. The
-    distances' scale is in no spring constant.
+    The constant k and the mass s of the spring are fitted by generalised least squares to
+    :math:`k = \\omega_i^2 M(s, m_i)`, where M is the oscillating mass
+    (:func:`pipeline.bench.spring.oscillating_mass_kg`). The covariance of the right-hand sides is
+    :math:`V_{ij} = \\delta_{ij} u_i^2 + 4 u_{c,i} u_{c,j} k^2 + r\\,\\omega_i^2\\omega_j^2 u(m_i) u(m_j)`.
+    The clock's term applies only to runs with the same clock. Errors that runs share, of the clock and of the balance,
+    are in its off-diagonal elements; they change all constants together and so hardly affect the test.
 
-    Where the runs disagree the eight farthest from a robust line through all are exchanged pair by pair, and the pair
-    is named that brings all runs into agreement, or a hundred times nearer to it: exchanged records need not agree to
-    the last digit.
+    A stated mass of the spring is one more observation. If it is not stated, the observation is
+    :func:`pipeline.bench.spring.unstated_spring_kg` for the lightest bob. This is so uncertain that runs with different
+    masses outweigh it. The mass then takes one degree of freedom, so two runs determine it but do not test it. Spring
+    constants do not depend on the scale of the distances.
+
+    If the runs disagree, the eight runs farthest from a robust line are exchanged pair by pair. A pair is reported if
+    its exchange makes all runs agree, or reduces their tension to a hundredth, because exchanged records need not agree
+    to the last digit.
 
     Examples
     --------
-    The report's own numbers, with its two periods exchanged as printed:
+    The numbers of the report, with its two periods exchanged as printed:
 
     >>> bare = SpringRun("undamped", Estimate(8.3458, 0.0158), Estimate(0.2007, 5e-5))
     >>> disc = SpringRun("damped", Estimate(8.6580, 0.0170), Estimate(0.2176, 5e-5))
@@ -219,17 +224,17 @@ def compare_springs(
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """One constant and one spring's mass for all runs."""
+    """The fit of one constant and one mass of the spring to all runs."""
 
     constant: Estimate
     spring: Estimate
-    solved: bool  # whether the runs say more of the spring's mass than was known before
+    solved: bool  # whether the runs determine a mass of the spring that was not stated
     each: tuple[Estimate, ...]
     own_u: tuple[float, ...]
     pulls: tuple[float, ...]
     chi2: float
     dof: int
-    tension: float  # of the runs and of the spring's mass, over its limit: 1 and less agrees
+    tension: float  # disagreement of the runs and of the spring's mass, over its limit: at most 1 is agreement
     deviation: float
 
     @property
@@ -265,7 +270,7 @@ def _fit(
     solved = stated is None and line.spring.u < SOLVED * spring.u
     constant, found = line.constant, line.spring
     if stated is None and not solved:
-        # Bobs too alike: the constant without the spring, and what it may weigh in the uncertainty.
+        # If the bobs are too similar, the prior mass of the spring is used, and its uncertainty enters that of k.
         of_spring = float(np.mean(line.slope)) * spring.u
         line = _line(squared, loads, covariance, Estimate(spring.value, 0.0, "kg"))
         constant = Estimate(line.constant.value, math.hypot(line.constant.u, of_spring), "N/m")
@@ -276,11 +281,12 @@ def _fit(
         chi2 += ((line.spring.value - stated.value) / stated.u) ** 2
     tension = chi2 / chi2_quantile(probability, dof) if dof else 0.0
     if solved:
-        # No spring weighs less than nothing; a heavy one is weighed by who hangs it.
+        # The mass of a spring cannot be negative, and a heavy spring would have been weighed.
         heaviest = LARGEST_SPRING * float(loads.min())
         away = max(-found.value, found.value - heaviest, 0.0) / max(found.u, 1e-12 * heaviest)
         tension = max(tension, away**2 / chi2_quantile(probability, 1))
-    # A stated spring gives each run the constant that its own analysis has, one that nothing brings together none.
+    # With a stated spring, each constant is that of the run's own analysis. Without a usable mass it excludes the
+    # spring.
     shown = stated or (found if solved and tension <= 1.0 else Estimate(0.0, 0.0, "kg"))
     each = squared * _oscillating(shown.value, loads)
     whole = covariance + shown.u**2 * np.outer(line.slope, line.slope)
@@ -303,17 +309,17 @@ def _fit(
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """The weighted line through the runs: constant and spring's mass, and what it leaves of each run, N/m."""
+    """The weighted line through the runs: constant, mass of the spring, and the residual of each run, N/m."""
 
     constant: Estimate
     spring: Estimate
-    slope: F8  # of each run's constant by the spring's mass, N/(m kg); 0 where that mass is exact
+    slope: F8  # derivative of each run's constant by the spring's mass, N/(m kg); 0 if that mass is exact
     residual: F8
     u_residual: F8
 
 
 def _line(squared: F8, loads: F8, covariance: F8, spring: Estimate) -> _Line:
-    """Fit constant and spring's mass by Gauss-Newton steps, with what is known of the spring as one observation."""
+    """Fit constant and mass of the spring by Gauss-Newton steps, with the prior mass as one observation."""
     known = np.diag([0.0, spring.u**-2 if spring.u > 0 else 0.0])
     s, state = spring.value, np.zeros((2, 2))
     k, slope, x = squared, squared, np.zeros(2)
@@ -345,7 +351,7 @@ def _line(squared: F8, loads: F8, covariance: F8, spring: Estimate) -> _Line:
 
 
 def _known_spring(masses: Sequence[Estimate], stated: Estimate | None) -> Estimate:
-    """What is known of the spring before the runs are compared."""
+    """Return the mass of the spring before the comparison: the stated one, or that of an unstated spring."""
     lightest = min(mass.value for mass in masses)
     return stated or unstated_spring_kg(Scene(bob_mass_kg=Estimate(lightest, 0.0, "kg")))
 
@@ -353,9 +359,10 @@ def _known_spring(masses: Sequence[Estimate], stated: Estimate | None) -> Estima
 def _suspects(
     runs: Sequence[SpringRun], masses: Sequence[Estimate], stated: Estimate | None, mass_correlation: float
 ) -> list[int]:
-    """Return the runs farthest from a robust line (soft-L1, which a few outliers move little), in their order.
+    """Return the indices of the runs farthest from a robust line, in ascending order.
 
-    The line is linear in the constant and in the spring's mass, over the constants with a spring of the known mass.
+    The soft-L1 loss of the line limits the influence of a few outliers. The line is linear in the constant and in the
+    deviation of the spring's mass from its value before the comparison.
     """
     from scipy.optimize import least_squares
 
@@ -366,7 +373,7 @@ def _suspects(
     squared = np.array([run.angular_frequency.value**2 for run in runs])
     k = squared * _oscillating(spring.value, loads)
     _, own = _covariance(runs, masses, k, mass_correlation)
-    # d k_i / d s = omega_i^2 / 3 of a light spring; counted in multiples of what the spring's mass is uncertain by.
+    # d k_i / d s = omega_i^2 / 3 for a light spring; the unit of s is the uncertainty of the spring's mass.
     slope = squared * spring.u / 3.0
 
     def pulls(x: F8) -> F8:
@@ -384,13 +391,13 @@ def _oscillating(spring_kg: float, loads: F8) -> F8:
 def _covariance(
     runs: Sequence[SpringRun], masses: Sequence[Estimate], each: F8, mass_correlation: float
 ) -> tuple[F8, F8]:
-    """Of the runs' constants, (n, n), and what of it is each run's own, (n,), N/m."""
+    """Return the covariance (n, n) of the runs' constants, and the standard uncertainties (n,) that are not shared."""
     squared = np.array([run.angular_frequency.value**2 for run in runs])
     of_omega = 2.0 * each * np.array([run.angular_frequency.u / run.angular_frequency.value for run in runs])
     of_mass = squared * np.array([mass.u for mass in masses])
     own = np.hypot(of_omega, of_mass * math.sqrt(1.0 - mass_correlation))
     own = np.maximum(own, 1e-15 * each)
-    # Shared relative errors at the common value: taken at each value they would favour the smallest.
+    # Shared relative errors are multiplied by the mean value: with each run's own, small values would get more weight.
     of_clock = 2.0 * float(np.mean(each)) * np.array([run.u_clock for run in runs])
     one_clock = np.array([[a.clock == b.clock for b in runs] for a in runs])
     common = np.where(one_clock, np.outer(of_clock, of_clock), 0.0) + mass_correlation * np.outer(of_mass, of_mass)

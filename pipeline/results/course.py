@@ -1,4 +1,4 @@
-"""Many runs of a course: one spring, one disc, one drag across them, and which runs were noted down wrongly."""
+"""Many runs of a course: whether they agree on spring, disc and drag, and which runs have wrong notes."""
 
 from __future__ import annotations
 
@@ -19,39 +19,39 @@ __all__ = ["Agreement", "Cause", "CourseRun", "Suspect", "agreement", "suspects"
 Cause = Literal[
     "masses exchanged", "unit of the mass", "unit of the distance", "clipped", "wrong disc", "wrong spring", "unknown"
 ]
-"""What makes a run differ from its course."""
-FAR = 5.0  # standard deviations from the middle: none of 200 good runs
-NEAR = 4.0  # within which a run with its fault mended must come
-FEW = 4  # runs that make no middle
-POWERS = (-3, -2, -1, 1, 2, 3)  # of ten, between units
-LEAST_SCATTER = {"spring": 2e-4, "drag": 0.02}  # relative, of a middle of runs that agree too well
-SPREAD_OF_KC = 0.5  # in the logarithm, from which a slope over it is sought
+"""The possible causes of a run that differs from its course."""
+FAR = 5.0  # distance from the median, in standard deviations, above which a run is suspect: none of 200 good runs
+NEAR = 4.0  # maximum distance from the median, in standard deviations, after a cause is corrected
+FEW = 4  # minimum number of runs in a group for a median
+POWERS = (-3, -2, -1, 1, 2, 3)  # powers of ten between units
+LEAST_SCATTER = {"spring": 2e-4, "drag": 0.02}  # minimum relative scatter of a group, if its runs agree by chance
+SPREAD_OF_KC = 0.5  # minimum spread of ln KC for which a slope against it is fitted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CourseRun:
-    """What a run says of its bench, and what was noted of it.
+    """The results and the notes of one run.
 
     Parameters
     ----------
     name, spring, disc, bench : str
-        Labels; runs of one spring, disc or bench have the same.
+        Labels; runs with the same spring, disc or bench have the same label.
     spring_constant : Estimate or None
-        N/m, with what the run does not share with the others.
+        Spring constant, N/m; its uncertainty includes only errors that the run does not share with others.
     bob_mass_kg : float
-        As noted; NaN where nothing is.
+        Mass of the bob as noted, kg; NaN if it is not noted.
     natural_angular_frequency : float
-        Of the undamped motion, rad/s; NaN where the run has none.
+        Angular frequency of the undamped motion, rad/s; NaN if the run has none.
     amplitude_m, offset_m, noise_m : float
-        As recorded.
+        Amplitude, rest position and noise as recorded, m.
     diameter_m : float
-        Of the disc as noted; NaN without one.
+        Diameter of the disc as noted, m; NaN without a disc.
     drag : Estimate or None
-        Drag coefficient in the middle of the run's amplitudes.
+        Drag coefficient in the middle of the amplitudes of the run.
     keulegan_carpenter : float
-        There.
+        Keulegan-Carpenter number at the same amplitude.
     clipped : bool
-        Whether its record has the finding.
+        Whether the record has the finding "clipped".
     """
 
     name: str
@@ -70,7 +70,7 @@ class CourseRun:
     clipped: bool = False
 
     def constant_with(self, bob_mass_kg: float) -> float:
-        """Return the spring constant that another bob would give, N/m: the spring's and the air's shares stay."""
+        """Return the spring constant for another mass of the bob, N/m; the shares of spring and air stay the same."""
         assert self.spring_constant is not None
         squared = self.natural_angular_frequency**2
         return self.spring_constant.value + squared * (bob_mass_kg - self.bob_mass_kg)
@@ -84,10 +84,10 @@ class Suspect:
     ----------
     name : str
     cause : str
-        The likeliest, one of :data:`Cause`.
+        The most likely cause, one of :data:`Cause`.
     message : str
     other : str
-        The run, spring or disc that it was mistaken for; empty if there is none.
+        Name of the run, spring or disc with which it was confused; empty if there is none.
     """
 
     name: str
@@ -98,20 +98,23 @@ class Suspect:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """One quantity of many runs.
+    """The agreement of many runs on one quantity.
 
     Parameters
     ----------
     quantity, group : str
+        Names of the quantity and of the group of runs.
     mean : Estimate
-        Over benches, with the scatter between them.
+        Mean over benches; its uncertainty includes the scatter between them.
     within, between : float
-        Standard deviation of runs at one bench, and of benches in addition to it; NaN if there is only one.
+        Standard deviation of runs at one bench, and additional standard deviation between benches. ``within`` is NaN if
+        no bench has two runs, and ``between`` is NaN if there is only one bench.
     stated : float
-        Root mean square of the runs' own standard uncertainties.
+        Root mean square of the standard uncertainties of the runs.
     runs, benches : int
+        Numbers of runs and benches.
     chi2, dof : float
-        Of the benches' means about the mean, by the scatter within.
+        Chi-square and degrees of freedom of the means of the benches, with the scatter within benches.
     """
 
     quantity: str
@@ -132,11 +135,11 @@ def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Se
     Parameters
     ----------
     quantity, group : str
-        Names.
+        Names of the quantity and of the group of runs.
     values : sequence of Estimate
-        One a run, one at least; u is what the run does not share.
+        One value for each run, at least one; u includes only errors that the run does not share.
     benches : sequence of str
-        Of the runs.
+        Bench of each run.
 
     Raises
     ------
@@ -145,10 +148,11 @@ def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Se
 
     Notes
     -----
-    The one-way layout with random effects :math:`x_{ij} = \\mu + b_j + e_{ij}` by its moments [1]_: the variance
-    within is that of the runs about their bench's mean, pooled; the variance between is that of the means less what
-    the scatter within makes of them, by DerSimonian and Laird's moments. A bench's mean has the larger of
-    the scatter within and what its runs state.
+    The model is the one-way layout with random effects :math:`x_{ij} = \\mu + b_j + e_{ij}`, fitted by its moments
+    [1]_. The variance within benches is the pooled variance of runs about the mean of their bench. The variance between
+    benches is the variance of the means less the part from scatter within benches, by the moments of DerSimonian and
+    Laird. The uncertainty of a bench's mean uses the larger of the scatter within benches and the stated uncertainty of
+    the runs.
 
     References
     ----------
@@ -185,7 +189,7 @@ def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Se
 
 
 def suspects(runs: Sequence[CourseRun]) -> tuple[Suspect, ...]:
-    """Return the runs that differ from their course, each with its likeliest cause, in the order of the runs.
+    """Return the runs that differ from their course, each with its most likely cause, in the order of the runs.
 
     Parameters
     ----------
@@ -193,19 +197,28 @@ def suspects(runs: Sequence[CourseRun]) -> tuple[Suspect, ...]:
 
     Notes
     -----
-    A middle is a median, its scatter the median deviation. A record that was clipped says so itself. Where noise,
-    rest and amplitude together lie a power of ten beside the course's, it is the unit of the distance. A spring
-    constant :data:`FAR` from those of its spring is a mass in another unit (it agrees with a power of ten of it), a
-    mass exchanged with that of another such run (both come near with the masses exchanged), another spring (it lies
-    near that one's), or unknown. A drag coefficient far from those of its disc at the same Keulegan-Carpenter
-    number is another disc, where it comes
-    near that one's with its diameter: :math:`C \\propto D^{-2}`.
+    Each run is compared with the median of its group, and with the scatter from the median absolute deviation. The
+    causes are:
+
+    - clipped: the record has this finding;
+    - unit of the distance: noise, rest position and amplitude all differ from the course by the same power of ten.
+
+    If a spring constant is farther than :data:`FAR` from those of the same spring, the cause is the first of these:
+
+    - masses exchanged: two such runs agree with their springs after their masses are exchanged;
+    - unit of the mass: the run agrees if its mass is multiplied by a power of ten;
+    - wrong spring: the constant agrees with that of another spring;
+    - unknown.
+
+    If a drag coefficient is far from those of the same disc at the same Keulegan-Carpenter number, the cause is a wrong
+    disc or unknown. It is a wrong disc if the coefficient agrees with that of another disc after a correction for its
+    diameter, :math:`C \\propto D^{-2}`.
     """
     found: dict[str, Suspect] = {}
     for one in (*_clipped(runs), *_in_other_units(runs), *_springs(runs)):
         found.setdefault(one.name, one)
-    # A drag coefficient goes by length, mass and amplitude: a run with one of these wrong says nothing of its disc. But
-    # another disc carries other air along, which k tells where nothing else explains it.
+    # A drag coefficient depends on length, mass and amplitude, so a run with one of these wrong does not test its disc.
+    # But a wrong disc also changes k, by the air carried along, so runs with an unknown cause are tested.
     for one in _discs([run for run in runs if run.name not in found or found[run.name].cause == "unknown"]):
         found[one.name] = one
     return tuple(found[run.name] for run in runs if run.name in found)
@@ -218,7 +231,7 @@ def _clipped(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
 
 
 def _in_other_units(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
-    """Yield runs of which everything with a length is a power of ten off."""
+    """Yield runs in which noise, rest position and amplitude all differ from the course by one power of ten."""
     logs = np.log10(
         [[max(abs(x), 1e-300) for x in (r.noise_m, r.offset_m, r.amplitude_m)] for r in runs] or [[0.0] * 3]
     )
@@ -228,7 +241,7 @@ def _in_other_units(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
     for run, log in zip(runs, logs, strict=True):
         away = log - middle
         for power in POWERS:
-            # Noise is the sensor's and the rest position the bench's, more or less; amplitudes are as one pulls.
+            # The noise depends on the sensor and the rest position on the bench; amplitudes vary most between users.
             if np.all(np.abs(away - power) < (0.3, 0.35, 0.5)):
                 message = (
                     f"noise, rest position and amplitude are 10^{power:+d} of the course's: the unit of its distances"
@@ -238,7 +251,7 @@ def _in_other_units(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
 
 @dataclass(frozen=True, slots=True)
 class _Middle:
-    """Where the logarithms of a group lie: a median, over ln KC a line, and the scatter about it."""
+    """The location of the logarithms of a group: a median, or a line against ln KC, and the scatter about it."""
 
     centre: float
     scatter: float
@@ -291,7 +304,10 @@ def _springs(runs: Sequence[CourseRun]) -> Iterator[Suspect]:
 def _away(
     run: CourseRun, middles: Mapping[str, _Middle], middle: _Middle | None = None, mass: float | None = None
 ) -> float:
-    """Return how far a run's spring constant is from a middle, with another mass where one is given."""
+    """Return the distance of a run's spring constant from a median, in standard deviations.
+
+    A mass replaces the noted one if it is given.
+    """
     k = run.spring_constant
     assert k is not None
     value = k.value if mass is None else run.constant_with(mass)
@@ -301,7 +317,10 @@ def _away(
 
 
 def _exchanged(far: Sequence[CourseRun], middles: Mapping[str, _Middle]) -> dict[str, str]:
-    """Return pairs of runs that come near with their masses exchanged, those of one bench first, the nearest first."""
+    """Return the partner of each run, for pairs that agree with their springs after their masses are exchanged.
+
+    Pairs from the same bench take precedence, then pairs that agree better.
+    """
     pairs = []
     for i, one in enumerate(far):
         for other in far[i + 1 :]:

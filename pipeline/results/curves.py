@@ -1,4 +1,4 @@
-"""Curves with a band: energy against time, drag coefficient against amplitude."""
+"""Curves with uncertainty bands: energy against time, and drag coefficient against amplitude."""
 
 from __future__ import annotations
 
@@ -18,23 +18,24 @@ from pipeline.windows.demodulate import Demodulated
 
 __all__ = ["Curve", "drag_curve", "energy_curve"]
 
-POINTS = 200  # of a drawn curve
-GROUPS = 12  # of windows whose local slope is drawn beside the law
-LEAST_IN_GROUP = 4
+POINTS = 200  # number of points of a drawn curve
+GROUPS = 12  # maximum number of groups of windows whose local slopes are drawn with the curve
+LEAST_IN_GROUP = 4  # minimum number of windows in a group
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """A quantity as the selected law gives it, with its band, and as stretches of the record give it without a law.
+    """A quantity by the selected law, with its uncertainty band, and points calculated without a law.
 
     Parameters
     ----------
     x, y, u : (n,) float64
-        The curve and its standard uncertainty, all known contributions included.
+        The curve and its standard uncertainty, including all known contributions.
     unit : str
-        Of y.
+        Unit of y.
     x_points, y_points, u_points : (m,) float64
-        From the windows' amplitudes; ``u_points`` is only their scatter, which the points do not share.
+        Points from the amplitudes of windows. ``u_points`` includes only their scatter, and no errors that all points
+        share.
     """
 
     x: F8
@@ -56,16 +57,16 @@ def energy_curve(
     damping : Damping
     demodulated : Demodulated
     factor : Estimate
-        :math:`\\frac12 m\\omega^2`, the scale's square included.
+        The factor :math:`F = \\frac12 m\\omega^2`, including the square of the scale.
     laws : sequence of Weighted
-        What the band is made of.
+        The laws from which the band is calculated.
     unit : str
-        "J", or "J/kg" where no mass is known.
+        "J", or "J/kg" if no mass is known.
 
     Notes
     -----
-    :math:`u^2(E) = \\sum_i w_i[(2 E_i\\,u(A_i)/A_i)^2 + (E_i - E)^2] + (E\\,u_F/F)^2` over the laws of which the
-    amplitude is stated; E itself is the selected one's.
+    The uncertainty is :math:`u^2(E) = \\sum_i w_i[(2 E_i\\,u(A_i)/A_i)^2 + (E_i - E)^2] + (E\\,u_F/F)^2`, summed over
+    ``laws``; E is the energy by the selected law.
     """
     t = demodulated.t
     x = np.linspace(damping.t0, float(t[-1]), POINTS)
@@ -90,23 +91,23 @@ def energy_curve(
 
 
 def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, laws: Sequence[Weighted]) -> Curve | None:
-    """Return the drag coefficient against amplitude; None where the amplitude does not fall.
+    """Return the drag coefficient against amplitude; None if the amplitude does not decrease.
 
     Parameters
     ----------
     damping : Damping
     demodulated : Demodulated
     factor : Estimate
-        :math:`F = 3\\pi m/(2\\omega\\rho S)`, m.
+        The factor :math:`F = 3\\pi m/(2\\omega\\rho S)`, m.
     laws : sequence of Weighted
-        What the band is made of.
+        The laws from which the band is calculated.
 
     Notes
     -----
-    The coefficient that purely quadratic drag would need to take the same energy in one cycle:
-    :math:`C(A) = F\\,(-\\dot A - \\mu)/A^2`. Friction is no drag and stays out where the selected law has it, by as
-    much as that law says; every other loss, the spring's own included, is in. The points are slopes of ln A through
-    stretches of the record.
+    The curve is the coefficient with which purely quadratic drag would dissipate the same energy in one cycle:
+    :math:`C(A) = F\\,(-\\dot A - \\mu)/A^2`. Friction is no drag, so the friction of the selected law, if it has any,
+    is subtracted. All other losses are included, also those in the spring. The points come from slopes of ln A over
+    groups of windows.
     """
     best = damping.best
     elapsed = demodulated.t - damping.t0
@@ -114,7 +115,7 @@ def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, law
     least, most = float(np.min(fitted)), float(np.max(fitted))
     if not (0.0 < least < most):
         return None
-    # Amplitudes beyond the record would be extrapolated; equal ratios show the small ones too.
+    # Amplitudes beyond the record would be extrapolated; a logarithmic spacing shows small amplitudes too.
     x = np.geomspace(least, most, POINTS)
 
     def coefficient(fit: LawFit, theta: F8) -> F8:
@@ -135,7 +136,7 @@ def _friction(fit: LawFit, theta: F8) -> float:
 
 
 def _local_drag(damping: Damping, demodulated: Demodulated, factor: float) -> tuple[F8, F8, F8]:
-    """Coefficient, amplitude and scatter of stretches of windows, no law assumed."""
+    """Return amplitude, drag coefficient and its scatter for groups of windows, without assuming a law of drag."""
     kept = damping.scatter.kept
     t, amplitude, u = demodulated.t[kept], demodulated.amplitude[kept], damping.scatter.u[kept]
     groups = min(GROUPS, t.size // LEAST_IN_GROUP)

@@ -1,4 +1,4 @@
-"""Derive: from frequency, amplitude and damping to what the experiment is about, with uncertainties."""
+"""Derive: from frequency, amplitude and damping to the results of the experiment, with uncertainties."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Params:
     Parameters
     ----------
     u_clock_nominal : float
-        Relative standard uncertainty of a clock by its crystal's specification: 50 ppm taken as half-width of a
-        rectangle. It does not average away.
+        Relative standard uncertainty of a clock from the specification of its crystal: 50 ppm is the half-width of a
+        rectangular distribution. It does not decrease by averaging.
     u_air_temperature_k : float
         Standard uncertainty of an air temperature stated without one, K.
     """
@@ -55,28 +55,29 @@ class Params:
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """Everything that Table 1 lists; what only curves and comparisons need is worked out when asked for.
+    """The results in Table 1; quantities that only curves and comparisons need are calculated on access.
 
     Parameters
     ----------
     estimates : mapping of str to Estimate
-        With every known contribution to the uncertainty, the clock's and the scale's among them.
+        Estimates with all known contributions to the uncertainty, including clock and scale.
     coefficients : mapping of str to Estimate
-        Of linear and quadratic drag together, where the record allows it; else of the selected law, which is always a
-        stated one. They are those of the law ``laws[0]``, with every known contribution. Those that are not
-        determined are upper limits.
+        Coefficients of the law ``laws[0]``, with all known contributions; coefficients that are not determined are
+        upper limits. The law is a stated one if there is one. Otherwise it is linear and quadratic drag together if the
+        record allows it, or the selected law.
     budgets : mapping of str to Budget
-        Of every estimate and coefficient: which input contributes what.
+        Contributions of the inputs to every estimate and coefficient.
     laws : tuple of Weighted
-        The laws by which amplitude and damping rate are stated; the coefficients are the first one's.
+        The laws over which amplitude and damping rate are averaged; the coefficients are those of the first law.
     parts : mapping of str to (variable, str)
-        What the properties below are read from, with units; absent where the scene does not give it.
+        Variables with units, from which the properties below are read; those that the scene does not determine are
+        missing.
     law : str
-        Name of the one law by which the results are stated; empty where they are an average over laws. Both drags
-        together are such an average where the record selects one of them: they hold either.
+        Name of the law by which the results are stated; empty if they are an average over laws. They count as an
+        average also if the record selects one drag and the results use both, of which it is a special case.
     alone : callable or None
-        Gives the same by the law that is clearly ahead (:attr:`pipeline.damping.select.Damping.ahead`), where the
-        results are an average over laws.
+        Function that returns the results by the law that is clearly ahead
+        (:attr:`pipeline.damping.select.Damping.ahead`). None if no law is ahead, or if ``law`` is not empty.
     """
 
     estimates: Mapping[str, Estimate]
@@ -89,7 +90,7 @@ class Derived:
 
     @cached_property
     def of_law(self) -> frozenset[str]:
-        """Names of the estimates whose values and uncertainties depend on the law of damping."""
+        """Names of the estimates that depend on the damping law."""
         return frozenset(
             name
             for name in self.estimates
@@ -98,20 +99,21 @@ class Derived:
 
     @cached_property
     def leading(self) -> Derived | None:
-        """What the results are if the law that is clearly ahead holds; None where none is, or where one was stated."""
+        """The results if the law that is clearly ahead is true; None if no law is ahead, or if the results use it."""
         return None if self.alone is None else self.alone()
 
     def coefficients_of(self, law: str) -> Mapping[str, Estimate]:
-        """Return the coefficients that the results state of a law; nothing where they state none of it."""
+        """Return the coefficients of a law as the results state them; empty if they state none of this law."""
         for stated in (self, self.leading):
             if stated is not None and stated.laws[0].fit.name == law:
                 return stated.coefficients
         return {}
 
     def parameters_of(self, fit: LawFit) -> dict[str, Estimate]:
-        """Return the parameters of a law in true seconds and metres, with every known contribution, by name.
+        """Return the parameters of a law by name, in true seconds and metres, with all known contributions.
 
-        They are the results' own where these are of this law. Coefficients that are not determined are upper limits.
+        If the results are stated by this law, their values are returned. Coefficients that are not determined are upper
+        limits.
         """
         from uncertainties import correlated_values
 
@@ -129,47 +131,52 @@ class Derived:
 
     @property
     def _scales(self) -> tuple[Any, Any]:
-        """True seconds in a second of the record and true lengths in a recorded one, as factors of rate and length."""
+        """The factors that convert rates and lengths of the record to true seconds and metres."""
         return self.parts["rates"][0], self.parts["lengths"][0]
 
     @cached_property
     def statistical(self) -> Mapping[str, Estimate]:
-        """The estimates with only the part of their uncertainties from the scatter of the recording (Type A)."""
+        """The estimates with only the part of their uncertainties from scatter of the recording (type A)."""
         return {name: Estimate(e.value, self.budgets[name].u_of("A"), e.unit) for name, e in self.estimates.items()}
 
     @cached_property
     def joint(self) -> Joint:
-        """All estimates and coefficients with their covariance; where both name one, as of A0, the estimate."""
+        """All estimates and coefficients with their covariance; an estimate replaces a coefficient of the same name."""
         return joint_of({**self.coefficients, **self.estimates})
 
     @cached_property
     def effective_mass_kg(self) -> Estimate | None:
-        """Mass that oscillates: bob, air carried along, the spring's share, as far as the scene requires them."""
+        """Oscillating mass: the bob, and the air and the share of the spring that the effects table includes."""
         return self._part("mass")
 
     @cached_property
     def own_mass_kg(self) -> Estimate | None:
-        """The part of the mass that belongs only to this run."""
+        """The oscillating mass without the share of the spring."""
         return self._part("own_mass")
 
     @cached_property
     def half_stiffness(self) -> Estimate | None:
-        """Mechanical energy over the recorded amplitude's square, N/m; per kilogram where the scene gives no mass.
+        """Mechanical energy over the square of the recorded amplitude, N/m; per kilogram if no mass is known.
 
-        Of velocities and accelerations over the square of their unit; None where the record tells no displacement.
+        For velocities and accelerations the unit is that of an energy over the square of theirs. None if the record
+        does not determine the displacement.
         """
         return self._part("half_stiffness")
 
     @cached_property
     def displacement(self) -> Estimate | None:
-        """Displacement over the recorded amplitude: 1, of a velocity s, of an acceleration s^2; of others None."""
+        """Ratio of displacement to recorded value: 1 for a length, in s for a velocity, in s^2 for an acceleration.
+
+        None for other quantities.
+        """
         return self._part("displacement")
 
     @cached_property
     def drag_length(self) -> Estimate | None:
-        """Drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude, in the record's unit.
+        """Ratio of the drag coefficient to :math:`-\\dot A/A^2` of the recorded amplitude, in the unit of the record.
 
-        None without disc, mass or air temperature.
+        None if the disc, the mass or the air temperature is not stated, or if the record does not determine the
+        displacement.
         """
         return self._part("drag_length")
 
@@ -177,15 +184,15 @@ class Derived:
         return estimate_of(*self.parts[name]) if name in self.parts else None
 
     def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
-        """Return the mechanical energy against time with its band, J; J/kg where no mass is known.
+        """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known.
 
-        None where the record tells no displacement.
+        Return None if the record does not determine the displacement.
 
         Parameters
         ----------
         damping : Damping
         demodulated : Demodulated
-            Of the same run.
+            Demodulation of the same run.
         """
         unit = "J/kg" if self.effective_mass_kg is None else "J"
         if self.half_stiffness is None:
@@ -193,13 +200,13 @@ class Derived:
         return energy_curve(damping, demodulated, self.half_stiffness, self.laws, unit)
 
     def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
-        """Return the drag coefficient against amplitude with its band; None where the scene or the record gives none.
+        """Return the drag coefficient against amplitude with its band; None if it is not determined.
 
         Parameters
         ----------
         damping : Damping
         demodulated : Demodulated
-            Of the same run.
+            Demodulation of the same run.
         """
         if self.drag_length is None:
             return None
@@ -219,23 +226,23 @@ def derive(
     misfits: tuple[Misfit, ...] = (),
     smoothing: SensorFilter | None = None,
 ) -> Derived:
-    """Propagate uncertainties to everything that is asked of a run.
+    """Calculate all results of a run and propagate their uncertainties.
 
     Parameters
     ----------
     demodulated, damping, phase, rest
-        Outputs of the stages of those names.
+        Outputs of the stages with the same names.
     scene : Scene
-        What is not known there leaves out what depends on it.
+        The scene; results that depend on values missing in it are left out.
     effects : tuple of Effect
-        Say which masses count.
+        The effects table, which says which masses are included.
     instrument : Instrument
         Clock and scale of the sensor.
     params : Params, optional
     misfits : tuple of Misfit
-        What the record says against its own model: inputs of kind B, uncertain about nothing.
+        Contradictions between the record and its model; they are inputs of kind B with the mean zero.
     smoothing : SensorFilter, optional
-        What the scene says of the sensor's filter, for which amplitude and phase are corrected.
+        The filter of the sensor in the scene, for which amplitude and phase are corrected.
 
     Returns
     -------
@@ -243,23 +250,32 @@ def derive(
 
     Notes
     -----
-    First-order propagation [1]_ through the ``uncertainties`` package, every input one variable wherever it enters:
-    with the clock's rate r and the distances' scale s (both 1 but for their uncertainty)
-    :math:`\\omega = r\\omega_0`, :math:`f = \\omega/2\\pi`, :math:`T = 2\\pi/\\omega`,
-    :math:`k = (\\omega^2 + \\overline{\\lambda^2}) m_s/x^2` with :math:`x \\tan x = m_s/(m + m_a)`,
-    :math:`A_0 = s a_0`, :math:`\\beta = r b/s`,
-    :math:`Q = \\omega_0/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start and
-    :math:`\\omega_0^2 = \\omega^2 + \\overline{\\lambda^2}`, which is the quality factor of linear drag, and for other
-    laws :math:`2\\pi` times the energy over the loss in a period, at the start and to first order of the damping,
-    :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`, :math:`Re = \\rho v_\\mathrm{rms} D/\\eta` of the
-    whole record and with :math:`\\omega A_0/\\sqrt 2` at its start,
-    :math:`KC = 2\\pi A_0/D`, and for the drag coefficient :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
-    Of an acceleration of amplitude a the displacement's is :math:`a/(\\omega^2 + \\lambda^2)`, of a velocity
-    :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`, and with it everything that needs a length, as of an angular velocity the
-    angle's; of angles, voltages, forces and numbers no such thing is given. The spring constant needs none.
-    What depends on the damping law is an average over laws (:func:`pipeline.damping.average.average_over_laws`):
-    :math:`x = \\sum_i w_i x_i` and :math:`u^2 = \\sum_i w_i (u_i^2 + s (x_i - x)^2)`, where s is what the spread
-    between laws counts (:func:`pipeline.damping.average.spread_counts`).
+    Uncertainties are propagated to first order [1]_ by the ``uncertainties`` package, with one variable for each input.
+    The clock's rate r and the scale s of the distances are uncertain. The results are:
+
+    - frequency and period: :math:`\\omega = r\\omega_r`, with :math:`\\omega_r` from the record,
+      :math:`f = \\omega/2\\pi` and :math:`T = 2\\pi/\\omega`;
+    - spring constant: :math:`k = (\\omega^2 + \\overline{\\lambda^2}) m_s/x^2` with
+      :math:`x \\tan x = m_s/(m + m_a)`;
+    - amplitude and quadratic drag: :math:`A_0 = s a_0` and :math:`\\beta = r b/s`;
+    - quality factor: :math:`Q = \\omega_0/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start and
+      :math:`\\omega_0^2 = \\omega^2 + \\overline{\\lambda^2}`. It is exact for linear drag. For other laws it is
+      :math:`2\\pi` times the energy over the loss in a period, at the start and to first order in the damping;
+    - velocity: :math:`v_\\mathrm{rms} = \\omega\\sqrt{\\overline{A^2}/2}`;
+    - Reynolds number: :math:`Re = \\rho v_\\mathrm{rms} D/\\eta` for the whole record, and with
+      :math:`\\omega A_0/\\sqrt 2` at its start;
+    - Keulegan-Carpenter number: :math:`KC = 2\\pi A_0/D`;
+    - drag coefficient: :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
+
+    If an acceleration of amplitude a is recorded, the amplitude of the displacement is
+    :math:`a/(\\omega^2 + \\lambda^2)`; for a velocity it is :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`. Results that need
+    a length use this amplitude. The amplitude of an angle follows from an angular velocity in the same way. For
+    angles, voltages, forces and numbers, results that need a length are left out. The spring constant needs no length.
+
+    Results that depend on the damping law are averages over laws
+    (:func:`pipeline.damping.average.average_over_laws`): :math:`x = \\sum_i w_i x_i` and
+    :math:`u^2 = \\sum_i w_i (u_i^2 + c (x_i - x)^2)`, where the factor c weights the spread between laws
+    (:func:`pipeline.damping.average.spread_counts`).
 
     References
     ----------
@@ -310,23 +326,24 @@ def derive(
 
 
 def limited(law: Law, name: str, estimate: Estimate) -> Estimate:
-    """Return a law's parameter, as an upper limit where it is a coefficient that the record does not determine."""
+    """Return a parameter of a law; a coefficient that the record does not determine becomes an upper limit."""
     return estimate if name in ("A0", free_power(law)) else UpperLimit.of(estimate)
 
 
 @dataclass(frozen=True)
 class _Formula:
-    """One row of the table: a quantity, and how it is calculated from terms.
+    """One row of the table: a quantity and its expression.
 
     Parameters
     ----------
     name : str
-        Of an estimate in :data:`pipeline.registry.quantities.QUANTITIES`, or of one of :attr:`Derived.parts`.
+        Name of an estimate in :data:`pipeline.registry.quantities.QUANTITIES`, or of an entry of
+        :attr:`Derived.parts`.
     expression : callable
-        Its parameters name the terms that it requires, those of :func:`_terms` and rows above; where one is missing,
-        the quantity is left out.
+        Function whose parameters are the names of the terms that it needs, from :func:`_terms` or from rows above. If a
+        term is missing, the quantity is left out.
     units : mapping of str to str
-        By the record's unit, where the registry does not say.
+        Unit of the quantity for each unit of the record, if it differs from the registry.
     """
 
     name: str
@@ -398,7 +415,7 @@ _FORMULAS = (
     ),
     _Formula("drag_coefficient", lambda drag_per_beta, beta: drag_per_beta * beta),
 )
-"""Everything calculated from terms, in the order of calculation: one more estimate is one more row."""
+"""All quantities calculated from terms, in the order of calculation; a new estimate is a new row."""
 
 
 def _terms(
@@ -415,14 +432,14 @@ def _terms(
     laws: _Laws,
     inputs: Inputs,
 ) -> tuple[dict[str, Any], dict[str, tuple[Any, str]]]:
-    """What the formulas calculate with, by name, without what record and scene do not give; and the coefficients."""
+    """Return the terms of the formulas by name, as far as record and scene give them, and the coefficients."""
     ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
     amiss = _Amiss(misfits, inputs)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
     unit = rest.mean.unit
     scale = ambient.scale(instrument) if unit == "m" else 1.0
     windows = phase.residual.size
-    # Of one window or two the uncertainty is by the samples.
+    # With one or two windows the uncertainty comes from the samples.
     free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
     omega = slope * rate
@@ -433,7 +450,7 @@ def _terms(
     lam = laws.rate_at_start * rates
     squared_rate = laws.squared_rate if phase.squared_rate is None else phase.squared_rate
     natural = omega**2 + squared_rate * rate**2
-    # How large the displacement is where the recorded value is 1; nobody knows of a voltage or a force.
+    # The ratio of displacement to recorded value; it is unknown for a voltage or a force.
     displacement = {"m": 1.0, "m/s": natural**-0.5, "m/s^2": 1.0 / natural}.get(unit)
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B")
     offset = inputs.add("rest_position", rest.mean, "A", free) * scale
@@ -442,14 +459,14 @@ def _terms(
     diameter: Any = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
-    # Of which order the record is the derivative of a length or of an angle.
+    # The order of the time derivative of a length or an angle that was recorded.
     length_order, angle_order = {"m/s": 1, "m/s^2": 2}.get(unit), {"rad/s": 1}.get(unit)
     in_air = ambient.known and diameter is not None and displacement is not None
     drag_per_beta = None
     if in_air and mass is not None:
-        # C over beta; the area, the mass and the density are in it once.
+        # The ratio C/beta.
         drag_per_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
-    # An angle may be a pendulum's, whose bob hangs from no spring unless the scene has one.
+    # An angle may be that of a pendulum, so a spring constant is given only if the scene has a spring.
     sprung = not unit.startswith("rad") or scene.spring_mass_kg is not None
     quadratic = damping.settled and damping.best.drag_term("beta") is not None
     terms = {
@@ -471,7 +488,7 @@ def _terms(
         "per_value": {"rad": 1.0, "rad/s": natural**-0.5}.get(unit, displacement),
         "length_order": length_order,
         "angle_order": angle_order,
-        # Of a length the amplitude itself, which is not stated twice.
+        # For a length, the amplitude itself is used, so that it is not stated twice.
         "displacement_amplitude": start if unit == "m" else None,
         "mass": mass,
         "energy_mass": 1.0 if mass is None else mass,
@@ -487,7 +504,7 @@ def _terms(
 
 
 class _Amiss:
-    """The misfits as inputs: by name of the estimate, a variable of mean zero."""
+    """The misfits as inputs: a variable of mean zero for each estimate, by name."""
 
     def __init__(self, misfits: tuple[Misfit, ...], inputs: Inputs) -> None:
         self.by_name: dict[str, Any] = {}
@@ -507,12 +524,12 @@ class _Amiss:
         return self.by_name.get(name, 0.0)
 
     def over(self, name: str, value: float) -> Any:
-        """Return the factor that makes an estimate of this value as uncertain as the misfits do."""
+        """Return a factor of mean 1 that adds the uncertainty from the misfits to an estimate of this value."""
         return 1.0 + self[name] / float(value) if value else 1.0
 
 
 class _Filtered:
-    """What the sensor's filter does: the size of an oscillation of 1 behind it, and by how much it is late, rad."""
+    """The effect of the sensor's filter on an oscillation: its gain and its delay, rad."""
 
     def __init__(self, smoothing: SensorFilter | None, omega: Any, inputs: Inputs) -> None:
         self.gain: Any = 1.0
@@ -530,13 +547,13 @@ class _Filtered:
 
 
 class _Laws:
-    """What depends on the damping law, as inputs: amplitude and rate at the start, displacement, coefficients."""
+    """Inputs that depend on the damping law: start amplitude, damping rate, rms displacement and coefficients."""
 
     def __init__(self, damping: Damping, inputs: Inputs, demodulated: Demodulated) -> None:
         elapsed, best = demodulated.t - damping.t0, damping.best
         every = average_over_laws(damping, math.sqrt(float(np.mean(demodulated.amplitude**2))))
         found = [(one, *_of_law(one.fit, elapsed)) for one in every]
-        # A law whose fit runs to infinity within the record states nothing that the others could be averaged with.
+        # A law that is infinite within the record cannot be averaged with the others.
         found = [(one, values, slopes) for one, values, slopes in found if np.isfinite(values @ slopes).all()]
         if not found:
             found = [(Weighted(best, 1.0), *_of_law(best, elapsed))]
@@ -565,7 +582,7 @@ class _Laws:
 
 
 def _root(covariance: F8) -> F8:
-    """Return R with R R^T the covariance (p, p): products with it keep no negative variance, however it is scaled."""
+    """Return R such that R R^T is the covariance (p, p), so that products give no negative variance at any scaling."""
     u = np.sqrt(np.diag(covariance))
     scale = np.where(u > 0.0, u, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
@@ -573,7 +590,7 @@ def _root(covariance: F8) -> F8:
 
 
 def _of_law(fit: LawFit, elapsed: F8) -> tuple[F8, F8]:
-    """Amplitude and its rate at the start and the rms displacement over the windows, (3,), and their slopes (3, p)."""
+    """Return start amplitude, damping rate at the start and rms displacement, (3,), and their derivatives (3, p)."""
     amplitude, jacobian = fit.law.curve(elapsed, fit.joint.values)
     size = math.sqrt(float(amplitude @ amplitude) / (2.0 * elapsed.size))
     by_size = amplitude @ jacobian / max(2.0 * elapsed.size * size, 1e-300)
@@ -583,7 +600,7 @@ def _of_law(fit: LawFit, elapsed: F8) -> tuple[F8, F8]:
 
 
 def _start_phase(phase: PhaseFit, slope: Any, inputs: Inputs, dof: float) -> Any:
-    """The phase at the start: the line's own at its middle, and what the slope's error makes of it over the way."""
+    """Return the phase at the start, from the phase in the middle of the fitted line and the error of its slope."""
     omega, at_start = phase.angular_frequency, phase.phase
     way = phase.t0 - phase.middle
     if omega.u > 0:
@@ -593,13 +610,13 @@ def _start_phase(phase: PhaseFit, slope: Any, inputs: Inputs, dof: float) -> Any
 
 
 def _coefficients(laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
-    """The stated law's coefficients in true seconds and metres."""
+    """Return the coefficients of the law of the results, in true seconds and metres."""
     found = _in_true_units(laws.stated.law, laws.stated.joint, laws.variables, rate, scale)
     return {name: found[name] for name in laws.stated.joint.names[1:]}
 
 
 def _in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
-    """A law's parameters in true seconds and metres, with their units."""
+    """Return the parameters of a law in true seconds and metres, with their units."""
     values = dict(zip(joint.names, variables, strict=True))
     found: dict[str, tuple[Any, str]] = {}
     for name, printed in zip(joint.names, joint.units, strict=True):
@@ -612,7 +629,7 @@ def _in_true_units(law: Law, joint: Joint, variables: list[Any], rate: Any, scal
 def _masses(
     scene: Scene, effects: tuple[Effect, ...], diameter: Any, ambient: Ambient, inputs: Inputs
 ) -> tuple[Any, Any]:
-    """Bob with the air it carries, and the spring's share, as far as the effects table includes them."""
+    """Return the mass of the bob, with the air carried along if the effects include it, and the share of the spring."""
     if scene.bob_mass_kg is None:
         return None, None
     own = inputs.add("bob_mass", scene.bob_mass_kg, "B")
@@ -628,11 +645,11 @@ def _masses(
 
 
 def _noise(demodulated: Demodulated, unit: str) -> Estimate:
-    """Noise of one sample, from the residuals' median.
+    """Return the noise of one sample, from the median of the absolute residuals.
 
-    Tails heavier than the normal distribution's make "the" standard deviation a matter of definition. The uncertainty
-    holds the difference to the root mean square of the samples used, and what a share e of wide draws like those left
-    out does to a median: 0.5 e / (2 phi(0.6745)) = 1.17 e of it.
+    For a distribution with heavy tails, the standard deviation is a matter of definition. So the uncertainty includes
+    the difference to the root mean square of the samples used. It also includes the relative error of the median if a
+    share e of the samples are outliers like those left out: 0.5 e / (2 phi(0.6745) 0.6745) = 1.17 e.
     """
     flags, residual = demodulated.flags, demodulated.residual
     clean = not flags.any()

@@ -1,7 +1,7 @@
-"""Effects: what could act at this bench, how large it should be, how large it was, and whether the model holds it.
+"""Effects: the possible effects at this bench, their predicted and measured sizes, and whether the model includes them.
 
-An effect enters the model only where its predicted or its measured size exceeds a tenth of the uncertainty it would
-disturb; the table shows all of them, in or out, with the reason.
+The model includes an effect only if its predicted or measured size exceeds a tenth of the uncertainty that it would
+affect. The table shows all effects, included or not, with the reason.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ from pipeline.windows.disturbances import Disturbances
 
 __all__ = ["Effect", "tabulate"]
 
-SHARE = 0.1  # of the uncertainty that an effect would disturb
+SHARE = 0.1  # size from which the model includes an effect, over the uncertainty that the effect would change
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
 STEEL_KG_PER_M3 = 7850.0
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One line of the effects table.
+    """One row of the effects table.
 
     Parameters
     ----------
     name : str
         One of :data:`pipeline.registry.effects.EFFECTS`.
     predicted : float or None
-        Size that the scene predicts, in ``unit``; None where the scene says too little.
+        Size that the scene predicts, in ``unit``; None if the scene does not determine it.
     measured : float or None
-        Size that the record shows; None where the record cannot show it.
+        Size measured in the record, in ``unit``; None if the record does not show it.
     unit : str
     included : bool
-        Whether the model holds it.
+        Whether the model includes the effect.
     why : str
-        One sentence.
+        The reason, one sentence.
 
     Raises
     ------
@@ -80,13 +80,13 @@ def tabulate(
     Parameters
     ----------
     scene, damping, phase, rest
-        The bench and what the stages found.
+        The bench, and outputs of the stages with the same names.
     noise_m : float
         Standard deviation of one sample, m.
     instrument : Instrument
         Clock and scale of the sensor.
     disturbances : Disturbances, optional
-        Modes other than the main oscillation; left out, they were not sought.
+        Modes other than the main oscillation; None if they were not sought.
     """
     omega, unit = phase.angular_frequency, rest.mean.unit
     u_k = 2.0 * math.hypot(omega.u / omega.value, instrument.clock_rate.u)
@@ -136,11 +136,11 @@ def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[
     predicted_gamma = predicted_beta = None
     if scene.disc_diameter_m is not None and scene.bob_mass_kg is not None:
         radius, mass = 0.5 * scene.disc_diameter_m.value, scene.bob_mass_kg.value
-        # Creeping flow past a disc broadside on: F = 16 eta a v.
+        # Creeping flow past a disc that moves along its axis: F = 16 eta a v.
         celsius, pascal, _ = scene_air(scene)
         predicted_gamma = 8.0 * air_viscosity(celsius.value, pascal.value) * radius / mass
         b = 0.5 * STEADY_DISC_DRAG * scene_air_density(scene) * math.pi * radius**2
-        # Of the displacement, which is smaller than its derivatives by omega each; of nothing else is one known.
+        # Converts to the recorded quantity: each time derivative is larger than the displacement by a factor omega.
         share = {"m": 1.0, "m/s": omega**-1, "m/s^2": omega**-2}.get(unit)
         predicted_beta = None if share is None else 4.0 * b * omega / (3.0 * math.pi * mass) * share
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
@@ -177,7 +177,7 @@ def _rest_drift(rest: Rest, noise_m: float) -> Effect:
 
 
 def _modes(disturbances: Disturbances | None, unit: str) -> Iterator[Effect]:
-    """A mode of another frequency, and the harmonics and products of the main oscillation."""
+    """Yield the effects of modes of other frequencies, and of harmonics and products of the main oscillation."""
     found = () if disturbances is None else disturbances.sideways.modes
     own = [mode for mode in found if mode.kind == "mode"]
     locked = [mode for mode in found if mode.kind != "mode"]

@@ -1,7 +1,7 @@
-"""Effects that a scene implies for a motion that nobody has measured yet: how much each changes it, in or out, why.
+"""Effects in a simulated motion: how much each changes the motion, whether it is included, and why.
 
-The sizes are those of the displacement over the starting amplitude, at the end of the run or before: what would be
-wrong if the effect were left out. The table is that of an analysis, without anything measured.
+The size of an effect is the largest error of the displacement over the run without it, over the start amplitude. The
+table has the form of that of an analysis, without measured sizes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from pipeline.results.effects import Effect
 __all__ = ["simulated_effects"]
 
 GRAVITY = 9.81  # m/s^2
-SOFTER_PER_K = 2.6e-4  # by which a steel spring's modulus falls, 1/K
+SOFTER_PER_K = 2.6e-4  # relative decrease of the modulus of spring steel with temperature, 1/K
 _NAMES = {
     "viscous_drag": "[damping] gamma_per_s",
     "quadratic_drag": "[damping] beta_per_m_s",
@@ -46,24 +46,24 @@ def simulated_effects(
     Parameters
     ----------
     scene : Scene
-        As it was stated.
+        The scene as stated.
     problem : Problem
-        What is made of it, derived drag included.
+        The problem made from the scene, including derived drag.
     terms : sequence of Term
-        What became of the equation's terms at the tolerance; empty for a method by name, which solves all of them.
+        The terms of the equation, included or not at the tolerance; empty for a named method, which solves all of them.
     seconds : float
-        Of the run.
+        Duration of the run, s.
     drag : DerivedDrag or None
-        What was derived from disc, bob and air.
+        Drag derived from disc, bob and air.
     without : sequence of str
-        What the user left out: "drag", "disc", "spring-mass".
+        Effects that the user left out: "drag", "disc", "spring-mass".
 
     Notes
     -----
-    Leaving a share s of the mass out turns the phase by :math:`s\\omega T/2`; a frequency that is off by
-    :math:`\\delta` changes the displacement by up to :math:`2\\sin(\\delta T/2)` of the amplitude. Swinging sideways
-    grows where the suspended length is within 1.5 amplitudes of :math:`4g/\\omega^2`, from whatever little there is, by
-    :math:`3\\omega A/8l` a second [1]_.
+    Leaving out a share s of the mass shifts the phase by :math:`s\\omega T/2` over a run of duration T. An error
+    :math:`\\delta` of the angular frequency changes the displacement by up to :math:`2\\sin(\\delta T/2)` of the
+    amplitude. If the suspended length l is within 1.5 amplitudes of :math:`4g/\\omega^2`, any small sideways motion
+    grows at the rate :math:`3\\omega A/8l` [1]_.
 
     References
     ----------
@@ -82,7 +82,7 @@ def simulated_effects(
 
 
 def _turned(share: float, problem: Problem, seconds: float) -> float:
-    """Return the change of the displacement where the frequency is off by a share, over the amplitude."""
+    """Return the change of the displacement by a relative error of the frequency, over the amplitude."""
     return 2.0 * math.sin(min(0.5 * abs(share) * problem.equation.angular_frequency_per_s * seconds, 0.5 * math.pi))
 
 
@@ -115,7 +115,7 @@ def _masses(scene: Scene, problem: Problem, seconds: float, without: Sequence[st
 
 
 def _lost(problem: Problem, seconds: float, gamma: float, beta: float) -> float:
-    """Return by how much leaving out some of the damping changes the amplitude, over the start, at most."""
+    """Return the largest change of the amplitude without part of the damping, over the start amplitude."""
     start = problem.amplitude_m()
     if start == 0.0:
         return 0.0

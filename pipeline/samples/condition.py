@@ -1,4 +1,4 @@
-"""Condition: flag every sample that a fit may not take at face value, and drop none."""
+"""Condition: flag every sample that a fit must not take at face value, without dropping any."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
 QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
 TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
 CREST_SIGMAS = 3.5
-BLOCK = 256  # samples that tell the curvature where they are
-LARGEST = 1e100  # of a value that was measured: what lies beyond is a missing sample
-ROUNDING = 1e-9  # of the largest value: values that differ by less are one, converted twice
+BLOCK = 256  # samples over which a local curvature is estimated
+LARGEST = 1e100  # magnitude of a measured value; anything beyond is a missing sample
+ROUNDING = 1e-9  # fraction of the largest value; smaller differences are rounding errors of one value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,11 +32,11 @@ class Params:
     Parameters
     ----------
     spike_sigmas : float
-        A sample further than this from the median of its five neighbours, beyond what curvature explains, is a
-        false echo.
+        Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in
+        standard deviations of the noise.
     plateau_contrast : float
-        A plateau holds this many times more samples than the band of equal width beneath it. An unclipped
-        crest holds 1 / (sqrt 2 - 1) = 2.4 times as many.
+        Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an
+        unclipped crest the ratio is 1 / (sqrt 2 - 1) = 2.4.
     """
 
     spike_sigmas: float = 8.0
@@ -45,19 +45,19 @@ class Params:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Where a fixed object or a lost target cuts the motion at one end, as its sinusoid shows.
+    """One end of the motion at which a fixed object or a lost target cuts it off, as its sinusoid shows.
 
     Parameters
     ----------
     end : {"far", "near"}
     from_m : float
-        Distance from which on samples are left out, m.
+        Distance beyond which samples are left out, m.
     level_m : float
         Median of the outer half of the distances left out, m.
     samples : int
-        Left out.
+        Number of samples left out.
     first_s, last_s : float
-        Times of the first and the last of them, s.
+        Times of the first and the last sample left out, s.
     """
 
     end: Literal["far", "near"]
@@ -70,24 +70,24 @@ class Cut:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Conditioned:
-    """A track with every sample judged.
+    """A track in which every sample has been judged.
 
     Parameters
     ----------
     track : Track
-        As it came.
+        The track as it was given.
     flags : (n,) uint8
-        The track's flags and those found here.
+        The track's own flags and those found here.
     noise_m : float
-        Standard deviation of white noise from fourth differences, m; independent of any model of the motion.
+        Standard deviation of the white noise from fourth differences, m; independent of any model of the motion.
     plateaus_m : tuple of float
         Distances at which the record is clipped, m.
     quantum_m : float or None
-        Step in which the distances come: the track's, or a coarser one that the distances themselves show.
+        Resolution of the distances: the track's, or a coarser one that the distances themselves show.
     clipped_from_m : tuple of float
-        For each plateau the distance from which on samples were flagged, m.
+        For each plateau, the distance beyond which samples were flagged, m.
     cuts : tuple of Cut
-        What the sinusoid tells in place of the plateaus, see :mod:`pipeline.windows.clipping`.
+        Cuts found by the sinusoid, which replace the plateaus; see :mod:`pipeline.windows.clipping`.
     """
 
     track: Track
@@ -100,18 +100,18 @@ class Conditioned:
 
     @property
     def used(self) -> NDArray[np.bool_]:
-        """(n,) bool: samples without any flag that excludes them."""
+        """(n,) bool: True for samples without any flag that excludes them."""
         mask: NDArray[np.bool_] = (self.flags & UNUSABLE) == 0
         return mask
 
     def less(self, taken_m: F8) -> Conditioned:
-        """Return the record with something (n,) taken out of its distances; flags and times stay."""
+        """Return the record with values (n,) subtracted from its distances; flags and times are kept."""
         return replace(self, track=replace(self.track, y=self.track.y - taken_m))
 
     def near_plateau(self, model_m: F8, noise_m: float) -> NDArray[np.bool_]:
-        """Return where a model comes so near a plateau that noise decides whether a sample is clipped.
+        """Return where a model is so close to a plateau that noise decides whether a sample is clipped.
 
-        Samples there are left out by the model, not by their own noise: what is left is not biased.
+        The model selects the samples to leave out there, not their own noise, so the remaining samples are not biased.
 
         Parameters
         ----------
@@ -141,13 +141,13 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
     Raises
     ------
     AnalysisError
-        If fewer than eight samples are left to work with.
+        If fewer than eight usable samples are left.
 
     Notes
     -----
-    Noise is estimated from fourth differences, in which a motion of angular frequency :math:`\\omega` sampled
-    every :math:`h` leaves only :math:`A (\\omega h)^4`, by the median of their absolute values, so that false
-    echoes do not count.
+    Noise is estimated from fourth differences. A motion of amplitude A and angular frequency :math:`\\omega`, sampled
+    every :math:`h`, contributes only :math:`A (\\omega h)^4` to them. The median of their absolute values is taken, so
+    false echoes have no effect.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
     flags = track.flags.copy()
     measured = np.abs(track.y) < LARGEST  # and not NaN
     flags[~measured] |= np.uint8(Quality.MISSING)
-    # A reader that already said which of two exchanged rows is wrong is believed.
+    # Where the reader has flagged one of two interchanged rows, its decision is kept.
     judged = (flags & np.uint8(Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME)) != 0
     flags |= _time_flags(np.where(judged, np.nan, track.t), judged)
     clean = (flags & UNUSABLE) == 0
@@ -187,7 +187,7 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
         (sign, *_plateau(sign * y_kept, increasing, max(noise_m, half_step), params.plateau_contrast))
         for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1]))
     ]
-    # A record that lies on plateaus for the most part is a step or a still bob, not a clipped motion.
+    # A record that lies mostly on plateaus is a step or a bob at rest, not a clipped motion.
     if sum(members.size for _, _, _, members in found) <= 0.6 * y_kept.size:
         for sign, level, bottom, members in found:
             if members.size:
@@ -199,14 +199,14 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
 
 
 def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
-    """Return the step between neighbouring values where values repeat; files print more digits than sensors have.
+    """Return the smallest step between values that repeat; files print more digits than sensors resolve.
 
     Parameters
     ----------
     ordered : (n,) float64, m
         Distances in increasing order.
     stated_m : float or None
-        What stands where values do not repeat, or show no coarser step.
+        Step to return where values do not repeat, or show no coarser step.
     """
     steps = np.diff(ordered)
     apart = steps > ROUNDING * max(-float(ordered[0]), float(ordered[-1]), 0.0)
@@ -217,12 +217,12 @@ def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
 
 
 def fourth_difference_noise(y: F8) -> float:
-    """Return the standard deviation of white noise on a smooth motion.
+    """Return the standard deviation of the white noise on a smooth motion.
 
     Parameters
     ----------
     y : (n,) float64, m
-        Equally spaced; fewer than five samples give 0.
+        Equally spaced samples; fewer than five give 0.
 
     Notes
     -----
@@ -234,7 +234,7 @@ def fourth_difference_noise(y: F8) -> float:
 
 
 def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
-    """Flag times that repeat or run behind the latest time seen so far; those judged before stay as they are."""
+    """Flag times that repeat or precede the latest time so far, except those judged already."""
     flags = np.zeros(t.size, np.uint8)
     if np.all(np.diff(t) > 0.0):
         return flags
@@ -247,16 +247,16 @@ def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
 
 
 def _least_noise(second: F8, rounding: float) -> tuple[float, bool]:
-    """Noise that a third of the fourth differences still shows, and whether even so many are not clean.
+    """Estimate noise from the smallest fourth differences, and say whether fewer than a quarter of them are clean.
 
-    From the second differences, three at least; of values in coarse steps many are 0 but for their rounding.
+    There must be at least three second differences. For values in coarse steps, many are 0 except for rounding.
 
-    A fifth of the samples being spikes leaves a third of the fourth differences clean, two fifths leave a twelfth.
+    If a fifth of the samples are spikes, a third of the fourth differences are clean; with two fifths, a twelfth.
     """
     size = np.abs(np.diff(second, 2))
     few, many = size.size // 20, size.size // 4
     ordered = np.partition(size, many)
-    ordered[:many].partition(few)  # the rest need not be looked at twice
+    ordered[:many].partition(few)  # the rest need not be partitioned again
     gain = float(FOURTH_DIFFERENCE_GAIN)
     quarter = float(ordered[many]) / (QUARTER_TO_SIGMA * gain)
     twentieth = float(ordered[few]) / (TWENTIETH_TO_SIGMA * gain)
@@ -265,28 +265,28 @@ def _least_noise(second: F8, rounding: float) -> tuple[float, bool]:
 
 
 def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
-    """Return which samples stand off the median of five around them by more than noise and curvature do."""
+    """Return which samples deviate from the median of five around them by more than noise and curvature explain."""
     if y.size < 8:
         return np.zeros(y.size, np.bool_)
     second = np.diff(y, 2)
     rounding = 1e-12 * float(np.abs(y).max())
     noise_m, flooded = _least_noise(second, rounding)
-    if noise_m <= rounding:  # most samples say what their neighbours say: single ones a step beside are no spikes
+    if noise_m <= rounding:  # most samples equal their neighbours: single ones one step off are no spikes
         half_step = 0.5 * (coarsest_step(np.sort(y), 2.0 * half_step) or 0.0)
-    # What curvature alone does: a quantile of the second differences that spikes on a fifth of the samples spare; of
-    # a cosine's second differences 0.15 lie within 0.40 of what 0.4 of them do.
+    # Effect of curvature alone: a quantile of the second differences that spikes on a fifth of the samples leave
+    # unchanged. For a cosine, the 0.15-quantile of the second differences is 0.40 times the 0.4-quantile.
     share, gain = (0.15, 2.5) if flooded else (0.4, 1.0)
     rank = int(share * second.size)
     least = sigmas * max(noise_m, half_step)
     spikes = _beyond(y, least + 5.0 * gain * float(np.partition(np.abs(second), rank)[rank]))
     if np.count_nonzero(spikes) > 0.05 * y.size:
-        # A bob that has nearly come to rest does not show the curvature at the start: each part is taken alone.
+        # Where the bob has nearly come to rest, the curvature is less than at the start: take each block by itself.
         blocks = second[: second.size // BLOCK * BLOCK].reshape(-1, BLOCK)
         if blocks.size and np.count_nonzero(
             local := _beyond(y, least + 5.0 * gain * _curvature(blocks, share, y.size))
         ) < 0.5 * np.count_nonzero(spikes):
             return local
-        # So many come in runs too, which a median of five believes; but hardly any lie within the motion.
+        # So many spikes also come in runs, which a median of five follows; but few of them lie within the motion.
         middle = float(np.median(y[~spikes]))
         reach = 3.0 * mad_sigma(y[~spikes] - middle)
         spikes |= np.abs(y - middle) > reach
@@ -294,14 +294,14 @@ def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
 
 
 def _curvature(blocks: F8, share: float, size: int) -> F8:
-    """(size,): for each sample that quantile of the second differences (b, k) of the block that it lies in."""
+    """Return (size,): a quantile of the second differences (b, k) in each sample's block."""
     rank = int(share * blocks.shape[1])
     each = np.partition(np.abs(blocks), rank, axis=1)[:, rank]
     return np.asarray(each[np.minimum(np.arange(size) // blocks.shape[1], each.size - 1)])
 
 
 def _beyond(y: F8, bound: float | F8) -> NDArray[np.bool_]:
-    """Return which samples stand off the median of five around them by more than a bound."""
+    """Return which samples deviate from the median of five around them by more than a bound."""
     spikes = np.zeros(y.size, np.bool_)
     smooth = y
     for _ in range(4):
@@ -309,7 +309,7 @@ def _beyond(y: F8, bound: float | F8) -> NDArray[np.bool_]:
         found = np.flatnonzero(away > bound)
         if not found.size:
             break
-        # On a slope a spike shifts its neighbours' medians by a step: take the worst out and look again.
+        # On a slope a spike shifts its neighbours' medians by a step: remove the worst and search again.
         near = np.clip(found[:, None] + np.arange(-2, 3), 0, y.size - 1)
         worst = found[away[found] >= away[near].max(axis=1)]
         spikes[worst] = True
@@ -322,22 +322,23 @@ def _beyond(y: F8, bound: float | F8) -> NDArray[np.bool_]:
 
 
 def _off_median(y: F8) -> F8:
-    # Continued as point reflections, so that a slope at either end looks like a slope.
+    # Both ends are extended by point reflection, which continues a slope.
     first, last = _end(y[:5]), _end(y[:-6:-1])
     padded = np.concatenate([2.0 * first - y[2:0:-1], y, 2.0 * last - y[-2:-4:-1]])
     return np.abs(y - _median_of_five(*(padded[i : i + y.size] for i in range(5))))
 
 
 def _end(y: F8) -> float:
-    """The first of five samples, or what two of the others continue to where it stands off both."""
+    """Return the median of the first of five samples and two linear extrapolations to it."""
     first, second, third, fifth = float(y[0]), float(y[1]), float(y[2]), float(y[4])
     return sorted((first, 2.0 * second - third, 2.0 * third - fifth))[1]
 
 
 def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
-    """Median of five arrays element by element, computed only from minima and maxima.
+    """Return the elementwise median of five arrays, computed only from minima and maxima.
 
-    Of 12,000 samples in 0.15 ms; scipy.ndimage's filter takes 0.3 ms and 0.2 s to import, numpy's median 1.4 ms.
+    It takes 0.15 ms for 12,000 samples; scipy.ndimage's filter takes 0.3 ms plus 0.2 s to import, numpy's median
+    1.4 ms.
     """
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
     high = np.minimum(np.maximum(a, b), np.maximum(c, d))
@@ -345,17 +346,17 @@ def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
 
 
 def _visits(y: F8, band: NDArray[np.bool_], low: float) -> int:
-    """How often the motion comes to the band from below ``low``; a bob that settles there comes once."""
+    """Count how often the motion enters the band from below ``low``; a bob that settles there enters once."""
     state = np.where(band, 1, np.where(y < low, -1, 0))
     known = state[state != 0]
     return int(np.count_nonzero((known[1:] > 0) & (known[:-1] < 0))) + int(known[0] > 0)
 
 
 def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float, float, NDArray[np.int64]]:
-    """Find a clipped plateau at the upper end of ``y``, which ``ordered`` holds in increasing order.
+    """Find a clipped plateau at the upper end of ``y``; ``ordered`` contains its values in increasing order.
 
-    A clipped record piles samples into a band a few sigma wide with almost none above and few beneath; an
-    unclipped crest thins out as the square root of the depth below it.
+    A clipped record has many samples in a band a few sigma wide, with almost none above it and few beneath. For an
+    unclipped crest, the number of samples grows as the square root of the depth below the crest.
     """
     none = np.empty(0, np.int64)
     low, high = ordered[0], ordered[-1]
@@ -367,7 +368,7 @@ def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float
     first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
     upper = ordered[first:]
     few = math.ceil(max(0.02 * y.size, 8))
-    # Bands that begin at these hold enough.
+    # Bands that begin at these indices contain enough samples.
     starts = np.flatnonzero(upper[few - 1 :] <= upper[: max(upper.size - few + 1, 0)] + width)
     if not starts.size:
         return 0.0, 0.0, none
@@ -384,13 +385,13 @@ def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float
     starts, stops = edges[::2], edges[1::2]
     if np.median(stops - starts) < 3 or _visits(y, band, bottom - 3.0 * width) < 2:
         return 0.0, 0.0, none
-    # Heavy tails of the noise stand above the band and belong to the plateau all the same.
+    # Samples in heavy tails of the noise lie above the band but still belong to the plateau.
     members = np.flatnonzero(y >= bottom)
     return float(np.median(y[band])), float(bottom), members
 
 
 def _saturated(y: F8, ordered: F8, contrast: float) -> float | None:
-    """The value at which a sensor that saturates after its noise piles up the top samples, if it does."""
+    """Return the value at which a sensor clips its noisy signal at the top, or None where it does not."""
     few = max(int(0.02 * y.size), 8)
     level = float(ordered[-max(few // 2, 1)])
     first, last = np.searchsorted(ordered, level), np.searchsorted(ordered, level, side="right")

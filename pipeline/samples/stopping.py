@@ -1,4 +1,4 @@
-"""Stopping: where a bob comes to rest and stays at rest."""
+"""Stopping: the time at which a bob comes to rest and stays at rest."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from pipeline.track import F8
 
 __all__ = ["moving_part", "stop_row"]
 
-BLOCK = 25  # samples over which a bob is seen to move or not
+BLOCK = 25  # samples over which a bob is judged to be moving or at rest
 
 
 def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
-    """Return the record up to where its bob stops; None where it moves for a share of the samples, or never.
+    """Return the record up to the bob's stop; None if the bob moves for a stated share of the samples, or never.
 
-    A bob that friction stops early leaves a record in whose spectrum the oscillation drowns.
+    If friction stops a bob early, the noise of the long rest hides the oscillation in the record's spectrum.
 
     Parameters
     ----------
     conditioned : Conditioned
     share : float
-        Of the samples used.
+        Share of the samples used; a record whose bob moves for at least this share is kept whole.
     """
     if (stop := stop_row(conditioned)) is None:
         return None
@@ -37,7 +37,7 @@ def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
 
 
 def stop_row(conditioned: Conditioned) -> int | None:
-    """Return the index of the sample from which on the bob rests; None where it moves to the end, or never.
+    """Return the index of the first sample at rest; None if the bob moves to the end, or never.
 
     Parameters
     ----------
@@ -50,19 +50,19 @@ def stop_row(conditioned: Conditioned) -> int | None:
         return None
     y, blocks = conditioned.track.y, rows[: count * BLOCK].reshape(-1, BLOCK)
     end = median(y[blocks[-max(count // 10, 2) :]].ravel())
-    # Of a sensor that counts, distances are whole steps: two of them are two in every unit, however that rounds.
+    # With a quantised sensor, distances are whole steps: the margin lets two steps pass as two despite rounding.
     least = (2.0 + 1e-6) * noise
-    # Most bobs move at the end of their record, and the last blocks say so.
+    # Most bobs still move at the end of their record, and the last blocks show it.
     if _away(y[blocks[-4:]], end).max() > least:
         return None
     moving = np.flatnonzero(_away(y[blocks], end) > least)
-    # A few blocks that deep noise lifts are no motion: of those before the stop a share must stand off.
+    # A few blocks raised by strong noise are no motion: of the blocks before the stop, a minimum share must move.
     if moving.size < 3 or moving.size < 0.3 * (moving[-1] + 1):
         return None
     return int(blocks[int(moving[-1]) + 2, 0])
 
 
 def _away(blocks: F8, end: float) -> F8:
-    """Median distance of each block's samples from where the record ends, m."""
-    # The middle one of an odd number; the library's median takes ten times as long for a few blocks.
+    """Return the median distance of each block's samples from the record's final value, m."""
+    # The middle value of an odd number; the library's median takes ten times as long for a few blocks.
     return np.asarray(np.partition(np.abs(blocks - end), BLOCK // 2, axis=1)[:, BLOCK // 2])

@@ -1,5 +1,5 @@
 """Windows: the period, and amplitude, phase and rest position once per period.
 
-The room holds the spectrum's first period, the demodulation in windows, second modes, and the search for the part of a
-recording in which the bob moves freely.
+The room contains the first estimate of the period from the spectrum, the demodulation in windows and the search for
+second modes. It also finds the part of a recording in which the bob moves freely.
 """

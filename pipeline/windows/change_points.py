@@ -1,4 +1,4 @@
-"""Change points: where a series of windows jumps, by a test of stated probability of a false alarm."""
+"""Change points: jumps in a series of windows, found by a test with a stated false-alarm probability."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ class Params:
     Parameters
     ----------
     false_alarm : float
-        Probability that a smooth series shows a jump anywhere: Bonferroni's bound over all places tried.
+        Probability that a jump is found anywhere in a smooth series: Bonferroni's bound over all points tested.
     lengths : tuple of int
-        Points in an interval, in ascending order. Doubling loses less than a tenth of the power between two lengths
-        [1]_. Fewer than 8 leave no degrees of freedom; over more than 32 periods drag and drift are no cubics.
+        Numbers of points in an interval, in ascending order. Lengths that double lose less than a tenth of the power
+        between two lengths [1]_. Fewer than 8 points leave no degrees of freedom. Over more than 32 periods, drag and
+        drift are no longer cubic.
     undisturbed : float
-        Share of the intervals that no jump disturbs at least; the scatter of these is the usual one.
+        Minimum share of the intervals without a jump; the scatter of these intervals is taken as typical.
     apart : int
-        Fewest points between an interval's end and a jump within it, so that two bad windows are none; a quarter
-        of the interval if that is less. At the ends of the series one is enough.
+        Minimum number of points between an interval's end and a jump within it, so that two bad windows do not count
+        as a jump. It is a quarter of the interval if that is less. At the ends of the series one point is enough.
 
     References
     ----------
@@ -54,9 +55,9 @@ class Change:
     Parameters
     ----------
     index : int
-        First point after it.
+        Index of the first point after the jump.
     false_alarm : float
-        Probability that a smooth series shows as much anywhere.
+        Probability that a smooth series shows a jump as significant anywhere.
     """
 
     index: int
@@ -69,7 +70,7 @@ def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Cha
     Parameters
     ----------
     t : (n,) float64, s
-        In ascending order.
+        Times in ascending order.
     y, u : (m, n) float64
         Components and their standard uncertainties, independent of each other.
     params : Params, optional
@@ -81,19 +82,19 @@ def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Cha
     Notes
     -----
     In an interval of L points each component is a polynomial with a jump at point k,
-    :math:`y_j = p(t_j) + h\\,[j \\ge k]`, p a cubic, in the shortest intervals a parabola. In all m components together
-    a jump lowers chi-square by G(k) to X(k), which leaves :math:`\\nu` degrees of freedom:
+    :math:`y_j = p(t_j) + h\\,[j \\ge k]`, where p is a cubic, or a parabola in the shortest intervals. A jump in all m
+    components together lowers chi-square by G(k) to X(k), with :math:`\\nu` remaining degrees of freedom:
 
     .. math:: F = \\frac{G/m}{\\max(1, X/\\nu)\\,\\lambda}, \\qquad \\lambda = \\frac{1 + \\rho}{1 - \\rho},
 
-    with the correlation :math:`\\rho \\ge 0` of neighbouring residuals. So points that scatter more than stated, that
-    remember, or that bend otherwise than p count as fewer. F is compared with the quantile of Fisher's distribution of
-    m and :math:`\\nu/\\lambda` degrees of freedom at ``false_alarm`` over the number of places tried: Bonferroni's
-    bound, for normal noise of unknown size, and on the safe side where its size is known.
+    with the correlation :math:`\\rho \\ge 0` of neighbouring residuals. So points with more scatter than stated, with
+    correlation, or with a curve that p cannot follow carry less weight. F is compared with the quantile of the F
+    distribution with m and :math:`\\nu/\\lambda` degrees of freedom, at ``false_alarm`` over the number of tests.
+    This is Bonferroni's bound for normal noise of unknown variance; it is conservative where the variance is known.
 
-    The intervals are seeded ones [1]_, each length at steps of a quarter of itself. The series is parted at the
-    strongest jump of the shortest length that shows any (narrowest over threshold [2]_): a short interval has one
-    jump at most, and the polynomial is nearly right there. Then the search goes on in both parts.
+    The intervals are seeded [1]_: intervals of each length begin a quarter of this length apart. The series is split at
+    the strongest jump of the shortest length that shows any (narrowest over threshold [2]_). A short interval contains
+    at most one jump, and the polynomial is nearly exact there. Then the search continues in both parts.
 
     References
     ----------
@@ -126,7 +127,7 @@ def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Cha
                 found[index] = change.false_alarm
                 parts += [(first, index), (index, stop)]
                 break
-    # A single point between two jumps holds one jump: before it or after it is the same.
+    # Two jumps with a single point between them are one jump, whose side of the point is arbitrary.
     for index in sorted(found):
         if index + 1 in found:
             found[index + 1] = min(found.pop(index), found[index + 1])
@@ -134,20 +135,21 @@ def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Cha
 
 
 def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
-    """Return (n,): points far off, which clusters of echoes pull or which hold a jump; the first and last two are none.
+    """Return (n,) bool: True for single outliers, caused by clusters of echoes or by a jump within a window.
 
     Parameters
     ----------
     y, u : (m, n) float64
         Components and their standard uncertainties.
     false_alarm : float
-        Probability, at the most, that noise makes any point one.
+        Maximum probability that noise makes any point an outlier.
 
     Notes
     -----
-    Neither what lies between its neighbours nor what the two before or the two after continue to comes near such a
-    point. Of n normal deviations in two components the greatest has :math:`r > \\sqrt{2 \\ln(n/\\alpha)}` with
-    probability :math:`\\alpha`; a mean of two neighbours adds half of the variance.
+    Such a point lies far from interpolations between its neighbours and from extrapolations of the two points before or
+    after it. The first and last two points are never outliers. The maximum of n normal deviations in two components
+    exceeds :math:`\\sqrt{2 \\ln(n/\\alpha)}` with probability :math:`\\alpha`. A mean of two neighbours adds half the
+    variance.
     """
     if y.shape[1] < 5:
         return np.zeros(y.shape[1], np.bool_)
@@ -160,12 +162,12 @@ def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
 
 
 def _starts(size: int, length: int) -> I8:
-    """First points of the intervals of a length: at steps of a quarter of it, and the last ones."""
+    """Return the first points of the intervals of a length: a quarter of it apart, and one at the end."""
     return np.unique(np.append(np.arange(0, size - length + 1, length // 4), size - length))
 
 
 def _strongest(t: F8, y: F8, u: F8, length: int, params: Params, trials: int) -> Change | None:
-    """The strongest jump within the intervals of one length, if any is significant."""
+    """Return the strongest jump within the intervals of one length, or None if none is significant."""
     starts = _starts(t.size, length)
     rows = starts[:, None] + np.arange(length)
     x = t[rows]
@@ -183,7 +185,7 @@ def _strongest(t: F8, y: F8, u: F8, length: int, params: Params, trials: int) ->
     place = np.argmax(statistic, axis=1)
     highest = np.max(statistic, axis=1)
     best: tuple[float, Change] | None = None
-    # No quantile of F is below that of chi-square; hardly any record without a jump needs scipy's.
+    # No quantile of F is below that of chi-square; few records without a jump need scipy's exact quantile.
     if m * float(highest.max()) < NormalDist().inv_cdf(0.5 * params.false_alarm / trials) ** 2:
         return None
     for i in np.flatnonzero(highest > _threshold(m, dof, params.false_alarm / trials)).tolist():
@@ -200,11 +202,11 @@ def _strongest(t: F8, y: F8, u: F8, length: int, params: Params, trials: int) ->
 
 
 def _scatter(t: F8, y: F8, u: F8, params: Params) -> dict[int, F8]:
-    """By the length of an interval, (m, n): u with what a polynomial of that length misses all along.
+    """Return, by interval length, (m, n): u plus the typical misfit of a polynomial, added in quadrature.
 
-    A series that wobbles all along, as one with a second mode does, jumps nowhere, though it wobbles most somewhere.
-    A jump lies in L/(n - L) of the intervals of length L: in two thirds of them or fewer if the series is 2.5 L long.
-    A shorter series takes the excess of the next shorter length.
+    A series that fluctuates throughout, for example with a second mode, has no jump, although its fluctuations have a
+    maximum. A jump lies in L/(n - L) of the intervals of length L: in at most two thirds of them if the series has at
+    least 2.5 L points. A shorter series takes the excess of the next shorter length.
     """
     excess = np.zeros((len(y), 1))
     found = {}
@@ -224,15 +226,15 @@ def _scatter(t: F8, y: F8, u: F8, params: Params) -> dict[int, F8]:
 
 
 def _degree(length: int) -> int:
-    """Of the polynomials in intervals of a length."""
+    """Return the degree of the polynomials in intervals of a length."""
     return 3 if length > 10 else 2
 
 
 def _orthonormal(columns: list[F8]) -> list[F8]:
-    """Columns (..., length) made orthonormal along their last axis, one after another."""
+    """Orthonormalise columns (..., length) along their last axis, one after another."""
     basis: list[F8] = []
     for column in columns:
-        for _ in range(2):  # twice, so that rounding leaves nothing where weights differ by much
+        for _ in range(2):  # twice, to remove rounding errors where weights differ much
             for before in basis:
                 column = column - np.sum(before * column, axis=-1, keepdims=True) * before
         basis.append(column / np.linalg.norm(column, axis=-1, keepdims=True))
@@ -240,13 +242,13 @@ def _orthonormal(columns: list[F8]) -> list[F8]:
 
 
 def _gains(weight: F8, basis: list[F8], left: F8) -> F8:
-    """(intervals, length): by how much a jump before each point lowers chi-square.
+    """Return (intervals, length): the amount by which a jump before each point lowers chi-square.
 
-    Sums from the end on give what a step there has in common with the residuals and with the basis.
+    Cumulative sums from the end give the scalar products of each step with the residuals and with the basis.
     """
     total = _from_end(weight**2)
     own = total - sum(_from_end(weight * column) ** 2 for column in basis)
-    # What the polynomial can be as well, to rounding, is no jump.
+    # A step that the polynomial can represent to rounding is no jump.
     own = np.where(own > 1e-9 * total[:, :, :1], own, np.inf)
     return np.asarray(np.sum(_from_end(weight * left) ** 2 / own, axis=0))
 
@@ -256,7 +258,7 @@ def _from_end(values: F8) -> F8:
 
 
 def _allowed(starts: I8, length: int, size: int, apart: int) -> NDArray[np.bool_]:
-    """(intervals, length): whether to test for a jump before each point; at an end of the series one point suffices."""
+    """Return (intervals, length): whether to test a jump before a point; one point suffices at the series' ends."""
     k, apart = np.arange(length), min(apart, length // 4)
     first = np.where(starts == 0, 1, apart)[:, None]
     last = np.where(starts + length == size, length - 1, length - apart)[:, None]
@@ -268,7 +270,7 @@ def _residual(design: F8, y: F8) -> F8:
 
 
 def _correlation(residuals: list[F8]) -> float:
-    """Points that count as one, from what neighbouring residuals have in common."""
+    """Return the number of points that count as one, from the correlation of neighbouring residuals."""
     both = sum(float(each[1:] @ each[:-1]) for each in residuals)
     rho = both / max(sum(float(each @ each) for each in residuals), 1e-300)
     return (1.0 + rho) / (1.0 - rho) if rho > 0.0 else 1.0

@@ -1,7 +1,7 @@
-"""Clipping: crests that a fixed object or a lost target cuts, left out by the motion that the middle of a swing shows.
+"""Clipping: crests cut off by a fixed object or a lost target, found by comparison with the middle of the swing.
 
-A level plateau shows in the distances alone (:mod:`pipeline.samples.condition`). One that wanders from crest to crest,
-lies at both ends or goes with the first cycles does not: it shows against the middle of the swing.
+A level plateau shows in the distances alone (:mod:`pipeline.samples.condition`). A plateau that changes from crest to
+crest, lies at both ends or ends after the first cycles does not; it shows in comparison with the middle of the swing.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from pipeline.windows.sinusoids import Windows, refit, solve
 
 __all__ = ["Params", "find_cuts"]
 
-LEVELS = 40  # heights tried for the level, from the middle of the swing to its top
-LEAST_SAMPLES = 3  # of a crest, for a median
-FAR_OFF = 5.0  # standard deviations beyond which a sample is a false echo: one normal deviation in two million
-SHARE_BEYOND = 0.05  # of the samples of a plateau that lie below the level from which on they are left out
-SETTLING, ROUNDS = 8, 11  # fits until the middle of the swing is free of what the crests made of the first; of all
+LEVELS = 40  # number of heights tried for the level, from the middle of the swing to its top
+LEAST_SAMPLES = 3  # samples of a crest needed for a median
+FAR_OFF = 5.0  # residual of a false echo in standard deviations: exceeded by one normal deviation in two million
+SHARE_BEYOND = 0.05  # share of a plateau's samples below the level beyond which samples are left out
+SETTLING, ROUNDS = 8, 11  # fits until the cut crests no longer affect the middle of the swing; fits in all
 
 Bools = NDArray[np.bool_]
 
@@ -38,16 +38,16 @@ class Params:
     Parameters
     ----------
     false_alarm : float
-        Probability that crests of an uncut motion in white noise fall short by so much at either end.
+        Probability that the crests of an uncut motion in white noise appear to be cut at either end.
     each : float
-        Standard uncertainties by which three quarters of the crests have to fall short, each by itself: one in twenty
-        of those that are not cut does. Clusters of echoes come at some crests and not at others.
+        Shortfall that each of three quarters of the crests must have, in standard uncertainties. One in twenty uncut
+        crests has it. Clusters of echoes occur at some crests only.
     least_crests : int
-        Fewer than that may be struck by echoes one after another.
+        Minimum number of crests; echoes may strike fewer in succession.
     middle : float
-        Of the amplitude: what lies within is not cut, so that the sinusoid is known.
+        Fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted.
     crest : float
-        Of the amplitude: the crest lies beyond, within 30 degrees of the turning point.
+        Fraction of the amplitude beyond which the crest lies: within 30 degrees of the turning point.
     """
 
     false_alarm: float = 1e-3
@@ -59,10 +59,10 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """Every window's sinusoid.
+    """The sinusoids of all windows.
 
-    ``rest`` and ``amplitude`` (w,), m; ``model``, ``residual`` and the model's uncertainty over the samples' ``u``
-    (w, l), m, m, 1; ``judged`` (w, l): samples that may be judged.
+    ``rest`` and ``amplitude`` (w,) are in m. ``model`` and ``residual`` (w, l) are in m; ``u`` (w, l) is the model's
+    uncertainty over that of a sample. ``judged`` (w, l) is True for samples that may be judged.
     """
 
     rest: F8
@@ -73,13 +73,13 @@ class _Fit:
     judged: Bools
 
     def height(self, sign: float) -> F8:
-        """(w, l): how far towards an end the model goes, over its amplitude."""
+        """Return (w, l): the model's displacement towards an end, over its amplitude."""
         return np.asarray(sign * (self.model - self.rest[:, None]) / self.amplitude[:, None])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _End:
-    """The first windows' crests are cut at one end, from a distance on, m, times the end's sign."""
+    """One end at which the crests of the first windows are cut beyond a level: distance times the end's sign, m."""
 
     sign: float
     level: float
@@ -89,26 +89,26 @@ class _End:
 def find_cuts(
     conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated, params: Params | None = None
 ) -> Conditioned | None:
-    """Return the record with every crest flagged that is cut, or None where none shows beyond what is flagged already.
+    """Return the record with every cut crest flagged, or None if no cuts show beyond those flagged already.
 
     Parameters
     ----------
     conditioned, cycles, demodulated
-        Outputs of the stages of those names.
+        Outputs of the stages with these names.
     params : Params, optional
 
     Notes
     -----
-    Every window's sinusoid is fitted to the middle of its swing. With :math:`z_j` by how many standard uncertainties
-    the median of crest j falls short of it, crests are cut from the first to the n-th where
-    :math:`\\sum_{j \\le n} z_j/\\sqrt n` is greatest, if that exceeds what noise does at any n with probability
-    ``false_alarm`` (Bonferroni's bound): a bob that loses its amplitude reaches a fixed object first and then no more.
+    Every window's sinusoid is fitted to the middle of its swing. Let :math:`z_j` be the shortfall of the median of
+    crest j in standard uncertainties. Crests 1 to n are cut if n maximises :math:`\\sum_{j \\le n} z_j/\\sqrt n` and
+    this exceeds what noise reaches at any n with probability ``false_alarm`` (Bonferroni's bound). The first crests are
+    taken because a bob with decaying amplitude reaches a fixed object at first and later no longer.
 
-    Beyond its level l a fixed object takes all of the way, :math:`\\max(0, h - l)` at height h. The level is the one
-    that leaves least, and it must leave less than :math:`c_2 h^2 + c_3 h^3`, as which a bent scale or another shape of
-    the motion shows beside a sinusoid through its middle. Samples are left out where the model lies beyond what
-    nineteen in twenty of those on the plateau lie beyond, and one on either side, whatever they say themselves: that
-    brings no bias.
+    A fixed object removes the motion beyond its level l, so the shortfall is :math:`\\max(0, h - l)` at height h. The
+    level l minimises the residual, which must be less than that of :math:`c_2 h^2 + c_3 h^3`. The latter describes a
+    non-linear scale or a motion that is not sinusoidal. Samples are left out where the model lies beyond the limit that
+    nineteen in twenty samples on the plateau exceed, with one more sample on either side. The model selects them, not
+    their own values, so this causes no bias.
     """
     params = params or Params()
     least_m = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
@@ -145,7 +145,7 @@ def find_cuts(
 
 
 def _of_windows(windows: Windows, demodulated: Demodulated) -> _Fit:
-    """The fits that went through the crests too: they still leave them off by a third of what they fall short by."""
+    """Return the fits that include the crests; their residuals still show a third of the shortfall."""
     residual = np.nan_to_num(demodulated.residual[windows.rows])
     rest, amplitude = (
         np.interp(windows.centre, demodulated.t, x) for x in (demodulated.offset, np.abs(demodulated.amplitude))
@@ -155,7 +155,7 @@ def _of_windows(windows: Windows, demodulated: Demodulated) -> _Fit:
 
 
 def _fitted(windows: Windows, basis: F8, inside: Bools, least: float) -> tuple[_Fit, float]:
-    """Every window's sinusoid through some of its samples, false echoes left out, and the noise about it, m."""
+    """Fit every window's sinusoid to selected samples without false echoes; return it and the noise, m."""
     usable = windows.usable > 0
     solution = solve(basis, (inside & usable).astype(np.float64))
     sigma = max(least, mad_sigma(solution.residual[inside & usable & solution.good[:, None]]))
@@ -169,7 +169,7 @@ def _fitted(windows: Windows, basis: F8, inside: Bools, least: float) -> tuple[_
 
 
 def _cut_windows(fit: _Fit, sign: float, sigma: float, params: Params) -> int:
-    """Number of windows from the first on whose crests fall short, 0 where noise may do that."""
+    """Return the number of first windows whose crests are cut; 0 if noise can explain the shortfall."""
     crest = fit.judged & (fit.height(sign) > params.crest)
     count = crest.sum(axis=1)
     rows = np.flatnonzero(count >= LEAST_SAMPLES)
@@ -190,7 +190,7 @@ def _cut_windows(fit: _Fit, sign: float, sigma: float, params: Params) -> int:
 
 
 def _end(fit: _Fit, sign: float, sigma: float, params: Params) -> _End | None:
-    """Where the motion is cut at one end, if it is."""
+    """Return the level and the windows of a cut at one end, or None if the motion is not cut there."""
     n = _cut_windows(fit, sign, sigma, params)
     outer = fit.judged[:n] & (fit.height(sign)[:n] > params.middle)
     if np.count_nonzero(outer) < LEAST_SAMPLES:
@@ -210,7 +210,7 @@ def _end(fit: _Fit, sign: float, sigma: float, params: Params) -> _End | None:
 
 
 def _beyond(fit: _Fit, ends: list[_End]) -> Bools:
-    """(w, l): where the model lies beyond the level at which the motion is cut, or one sample from there."""
+    """Return (w, l): whether the model at a sample or its neighbour lies beyond the level of a cut."""
     beyond = np.zeros(fit.model.shape, np.bool_)
     for end in ends:
         beyond[: end.windows] |= (end.sign * fit.model > end.level)[: end.windows]
@@ -229,7 +229,7 @@ def _described(end: _End, fit: _Fit, windows: Windows, conditioned: Conditioned,
 
 
 def _median_of_rows(values: F8, chosen: Bools) -> F8:
-    """(w,): the median of the values chosen in each row, one at least."""
+    """Return (w,): the median of the chosen values in each row; at least one must be chosen."""
     ordered = np.sort(np.where(chosen, values, np.inf), axis=1)
     rows, count = np.arange(len(ordered)), chosen.sum(axis=1)
     return np.asarray(0.5 * (ordered[rows, (count - 1) // 2] + ordered[rows, count // 2]))

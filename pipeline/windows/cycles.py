@@ -1,4 +1,4 @@
-"""Cycles: is there an oscillation, at which frequency, and where does each window of whole periods begin."""
+"""Cycles: whether there is an oscillation, its frequency, and where each window of whole periods begins."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from pipeline.numerics.quantity import amount, noun
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-FEW_PERIODS = 4.5  # below which the spectrum's peak is displaced by the line's own image
-HOLE = 8.0  # sample intervals without a sample that make a hole
-LONG = 0.05  # of the record without a usable sample: a hole too
-MOSTLY_HOLES = 0.2  # share of the record beyond which straight lines over holes would be seen for a motion
-SHORTFALL = 0.05  # periods by which a record of one and a half may be misjudged
+FEW_PERIODS = 4.5  # periods below which the line's negative-frequency image shifts the spectrum's peak
+HOLE = 8.0  # length from which a gap counts as a hole, sample intervals
+LONG = 0.05  # fraction of the record without a usable sample that counts as a hole too
+MOSTLY_HOLES = 0.2  # fraction of holes in the record beyond which straight lines across them would pass for a motion
+SHORTFALL = 0.05  # tolerance of the minimum of one and a half periods, periods
 
 __all__ = ["Cycles", "NoOscillation", "Params", "find_cycles"]
 
@@ -29,12 +29,12 @@ class Params:
     Parameters
     ----------
     samples_per_window : int
-        Fewest samples that a window may hold; windows span as many whole periods as that takes.
+        Minimum number of samples in a window; windows span as many whole periods as this needs.
     u_phase : float
-        Standard uncertainty to which noise lets a window know its phase, rad; windows span as many whole periods as
-        that takes, so that phases can be unwrapped at any signal-to-noise ratio.
+        Maximum standard uncertainty of a window's phase due to noise, rad. Windows span as many whole periods as this
+        needs, so that phases can be unwrapped at any signal-to-noise ratio.
     most_windows : int
-        Longer records have longer windows, not more of them.
+        Maximum number of windows; longer records have longer windows, not more of them.
     false_alarm : float
         Probability that pure white noise is taken for an oscillation.
     """
@@ -47,18 +47,18 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cycles:
-    """The oscillation's start values.
+    """Initial values for the oscillation.
 
     Parameters
     ----------
     frequency_hz : float
-        From the spectrum's peak, good to a few thousandths.
+        Frequency of the spectrum's peak, accurate to a few thousandths.
     count : float
-        Periods in the record.
+        Number of periods in the record.
     bounds : (w + 1,) int64
-        Sample indices at which the windows begin, and the end of the last.
+        Sample indices at which the windows begin, and the end of the last window.
     periods : int
-        That a window spans.
+        Number of periods in a window.
     """
 
     frequency_hz: float
@@ -69,14 +69,14 @@ class Cycles:
 
 @dataclass(frozen=True, slots=True)
 class NoOscillation:
-    """Why a record is taken to hold no oscillation.
+    """The reason why no oscillation was found in a record.
 
     Parameters
     ----------
     why : str
-        One sentence.
+        Reason, in one sentence.
     code : str
-        Of the finding that says so.
+        Code of the finding that states it.
     """
 
     why: str
@@ -84,7 +84,7 @@ class NoOscillation:
 
 
 def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycles | NoOscillation:
-    """Find the oscillation's frequency and cut the record into windows of whole periods, one if noise permits.
+    """Find the oscillation's frequency and cut the record into windows of one period or, with noise, several.
 
     Parameters
     ----------
@@ -94,19 +94,19 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     Returns
     -------
     Cycles or NoOscillation
-        The latter says why: nothing moves, no peak stands out of the noise, or under 1.5 periods were seen.
+        The latter states the reason: nothing moves, no peak exceeds the noise, or the record spans under 1.5 periods.
 
     Notes
     -----
-    The spectrum is a Hann-windowed, zero-padded periodogram of the detrended record with flagged samples bridged
-    by straight lines, or by the mean where holes make up a fifth of it; the peak is interpolated by a parabola
-    through the logarithms [1]_. For white noise the ratio of a bin to the mean is exponentially distributed, so the
-    largest of n exceeds :math:`\\ln(n/\\alpha)` with probability :math:`\\alpha`. A line too weak for that
-    is looked for once more without the window, which costs 1.8 dB. Under four periods the peak is off by up to a tenth:
-    there the frequency is the one at which a sinusoid with an offset leaves least.
+    The spectrum is a Hann-windowed, zero-padded periodogram of the detrended record. Straight lines bridge flagged
+    samples; where holes make up more than a fifth of the record, the mean fills them. The peak is interpolated by a
+    parabola through the logarithms [1]_. For white noise the ratio of a bin to the mean is exponentially distributed,
+    so the largest of n exceeds :math:`\\ln(n/\\alpha)` with probability :math:`\\alpha`. If no line is found,
+    the search is repeated without the Hann window, which costs 1.8 dB. Below 4.5 periods the peak is off by up to a
+    tenth. There the frequency is the one at which the residual of a sinusoid with an offset is smallest.
 
-    A window of N samples knows its phase to :math:`\\sqrt{2/N}\\,\\sigma/A`; it spans as many periods as bring that to
-    ``u_phase``.
+    The phase of a window of N samples has the standard uncertainty :math:`\\sqrt{2/N}\\,\\sigma/A`. The window spans as
+    many periods as are needed to bring this down to ``u_phase``.
 
     References
     ----------
@@ -144,20 +144,20 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
 def _spectral_line(
     t: F8, y: F8, recorded: F8, rate_hz: float, false_alarm: float
 ) -> tuple[float, float] | NoOscillation:
-    """Frequency, Hz, and mean amplitude, m, of the strongest line."""
+    """Return the frequency, Hz, and mean amplitude, m, of the strongest line."""
     n = max(round(float(t[-1] - t[0]) * rate_hz) + 1, 8)
     if n > 50 * t.size:
         return NoOscillation(f"{t.size} samples are spread over {n} sample intervals: too thin to find a period")
     ordinal = np.arange(n, dtype=np.float64)
     grid = t[0] + ordinal / rate_hz
-    # Times that are equally spaced but for rounding need no interpolation.
+    # Times that are equally spaced except for rounding need no interpolation.
     regular = t.size == n and float(np.abs(t - grid).max()) <= 1e-9 / rate_hz
     values = y if regular else _bridged(grid, t, y, recorded, HOLE / rate_hz)
     centred = ordinal - 0.5 * (n - 1)
     values = values - values.sum() / n
     values -= centred * (float(centred @ values) / float(centred @ centred))
     threshold = math.log(n / false_alarm)
-    # Without a window lines are narrow, and between two bins one may be lost: they must lie closer.
+    # Without the Hann window lines are narrow and may be lost between two bins, so the bins must be closer.
     for taper, finer in ((_hann, 1), (np.ones, 4)):
         window = taper(n)
         frequency_hz, power, ratio = _peak(values * window, rate_hz, finer)
@@ -168,18 +168,18 @@ def _spectral_line(
 
 @functools.lru_cache(2)
 def _hann(n: int) -> F8:
-    """The window of n samples: the runs of a course are of one length."""
+    """Return the Hann window of n samples; it is cached, because the runs of a course have the same length."""
     window = np.hanning(n)
     window.setflags(write=False)
     return window
 
 
 def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:
-    """Return samples at the times of a grid: by straight lines, by their mean where mostly nothing was recorded."""
+    """Interpolate samples linearly at the times of a grid; if holes are a large part, fill them with the mean."""
     values = np.asarray(np.interp(grid, t, y))
     latest = np.maximum.accumulate(recorded[np.isfinite(recorded)])
     seconds = float(latest[-1] - latest[0])
-    # Rows without a sample make a hole only where it is no part of every period.
+    # Rows without a usable sample form a hole only where they last longer than the gaps that recur every period.
     for times, longest in ((latest, hole_s), (np.maximum.accumulate(t), max(hole_s, LONG * seconds))):
         step = np.diff(times)
         if float(step[step > longest].sum()) > MOSTLY_HOLES * seconds:
@@ -189,14 +189,14 @@ def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:
 
 
 def _peak(values: F8, rate_hz: float, finer: int) -> tuple[float, float, float]:
-    """Frequency, Hz, and power of the highest peak, and its ratio to the floor."""
+    """Return the frequency, Hz, and power of the highest peak, and its ratio to the noise floor."""
     n = values.size
     size = finer << (n - 1).bit_length()
     line = np.fft.rfft(values, size)
     power = line.real**2 + line.imag**2
     least = max(1, math.floor(size / n))  # slower than one period per record is drift
     k = least + int(np.argmax(power[least:-1]))
-    # What lies outside the peak's neighbourhood stands for the floor.
+    # The noise floor is estimated outside the peak's neighbourhood.
     reach = 4 * math.ceil(size / n)
     below, above = power[least : max(k - reach, least)], power[k + reach :]
     floor = float(below.sum() + above.sum()) / max(below.size + above.size, 1)
@@ -208,7 +208,7 @@ def _peak(values: F8, rate_hz: float, finer: int) -> tuple[float, float, float]:
 
 
 def _least_left(t: F8, y: F8, about_hz: float) -> float:
-    """Frequency at which an offset and a sinusoid leave least, from a rough one; for a few periods."""
+    """Refine a rough frequency for a record of a few periods by least squares of an offset and a sinusoid."""
     size = max(t.size // 400, 1)
     whole = t.size - t.size % size
     tau = t[:whole].reshape(-1, size).mean(axis=1)
@@ -234,7 +234,7 @@ def _bounds(t: F8, used: NDArray[np.bool_], frequency_hz: float, rate_hz: float,
     duration_s = float(t[last] - t[first]) + 1.0 / rate_hz
     windows = max(1, int(duration_s * frequency_hz / periods + 1e-6))
     edges = t[first] + duration_s * np.arange(windows + 1) / windows - 0.5 / rate_hz
-    # Latest time seen: monotone even where single times run backward.
+    # The latest time so far is monotone even where single times run backward.
     latest = np.maximum.accumulate(np.where(np.isfinite(t), t, -np.inf))
     bounds: NDArray[np.int64] = np.searchsorted(latest, edges).astype(np.int64)
     bounds[-1] = last + 1

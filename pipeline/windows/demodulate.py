@@ -1,9 +1,9 @@
 """Demodulate: amplitude, phase, rest position and noise against time, window by window, with covariance.
 
-No library fits every period robustly: on the bundled damped recording, in which clusters of false echoes lie at the
-turning points, one least-squares fit of a damped sine gives the amplitude 3.68 mm wrong, this 0.01 mm
-(``docs/decisions/0004-demodulation-first.md``). :mod:`windows` holds the linear fit and the tuning of its basis, this
-module the passes: let clusters go, rescue, clip, tune, clip.
+No library fits every period robustly. In the bundled damped recording, clusters of false echoes lie at the turning
+points. One least-squares fit of a damped sine gives an amplitude with an error of 3.68 mm there; the demodulation's
+error is 0.01 mm (``docs/decisions/0004-demodulation-first.md``). :mod:`pipeline.windows.sinusoids` contains the linear
+fit and the tuning of its basis. This module contains the passes: let clusters go, rescue, clip, tune, clip.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from pipeline.windows.sinusoids import Solution, Tuning, Windows, quantile, refi
 
 __all__ = ["Demodulated", "Params", "demodulate", "model_error", "polar"]
 
-WEAK = 7.0  # standard uncertainties of an amplitude under which its phase is known to 0.14 rad and less well
-DISTURBING, DRIFTING = 0.1, 0.5  # of the amplitudes' uncertainty; of amplitude and scatter, within a window
-FEWEST_STEADIED = 8  # windows
+WEAK = 7.0  # amplitude in standard uncertainties below which its phase is uncertain by more than 0.14 rad
+DISTURBING, DRIFTING = 0.1, 0.5  # a drift's bias over the amplitudes' uncertainty; its size over the motion's
+FEWEST_STEADIED = 8  # windows needed to correct a drift
 VERY_STRONG = 10.0  # difference of BIC: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773
-FINEST = 1e-4  # of the amplitude: scatter below it is a computed record's
-HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, and their quantiles of a normal |x|
+FINEST = 1e-4  # scatter relative to the amplitude; only computed records have less
+HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, with quantiles of |x| for normal x
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,9 +40,9 @@ class Params:
     Parameters
     ----------
     clip_sigmas : float
-        Residuals beyond this many standard deviations are false echoes and leave the fit.
+        Residuals beyond this many standard deviations are false echoes and are excluded from the fit.
     rounds : int
-        Reweighted fits of windows that hold false echoes, before the final ones.
+        Number of reweighted fits of windows with false echoes, before the final fits.
     """
 
     clip_sigmas: float = 4.0
@@ -51,7 +51,7 @@ class Params:
 
 @dataclass(frozen=True, eq=False)
 class Demodulated:
-    """The oscillation in windows of whole periods: what every later stage works on.
+    """The oscillation in windows of whole periods, on which every later stage works.
 
     In window j the motion is :math:`o_j + A_j e^{-g\\tau}\\cos(\\omega\\tau + \\varphi_j)`, with :math:`\\tau`
     counted from the window's centre.
@@ -61,23 +61,23 @@ class Demodulated:
     t : (w,) float64, s
         Centres of the windows.
     amplitude, phase, offset : (w,) float64, m, rad, m
-        The phase is unwrapped, as the total phase of the oscillation at the centre.
+        Values at the centre of each window. The phase is unwrapped: the total phase of the oscillation.
     noise : (w,) float64, m
-        Standard deviation of the samples about the fit, each window by itself.
+        Standard deviation of the samples about the fit, for each window separately.
     covariance : (w, 3, 3) float64
-        Of (amplitude, phase, offset); windows share no sample, so they are independent of each other.
+        Covariance of (amplitude, phase, offset). Windows share no samples, so they are independent of each other.
     count : (w,) int64
-        Samples that the fit used.
+        Number of samples used in the fit.
     angular_frequency : float, rad/s
-        Of the basis.
+        Angular frequency of the basis.
     decay : (w,) float64, 1/s
-        g of the basis.
+        Decay rate g of the basis.
     residual : (n,) float64, m
-        Every sample less its window's fit; NaN outside all windows and where unmeasured.
+        Every sample less its window's fit; NaN for samples outside all windows or not measured.
     flags : (n,) uint8
-        The conditioned flags and the false echoes found here.
+        Flags from the conditioning, with the false echoes and clipped crests found here.
     lost : int
-        Windows with too few usable samples, which carry no point.
+        Number of windows with too few usable samples, which give no point.
     """
 
     t: F8
@@ -101,7 +101,7 @@ class Demodulated:
 
 
 def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None = None) -> Demodulated:
-    """Fit rest position, amplitude and phase in every window, robustly.
+    """Fit rest position, amplitude and phase robustly in every window.
 
     Parameters
     ----------
@@ -116,17 +116,17 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     Raises
     ------
     AnalysisError
-        If no window holds enough usable samples.
+        If no window has enough usable samples.
 
     Notes
     -----
     Every window is a linear least-squares problem in :math:`(o, a, b)` of
-    :math:`o + e^{-g\\tau}(a\\cos\\omega\\tau - b\\sin\\omega\\tau)`, all solved together. False echoes come in clusters
-    that move with the bob, a fifth of a period long and more, so the first fit of a window may be pulled by them:
-    weights of Cauchy's form with a scale that shrinks from round to round release them, windows that disagree with
-    their neighbours start again from these, then residuals beyond ``clip_sigmas`` leave the fit permanently. Without
-    :math:`g`, which a second pass knows for each window, the conjugate line would bias the amplitude by
-    :math:`g/2\\omega` of itself.
+    :math:`o + e^{-g\\tau}(a\\cos\\omega\\tau - b\\sin\\omega\\tau)`; all are solved together. False echoes come in
+    clusters that move with the bob and last a fifth of a period or more, so they may bias the first fit of a window.
+    Weights of Cauchy's form, with a scale that shrinks from round to round, release the fit from them. Windows that
+    disagree with their neighbours are fitted again from the neighbours' values. Then residuals beyond ``clip_sigmas``
+    are excluded permanently. A second pass uses the decay :math:`g` of each window. Without it, the conjugate line
+    would bias the amplitude by the fraction :math:`g/2\\omega`.
     """
     params = params or Params()
     windows = Windows.cut(conditioned, cycles.bounds)
@@ -143,7 +143,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
         crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
         windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
         weights = np.where(crest, 0.0, weights)
-    # Fit again with a basis whose frequency, decay and drift of the rest position are those of each window.
+    # Fit again with each window's own frequency and decay, after correcting the drift of the rest position.
     windows = _steadied(windows, solution, spread, tuning.angular_frequency)
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
@@ -154,11 +154,11 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
 
 
 def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tuple[Solution, F8]:
-    """Fit every window; those that scatter more than noise does, with weights that ignore clusters of echoes.
+    """Fit every window; where the scatter exceeds the noise, use weights that ignore clusters of echoes.
 
-    Returns the fits and the spreads about them (w,).
+    Returns the fits and the spreads (w,) of the samples about them.
     """
-    solution = solve(basis, windows.usable.copy())  # what is put into it must not reach the windows
+    solution = solve(basis, windows.usable.copy())  # a copy: changes of the solution must not reach the windows
     spread = _spread(windows.usable, solution.residual)
     odd = np.flatnonzero(spread > 1.3 * noise_m)
     if odd.size:
@@ -169,17 +169,17 @@ def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tupl
 
 
 def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
-    """Fit windows that disagree with their neighbours again, starting from what the neighbours predict.
+    """Fit windows that disagree with their neighbours again, starting from the neighbours' prediction.
 
-    Puts what it finds into the solution and its spreads.
+    The solution and its spreads are updated in place.
 
-    Where false echoes hold half of a window its own fit may have settled on them; the amplitude, phase and rest
-    position of the windows around it tell which half to believe.
+    Where half of a window consists of false echoes, its own fit may have converged to them. The amplitude, phase and
+    rest position of the surrounding windows show which half to believe.
     """
     n = len(windows.y)
     if n < 5:
         return
-    # Turned back to one instant, so that medians are taken of slow quantities.
+    # The phases are referred to one instant, so that medians are taken of slowly varying quantities.
     turning = np.exp(1j * tuning.angular_frequency * (windows.centre - windows.centre[0]))
     steady = (solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]) / turning
     slow = np.stack([solution.coefficients[:, 0], steady.real, steady.imag])
@@ -198,7 +198,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
         return
     part, usable = basis[odd], windows.usable[odd]
     size = np.abs(part[:, 3] - (expected[odd, None, :] @ part[:, :3])[:, 0])
-    # A third of the samples is believed at first, so that echoes may hold more than half of a window.
+    # Only the best third of the samples sets the scale, so that echoes may make up more than half of a window.
     trial = _reweighted(part, usable, size, THIRD, level, params.rounds)
     after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])
@@ -209,8 +209,8 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
 def _reweighted(basis: F8, usable: F8, size: F8, believed: tuple[float, float], least: float, rounds: int) -> Solution:
     """Fit windows with weights of Cauchy's form, :math:`(1 + (r/s)^2)^{-2}`, from residuals of a given size (w, l).
 
-    The scale s is that of the share of samples which is believed, with its quantile of a normal |x|; ``least`` at
-    least.
+    ``believed`` is a share of samples and the corresponding quantile of |x| for standard normal x. The scale s is this
+    quantile of the residuals over that of |x|, but at least ``least``.
     """
     for _ in range(rounds):
         spread = np.maximum(quantile(size, usable, believed[0]) / believed[1], least)
@@ -220,7 +220,7 @@ def _reweighted(basis: F8, usable: F8, size: F8, believed: tuple[float, float], 
 
 
 def _neighbours(n: int) -> NDArray[np.int64]:
-    """(n, 6 or fewer): the nearest other windows of each, one-sided at the record's ends."""
+    """Return (n, 6 or fewer): the nearest other windows of each window, one-sided at the record's ends."""
     reach = min(7, n)
     first = np.clip(np.arange(n) - reach // 2, 0, n - reach)
     block = first[:, None] + np.arange(reach)
@@ -229,17 +229,17 @@ def _neighbours(n: int) -> NDArray[np.int64]:
 
 
 def _spread(usable: F8, residual: F8) -> F8:
-    """(w,): standard deviation of each window's samples about its fit, from their median."""
+    """Return (w,): the standard deviation of each window's samples about its fit, from their median deviation."""
     return quantile(np.abs(residual), usable, HALF[0]) / HALF[1]
 
 
 def _steadied(windows: Windows, solution: Solution, spread: F8, omega: float) -> Windows:
-    """Take out by how much a drifting rest position moves within each window, where that would disturb amplitudes.
+    """Subtract the drift of the rest position within each window, where it would bias the amplitudes.
 
-    A window fits a constant, so that of a rest that moves by R over a record of length T all amplitudes are off by up
-    to :math:`2R/\\omega T`, alike where windows begin alike. With X by which a straight line through the N rest
-    positions, of standard deviation :math:`\\sigma`, lowers chi-square, that is :math:`\\sqrt{24 X}/\\omega T` of
-    their mean's uncertainty, :math:`\\sqrt{2/N}\\sigma`.
+    A window fits a constant rest position. If this moves by R over a record of length T, all amplitudes are biased by
+    up to :math:`2R/\\omega T`, equally where windows begin at equal phases. Let a straight line through the N rest
+    positions, of standard deviation :math:`\\sigma`, lower chi-square by X. The bias is then
+    :math:`\\sqrt{24 X}/\\omega T` times the uncertainty of the mean amplitude, :math:`\\sqrt{2/N}\\sigma`.
     """
     good = solution.good
     if np.count_nonzero(good) < FEWEST_STEADIED:
@@ -255,19 +255,19 @@ def _steadied(windows: Windows, solution: Solution, spread: F8, omega: float) ->
     moved = curve(windows.centre[:, None] + windows.tau) - curve(windows.centre)[:, None]
     size = np.hypot(solution.coefficients[good, 1], solution.coefficients[good, 2])
     if np.any(np.abs(moved[good]).max(axis=1) > DRIFTING * np.hypot(size, spread[good])):
-        return windows  # a hand, or another motion: no drift of this one's rest
+        return windows  # moved by a hand or another motion, not a drift of the rest position
     return replace(windows, y=np.where(windows.placed, windows.y - moved, 0.0))
 
 
 def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
-    """The spread that is typical of the record's windows."""
+    """Return the median spread of the record's good windows."""
     return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
 def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
-    """Take residuals beyond the clip out and fit again."""
+    """Exclude samples with residuals beyond the clipping bound and fit again."""
     level = _typical(spread, windows, solution)
-    # One window's spread says little, and a cluster of echoes widens it: it is held near the record's.
+    # One window's spread is uncertain, and a cluster of echoes widens it, so it is kept near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
     least = model_error(size, tuning.decay, tuning.angular_frequency)
     bound = params.clip_sigmas * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
@@ -275,9 +275,9 @@ def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: T
 
 
 def model_error(amplitude: F8, decay: F8, angular_frequency: float) -> F8:
-    """Residual that a sinusoid can leave in a motion without noise, m; smaller residuals are never echoes.
+    """Return the residual, m, that a sinusoid can leave of a noiseless motion; smaller residuals are never echoes.
 
-    A ten-thousandth of the amplitude, and twice the third harmonic :math:`A g/20\\omega` of quadratic drag.
+    It is a ten-thousandth of the amplitude plus twice the third harmonic :math:`A g/20\\omega` of quadratic drag.
     """
     return (FINEST + np.abs(decay) / (10.0 * angular_frequency)) * np.abs(amplitude)
 
@@ -293,7 +293,7 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     noise = np.sqrt(squares / np.maximum(counts - 3, 1))
     pooled = math.sqrt(np.sum(squares[good]) / max(np.sum(counts[good] - 3), 1))
     pooled = _with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
-    # A window's own noise is known to a tenth only: it is drawn towards the record's.
+    # A window's own noise is uncertain by about a tenth, so it is shrunk towards the record's.
     prior = 30.0
     shrunk = ((prior * pooled**2 + counts * noise**2) / (prior + counts))[good]
     _, a, b = solution.coefficients[good].T
@@ -328,9 +328,9 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
 
 
 def _with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
-    """The record's noise, drawn towards the one that sensor or scene state, if the two agree.
+    """Return the record's noise, combined with the noise that sensor or scene states if the two agree.
 
-    A stated noise counts as much as thirty samples; it matters to records of a few periods only.
+    A stated noise counts as much as thirty samples, so it matters only to records of a few periods.
     """
     if stated_m is None or abs(noise_m / stated_m - 1.0) > 3.3 / math.sqrt(2.0 * max(dof, 1.0)):
         return noise_m
@@ -343,30 +343,30 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     Parameters
     ----------
     a, b : (w,) float64, m
-        Of :math:`a\\cos\\omega\\tau - b\\sin\\omega\\tau`.
+        Coefficients of :math:`a\\cos\\omega\\tau - b\\sin\\omega\\tau`.
     covariance : (w, 3, 3) float64
-        Of (offset, a, b).
+        Covariance of (offset, a, b).
     smooth_phase : (w,) float64, rad
-        Total phase from a smooth curve through the record; says how many turns lie between windows.
+        Total phase from a smooth curve through the record; it gives the number of turns between windows.
     smooth_amplitude : (w,) float64, m, or None
-        The same of the amplitude.
+        Amplitude from a smooth curve through the record.
 
     Notes
     -----
-    An amplitude from :math:`\\sqrt{a^2+b^2}` is too large by half the variance of the phase, which is taken off. Where
-    the smooth amplitude is below seven of its uncertainties, amplitude and phase are read along and across the smooth
-    phase instead: linear in a and b, they are right on average in the deepest noise, and an amplitude may come out
-    negative.
+    The amplitude :math:`\\sqrt{a^2+b^2}` is too large by half the variance of the phase, as a fraction; this bias is
+    subtracted. Where the smooth amplitude is below seven times the amplitude's uncertainty, amplitude and phase are the
+    components along and across the smooth phase instead. These are linear in a and b and therefore unbiased in any
+    noise, and an amplitude may be negative.
     """
     size = np.hypot(a, b)
-    # What is nothing beside the others divides by nothing smaller, whatever the record's unit.
+    # A negligible size is raised to a small positive one before it divides anything, in any unit.
     least = 1e-30 * float(size.max()) + 1e-150
     size = np.maximum(size, least)
     along, scale = np.arctan2(b, a), size
     weak = np.zeros(a.size, np.bool_)
     if smooth_amplitude is not None:
         u = np.sqrt(0.5 * (covariance[:, 1, 1] + covariance[:, 2, 2]))
-        # So is a window without a swing, whatever the curve says there.
+        # A window whose own amplitude is below its uncertainty is weak too, regardless of the curve.
         weak = (smooth_amplitude < WEAK * u) | (size < u)
         along = np.where(weak, smooth_phase, along)
         scale = np.where(weak, np.maximum(smooth_amplitude, 0.3 * u), size)
@@ -375,7 +375,7 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     if np.ptp(turned) > math.pi:
         turned[~weak] = np.unwrap(turned[~weak])
     turned = np.where(weak, (b * cosine - a * sine) / scale, turned)
-    # Derivatives of (amplitude, phase, offset) by (offset, a, b): along the phase, and across it over the amplitude.
+    # Derivatives of (amplitude, phase, offset) with respect to (offset, a, b).
     slope = np.zeros_like(covariance)
     slope[:, 0, 1], slope[:, 0, 2] = cosine, sine
     slope[:, 1, 1], slope[:, 1, 2] = -sine / scale, cosine / scale

@@ -1,4 +1,4 @@
-"""Disturbances: what a real record holds beside the main oscillation, found and taken out where it would do harm."""
+"""Disturbances: modes and steps beside the main oscillation, found and subtracted where they would do harm."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pipeline.windows.steps import Step, find_steps, staircase, weighed
 
 __all__ = ["Disturbances", "Params", "separate"]
 
-SHARE = 0.1  # of the uncertainty that an effect may disturb without being modelled
+SHARE = 0.1  # maximum bias of an effect that is not modelled, relative to the uncertainty
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,9 +32,9 @@ class Params:
     sideways : pipeline.windows.sideways.Params
     steps : pipeline.windows.steps.Params
     modes : bool
-        Whether modes are looked for at all.
+        Whether to search for modes at all.
     rounds : int
-        Most times that the modes are looked for, with the windows' fits of the record without them.
+        Maximum number of searches for modes. Each but the first uses the windows fitted without the modes found.
     """
 
     sideways: swings.Params = field(default_factory=swings.Params)
@@ -45,22 +45,22 @@ class Params:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Disturbances:
-    """What was found beside the main oscillation.
+    """The effects found beside the main oscillation.
 
     Parameters
     ----------
     conditioned : Conditioned
-        The record without it: what later stages work on.
+        The record without these effects, on which later stages work.
     sideways : Sideways
         Modes, harmonics and products of both.
     modelled : bool
-        Whether ``sideways`` was taken out: it would disturb the amplitude by more than a tenth of its uncertainty.
+        Whether ``sideways`` was subtracted, since it would bias the amplitude by over a tenth of its uncertainty.
     leak_m : float
-        By how much it would, m.
+        Bias of the amplitude that ``sideways`` would cause, m.
     steps : tuple of Step
-        Of the rest position; always taken out.
+        Steps of the rest position; they are always subtracted.
     position : (n,) float64, m
-        What was taken out, at the record's times.
+        Sum of the subtracted effects at the record's times.
     """
 
     conditioned: Conditioned
@@ -72,14 +72,14 @@ class Disturbances:
 
     @classmethod
     def nothing(cls, conditioned: Conditioned) -> Disturbances:
-        """Return what says that nothing was found, or sought."""
+        """Return disturbances of which none was found, or none was searched for."""
         return cls(conditioned, Sideways((), None), False, 0.0, (), np.zeros(len(conditioned.track)))
 
     def __bool__(self) -> bool:
         return self.modelled or bool(self.steps)
 
     def columns(self, t: F8) -> F8:
-        """Return (n, k): what was taken out, as columns of a fit that is linear in them."""
+        """Return (n, k): the subtracted effects at t (n,), as columns of a linear fit."""
         parts = [np.empty((t.size, 0))]
         if self.modelled:
             parts.append(self.sideways.columns(t))
@@ -94,27 +94,27 @@ def separate(
     params: Params | None = None,
     demodulation: Demodulation | None = None,
 ) -> tuple[Demodulated, Disturbances]:
-    """Look for modes and steps, and demodulate again without them.
+    """Search for modes and steps, and demodulate again without them.
 
     Parameters
     ----------
     conditioned, cycles, demodulated
-        Outputs of the stages of those names.
+        Outputs of the stages with these names.
     params : Params, optional
     demodulation : pipeline.windows.demodulate.Params, optional
 
     Returns
     -------
     demodulated : Demodulated
-        Of the record without what was found; as given where nothing was.
+        Windows of the record without the subtracted effects; unchanged if nothing was subtracted.
     disturbances : Disturbances
 
     Notes
     -----
     A mode of amplitude B at a distance :math:`\\Delta f` from the main frequency leaves up to
-    :math:`B/(\\pi\\,\\Delta f\\,T)` in the amplitude of a record of length T. Where that is less than a tenth of the
-    amplitude's standard uncertainty the mode is reported and left where it is. Where it is taken out, the windows'
-    variances grow by what it costs to know it from the same samples.
+    :math:`B/(\\pi\\,\\Delta f\\,T)` in the amplitude of a record of length T. If this is less than a tenth of the
+    amplitude's standard uncertainty for every mode, the modes are reported but not subtracted. If they are subtracted,
+    the windows' variances are increased, because the modes are estimated from the same samples.
     """
     params = params or Params()
     sideways = find_sideways(conditioned, demodulated, params.sideways) if params.modes else Sideways((), None)
@@ -123,7 +123,7 @@ def separate(
     t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
     for again in range(params.rounds if modelled else 0):
         if again:
-            # The windows' fits without the modes tell false echoes and the main oscillation better.
+            # Windows fitted without the modes separate false echoes from the main oscillation better.
             sideways = find_sideways(conditioned, demodulated, params.sideways) or sideways
         taken = sideways.position(t)
         demodulated = demodulate(conditioned.less(taken), cycles, demodulation)
@@ -142,10 +142,10 @@ def _u_amplitude(demodulated: Demodulated) -> float:
 
 
 def _price(sideways: Sideways) -> float:
-    """By what factor variances grow because the modes were estimated from the same samples.
+    """Return the factor by which variances grow because the modes were estimated from the same samples.
 
-    That of rest position, amplitude, phase, frequency and decay, whichever grows most, from the normal equations with
-    and without the modes' columns, on a dozen times a period.
+    It is the largest of the factors for rest position, amplitude, phase, frequency and decay. They follow from the
+    normal equations with and without the modes' columns, at twelve times per period.
     """
     carrier = sideways.carrier
     assert carrier is not None
@@ -162,7 +162,7 @@ def _price(sideways: Sideways) -> float:
 
 
 def _leak(sideways: Sideways) -> float:
-    """The most that any mode would leave in the amplitude of the main oscillation, m."""
+    """Return the maximum bias that any mode would cause in the amplitude of the main oscillation, m."""
     if sideways.carrier is None:
         return 0.0
     carrier = sideways.carrier

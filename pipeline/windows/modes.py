@@ -1,4 +1,4 @@
-"""Modes: the main oscillation and those beside it, as functions of time and as columns of a linear fit."""
+"""Modes: the main oscillation and further modes, as functions of time and as columns of a linear fit."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ C16 = NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carrier:
-    """The main oscillation as the windows show it, smooth, whatever law it follows.
+    """The main oscillation as smooth curves through the windows' values, independent of any damping law.
 
     Parameters
     ----------
     t : (k,) float64, s
         Nodes: the windows' centres and the record's ends.
     amplitude, turning, rest : (k,) float64, m, rad, m
-        At the nodes; ``turning`` is the phase beyond ``angular_frequency`` times t - t[0].
+        Values at the nodes; ``turning`` is the phase less ``angular_frequency`` times t - t[0].
     angular_frequency : float, rad/s
     degree, rest_degree : int
-        Of the polynomials in time.
+        Degrees of the polynomials in time, for amplitude and phase and for the rest position.
     """
 
     t: F8
@@ -46,7 +46,7 @@ class Carrier:
 
     @classmethod
     def through(cls, demodulated: Demodulated, start: float, end: float) -> Carrier:
-        """Draw polynomials through the windows' amplitudes, phases and rest positions."""
+        """Fit polynomials to the windows' amplitudes, phases and rest positions."""
         t, omega = demodulated.t, demodulated.angular_frequency
         degree, rest_degree = min(8, max(1, t.size // 6)), min(6, max(1, t.size // 10))
         turning = demodulated.phase - omega * (t - start)
@@ -68,7 +68,7 @@ class Carrier:
         return np.asarray(self.angular_frequency * (t - self.t[0]) + np.interp(t, self.t, self.turning))
 
     def position(self, t: F8) -> F8:
-        """Return rest position and oscillation at t (n,), m."""
+        """Return the sum of rest position and oscillation at t (n,), m."""
         return np.asarray(self.swing(t) + np.interp(t, self.t, self.rest))
 
     def swing(self, t: F8) -> F8:
@@ -76,13 +76,13 @@ class Carrier:
         return np.asarray(np.interp(t, self.t, self.amplitude) * np.cos(self.phase(t)))
 
     def wave(self, t: F8) -> C16:
-        """Return the oscillation at t (n,) as :math:`e^{i\\varphi}` times the amplitude over its largest value."""
+        """Return the oscillation at t (n,): :math:`e^{i\\varphi}` times the amplitude relative to its maximum."""
         relative = np.interp(t, self.t, self.amplitude / float(np.max(self.amplitude)))
         return rotating(relative, self.phase(t))
 
 
 def rotating(size: F8, angle: F8) -> C16:
-    """Return size (n,) times :math:`e^{i\\,\\mathrm{angle}}`: a fourth of the time of numpy's complex exponential."""
+    """Return size (n,) times :math:`e^{i\\,\\mathrm{angle}}` in a quarter of numpy's time for complex exponentials."""
     wave = np.empty(angle.shape, np.complex128)
     np.multiply(size, np.cos(angle), out=wave.real)
     np.multiply(size, np.sin(angle), out=wave.imag)
@@ -90,7 +90,7 @@ def rotating(size: F8, angle: F8) -> C16:
 
 
 def _smooth(powers: F8, y: F8) -> F8:
-    """Polynomial through points (w,), without those far off, at the points and a node before and after, (w + 2,)."""
+    """Fit a polynomial to points (w,) without outliers; return it at all points and two end nodes, (w + 2,)."""
     design, most = powers[1:-1], 2 * powers.shape[1]
     values = np.linalg.lstsq(design, y, rcond=None)[0]
     away = np.abs(y - design @ values)
@@ -102,7 +102,7 @@ def _smooth(powers: F8, y: F8) -> F8:
 
 @lru_cache(maxsize=16)
 def _powers_of_legendre(degree: int) -> F8:
-    """(degree + 1, degree + 1): power series of the Legendre polynomials, in columns. One takes numpy 0.2 ms."""
+    """Return the power series (degree + 1, degree + 1) of Legendre polynomials, in columns; numpy takes 0.2 ms each."""
     series = np.zeros((degree + 1, degree + 1))
     for k, row in enumerate(np.eye(degree + 1)):
         series[: k + 1, k] = np.polynomial.legendre.leg2poly(row[: k + 1])
@@ -113,25 +113,25 @@ def _powers_of_legendre(degree: int) -> F8:
 class Mode:
     """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) w(t)`.
 
-    The envelope E is a polynomial in time, the wave w turns: at the mode's own frequency, with an exponential decay; or
-    as the power :math:`b` of the main oscillation's and :math:`a` of the first mode's.
+    The envelope E is a polynomial in time and the wave w is a complex oscillation. It has the mode's own frequency with
+    an exponential decay, or it is the product of the main wave's power :math:`b` and the first mode's power :math:`a`.
 
     Parameters
     ----------
     turns : (int, int)
-        a and b, of the first mode and of the main oscillation; (1, 0) is a mode by itself.
+        Exponents a of the first mode and b of the main oscillation; (1, 0) is an independent mode.
     frequency : Estimate
-        Mean, Hz.
+        Mean frequency, Hz.
     amplitude : Estimate
         Root mean square of :math:`|E w|` over the record, m.
     decay : Estimate
-        Logarithmic rate of a mode's own wave, 1/s; 0 for harmonics and products.
+        Logarithmic decay rate of an independent mode's wave, 1/s; 0 for harmonics and products.
     false_alarm : float
-        Probability that a record without it shows it.
+        Probability that this mode is found in a record without it.
     span : (float, float)
-        First and last time used, s. Beyond it envelope and decay stay as they are there.
+        First and last time used, s. Outside this span, envelope and decay factor keep their values at its ends.
     coefficients : (degree + 1,) complex128, m
-        Of the envelope, in Legendre polynomials over ``span``.
+        Coefficients of the envelope, in Legendre polynomials over ``span``.
     """
 
     turns: tuple[int, int]
@@ -144,14 +144,14 @@ class Mode:
 
     @property
     def kind(self) -> Literal["mode", "harmonic", "product"]:
-        """Of another frequency; a multiple of the main one's; or a sum or difference of turns of both."""
+        """Kind of the mode: at an independent frequency, at a multiple of the main one, or at a sum or difference of both."""
         if self.turns == (1, 0):
             return "mode"
         return "product" if self.turns[0] else "harmonic"
 
     @property
     def degree(self) -> int:
-        """Of the envelope's polynomial."""
+        """Degree of the envelope's polynomial."""
         return self.coefficients.size - 1
 
     def wave(self, t: F8, main: C16, first: C16 | None) -> C16:
@@ -178,11 +178,11 @@ class Mode:
         return envelope
 
     def whole(self, t: F8, wave: C16) -> C16:
-        """Return the wave of which products are made: with the envelope, over the amplitude."""
+        """Return the wave from which products are formed: wave times envelope, over the amplitude."""
         return np.asarray(wave * self.envelope(t) / self.amplitude.value)
 
     def columns(self, t: F8, wave: C16) -> F8:
-        """Return (n, 2 (degree + 1)): what real and imaginary parts of the coefficients are multiplied by."""
+        """Return the columns (n, 2 (degree + 1)) that belong to the coefficients' real and imaginary parts."""
         powers = np.polynomial.legendre.legvander(self._x(t), self.degree).T if self.degree else np.ones((1, 1))
         rows = np.empty((self.degree + 1, 2, t.size))
         np.multiply(powers, wave.real, out=rows[:, 0])  # Re (x + iy) w = x Re w - y Im w
@@ -196,15 +196,15 @@ class Mode:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sideways:
-    """Every mode found, the strongest of another frequency first.
+    """All modes found, the strongest independent mode first.
 
     Parameters
     ----------
     modes : tuple of Mode
     carrier : Carrier or None
-        None where the record is too short to look.
+        Main oscillation; None if the record is too short, or too long, for a search.
     first : Mode or None
-        The mode that products are made of, as it was when they were sought.
+        The mode from which products are formed, as it was during the search for them.
     """
 
     modes: tuple[Mode, ...]
@@ -220,7 +220,7 @@ class Sideways:
         return np.concatenate([np.empty((t.size, 0)), *columns], axis=1)
 
     def position(self, t: F8) -> F8:
-        """Return what all modes add to the distance at t (n,), m."""
+        """Return the contribution of all modes to the distance at t (n,), m."""
         total = np.zeros(t.size)
         for mode, wave in self._waves(t):
             total += (mode.envelope(t) * wave).real
@@ -233,5 +233,5 @@ class Sideways:
         for mode in self.modes:
             wave = mode.wave(t, main, first)
             if first is None and self.first is not None:
-                first = self.first.whole(t, wave)  # it stands first among the modes
+                first = self.first.whole(t, wave)  # it is the first of the modes
             yield mode, wave

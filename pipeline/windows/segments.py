@@ -1,8 +1,8 @@
-"""Segments: the part of a record in which one free oscillation runs, and what the hand did before, between and after.
+"""Segments: the part of a record with one free oscillation, and the handling before, between and after.
 
-The amplitude of a free oscillation falls smoothly and its phase turns steadily. A bob that hangs still, is lifted, held
-or caught has another; a restart, a touch, lost rows or a clock that stood still break either from one period to the
-next: amplitude and phase jump.
+The amplitude of a free oscillation decays smoothly and its phase advances steadily. This does not hold for a bob that
+hangs still, is lifted, held or caught. At a restart, a touch, lost rows or a stopped clock, amplitude or phase jumps
+from one period to the next.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ from pipeline.windows.demodulate import FINEST, Demodulated
 
 __all__ = ["Break", "BreakKind", "Params", "Segments", "Span", "SpanKind", "find_free_part"]
 
-MOST_DECAY = 300.0  # logarithm, beyond which numbers overflow
-BRIDGED = 3  # samples that noise may take off a plateau on which a hand holds the bob
-# Of a jump of the phase, that the amplitude's may be besides: one touch in sixteen, at any moment, does no more.
+MOST_DECAY = 300.0  # largest exponent of a decay, against overflow
+BRIDGED = 3  # samples that noise may move off a plateau on which a hand holds the bob
+# Jump of the amplitude, over that of the phase, up to which the phase jumps alone. For one touch in sixteen, at any
+# moment, the ratio is smaller.
 ALONE = 0.1
-NEAR = 5  # windows on either side of a break or of still windows, from which the motion is continued there
+NEAR = 5  # number of windows beside a break or still windows from which the motion is extrapolated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,21 +40,22 @@ class Params:
     Parameters
     ----------
     changes : pipeline.windows.change_points.Params
-        Of the search for jumps; its probability of a false alarm holds for still windows too.
+        Options of the search for jumps; the false-alarm probability applies to still windows too.
     least_windows : int
-        Fewest of a part that is analysed: a damped oscillation has four parameters.
+        Minimum number of windows in a part that is analysed; a damped oscillation has four parameters.
     share : float
-        Of the greatest amplitude: a part with less is what the hand left of a motion, and is not analysed.
+        Minimum amplitude of a part relative to the largest one. A smaller motion is a remnant after handling and is
+        not analysed.
     rest_share : float
-        Share of a record that must follow after the motion is lost in the noise, for it to be left out. Less does no
-        harm to a fit.
+        Minimum share of a record after the motion is lost in the noise for this rest to be left out. A shorter rest
+        does not impair a fit.
     most_fall : float
-        Of the logarithm of the amplitude from window to window, behind the greatest, up to which jumps are searched.
-        The sinusoid of a window has one decay, which misses a stronger one by the square of it (0.4 %): more than
-        noise, and most where the motion begins.
+        Maximum decrease of the logarithm of the amplitude per window, after the maximum, for which jumps are searched.
+        The sinusoid of a window has a single decay rate. At a stronger decay its error, the square of the decrease
+        (0.4 %), exceeds the noise and is largest at the start of the motion.
     held_periods : float
-        For which a distance stays on a plateau only where a hand holds the bob. A crest that is cut above the rest
-        position lasts half a period at most.
+        Minimum time on a plateau, in periods, that shows a hand holding the bob. A crest that is cut off above the
+        rest position lasts half a period at most.
     """
 
     changes: change_points.Params = field(default_factory=change_points.Params)
@@ -65,16 +67,16 @@ class Params:
 
 
 class SpanKind(StrEnum):
-    """What the bob does in seconds that were left out."""
+    """State of the bob during a part that was left out."""
 
     AT_REST = "at_rest"  # nothing but noise
-    WAITING = "waiting"  # the same, up to the recording's own trigger
+    WAITING = "waiting"  # only noise, up to the recording's own trigger
     HANDLED = "handled"  # neither still nor free
     FREE = "free"  # another free oscillation
 
 
 class BreakKind(StrEnum):
-    """How one free oscillation becomes another."""
+    """Kind of the transition from one free oscillation to another."""
 
     RESTARTED = "restarted"  # with a pause between
     TOUCHED = "touched"  # the amplitude jumps
@@ -83,7 +85,7 @@ class BreakKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Seconds of a record that were left out.
+    """A stretch of a record that was left out.
 
     Parameters
     ----------
@@ -119,12 +121,12 @@ class Break:
 
 @dataclass(frozen=True, slots=True)
 class Segments:
-    """The part of a record that is analysed, and what is not.
+    """The part of a record that is analysed, and the parts that are left out.
 
     Parameters
     ----------
     first_s, last_s : float
-        The part's seconds.
+        Start and end of the analysed part, s.
     left_out : tuple of Span
         In order of time.
     breaks : tuple of Break
@@ -142,7 +144,7 @@ class Segments:
         return replace(track, flags=track.flags | np.where(outside, np.uint8(Quality.OUTSIDE), np.uint8(0)))
 
     def within(self, before: Segments | None) -> Segments:
-        """Return these, found in the part of others, together with what those left out."""
+        """Combine these segments with earlier ones, within whose part they were found."""
         if before is None:
             return self
         spans = sorted((*before.left_out, *self.left_out), key=lambda span: span.first_s)
@@ -154,7 +156,7 @@ class Segments:
 def find_free_part(
     conditioned: Conditioned, cycles: Cycles, windows: Demodulated, params: Params | None = None
 ) -> Segments | None:
-    """Return the longest part in which one free oscillation runs; None where that is the whole record.
+    """Return the longest part with one free oscillation; None if this is the whole record.
 
     Parameters
     ----------
@@ -165,12 +167,12 @@ def find_free_part(
 
     Notes
     -----
-    Of n windows without any motion the greatest amplitude exceeds :math:`r u = \\sqrt{2 \\ln(n/\\alpha)}\\,u` with
-    probability :math:`\\alpha` (Rayleigh's distribution). Windows below that, where a straight line through their
-    neighbours' amplitudes continues to twice as much, are still. Between still windows the record is parted where
-    amplitude and phase jump, see :func:`pipeline.windows.change_points.find_changes`; the decay and the turning that
-    are usual in the record are taken out before, so that a cubic follows what is left. Where in its window a bob was
-    touched is not known: a window on either side of a jump is left out.
+    The maximum amplitude of n windows without any motion exceeds :math:`r u = \\sqrt{2 \\ln(n/\\alpha)}\\,u` with
+    probability :math:`\\alpha` (Rayleigh distribution). Windows below this are still if a straight line through their
+    neighbours' amplitudes extrapolates to more than twice this value. Between still windows the record is split where
+    amplitude or phase jumps, see :func:`pipeline.windows.change_points.find_changes`. The record's median decay and
+    frequency are removed first, so that a cubic can follow the remainder. The moment of a touch within its window is
+    unknown, so a window on either side of a jump is left out.
     """
     params = params or Params()
     held = _held(conditioned, cycles, params.held_periods)
@@ -189,7 +191,7 @@ def find_free_part(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """Windows first to stop - 1, between jumps or still ones."""
+    """Windows first to stop - 1: all still, or moving without a jump."""
 
     first: int
     stop: int
@@ -198,11 +200,11 @@ class _Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Series:
-    """The windows in a frame that turns with the oscillation.
+    """The windows in a frame that rotates with the oscillation.
 
-    ``values`` and ``u`` (2, w) are amplitude, m, and phase, rad, with their uncertainties, less the decay and the
-    turning that are usual in the record; ``size`` (w,) is the amplitude itself; ``far`` is by how many uncertainties
-    noise alone goes.
+    ``values`` (2, w) are amplitude, m, and phase, rad, without the record's median decay and frequency; ``u`` (2, w)
+    are their uncertainties. ``size`` (w,) is the amplitude itself. ``far`` is the maximum of pure noise, in standard
+    uncertainties.
     """
 
     t: F8
@@ -236,24 +238,24 @@ class _Series:
 
     @property
     def weak(self) -> NDArray[np.bool_]:
-        """(w,): whether noise can explain a deviation of this size."""
+        """(w,): whether noise alone can explain the amplitude."""
         return np.asarray(self.values[0] <= self.far * self.u[0])
 
     @property
     def fall(self) -> float:
-        """Of the logarithm of the amplitude from window to window, behind the greatest."""
+        """Median decrease of the logarithm of the amplitude per window, after the maximum."""
         first = int(np.argmax(self.size))
         steps = -np.diff(np.log(np.maximum(self.size[first : first + NEAR + 3], self.u[0, first])))
         return median(steps) if steps.size else 0.0
 
     def moving(self) -> int:
-        """Number of windows up to the last two running that stand out of the noise."""
+        """Return the number of windows up to the last two in succession that exceed the noise."""
         out = ~self.weak
         pairs = np.flatnonzero(out[1:] & out[:-1])
         return int(pairs[-1]) + 2 if pairs.size else 0
 
     def parts(self, params: change_points.Params) -> list[_Part]:
-        """The record cut into still windows, and what lies between jumps."""
+        """Split the record into runs of still windows and the parts between jumps."""
         weak = self.weak
         edges = np.flatnonzero(np.diff(np.concatenate([[False], weak, [False]])))
         parts, begin = [], 0
@@ -264,7 +266,7 @@ class _Series:
         return [*parts, *self.between_jumps(begin, self.t.size, params)]
 
     def stands_still(self, first: int, stop: int, weak: NDArray[np.bool_]) -> bool:
-        """Whether the moving windows before or after weak ones continue to twice what noise shows there."""
+        """Return whether moving windows beside weak ones extrapolate to over twice the limit of noise there."""
         before, after = np.flatnonzero(~weak[:first])[-NEAR:], stop + np.flatnonzero(~weak[stop:])[:NEAR]
         return any(
             rows.size >= NEAR and self.continued(rows, k)[0] > 2.0 * self.far * self.u[0, k]
@@ -272,13 +274,13 @@ class _Series:
         )
 
     def continued(self, rows: NDArray[np.int64], k: float) -> F8:
-        """(2,): what windows continue to at window k, along straight lines of median slopes."""
+        """Return (2,): the values extrapolated to window k along straight lines with median slopes."""
         t = self.t[rows] - np.interp(k, np.arange(self.t.size), self.t)
         slope = np.median(np.diff(self.values[:, rows]) / np.diff(t), axis=1)
         return np.asarray(np.median(self.values[:, rows] - slope[:, None] * t, axis=1))
 
     def between_jumps(self, first: int, stop: int, params: change_points.Params) -> list[_Part]:
-        """Windows first to stop - 1 parted at their jumps."""
+        """Split windows first to stop - 1 at their jumps."""
         if stop - first < NEAR:
             return [_Part(first, stop, False)] if stop > first else []
         values, u = self.values[:, first:stop], self.u[:, first:stop]
@@ -289,13 +291,13 @@ class _Series:
 
 
 def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned, params: Params) -> Segments | None:
-    """Return the longest of the parts that oscillate, and what lies beside it."""
+    """Return the longest of the parts that oscillate freely, with the spans and breaks beside it."""
     if len(parts) == 1:
         return None
     n = series.t.size
-    # A window beside a cut may hold a little of what happened there.
+    # A window beside a cut may contain part of the disturbance there.
     limits = [(part.first + (part.first > 0), part.stop - (part.stop < n)) for part in parts]
-    # A decay that outlasts its motion is small for most of its time: where it began counts too.
+    # In a long decay the amplitude is small for most of the time, so its beginning counts too.
     size = np.array([_size(series.size[part.first : part.stop]) for part in parts])
     length = np.array([stop - first for first, stop in limits])
     free = ~np.array([part.still for part in parts]) & (length >= params.least_windows)
@@ -307,7 +309,7 @@ def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned, param
     begin_s, end_s, half = float(t[0]), float(t[-1]), 0.5 * series.spacing
 
     def seconds(first: int, stop: int) -> tuple[float, float]:
-        """From the beginning of window first to the end of window stop - 1."""
+        """Return the times at the beginning of window first and the end of window stop - 1."""
         first_s = begin_s if first == 0 else float(series.t[first]) - half
         return first_s, end_s if stop == n else float(series.t[stop - 1]) + half
 
@@ -332,14 +334,14 @@ def _size(amplitude: F8) -> float:
 
 
 def _break(series: _Series, stop: int, start: int) -> Break:
-    """What happened between the last window of one free oscillation and the first of the next."""
+    """Describe the break between the last window of one free oscillation and the first of the next."""
     middle = 0.5 * (stop - 1 + start)
     before = series.continued(np.arange(stop - NEAR, stop), middle)
     after = series.continued(np.arange(start, start + NEAR), middle)
     ratio = math.log(max(after[0], series.u[0, start]) / max(before[0], series.u[0, stop - 1]))
     angle = math.remainder(after[1] - before[1], 2.0 * math.pi)
     first_s, last_s = float(series.t[stop - 1]), float(series.t[start])
-    # Of either straight line through five windows, two windows on from its middle to its end and half a pause on.
+    # Each straight line through five windows is extrapolated from its middle: two windows to its end plus half a pause.
     away = 2.0 + middle - (stop - 1)
     u_ratio = math.sqrt(0.2 + 0.1 * away**2) * math.hypot(series.u[1, stop - 1], series.u[1, start])
     alone = abs(ratio) < min(max(series.far * u_ratio, ALONE * abs(angle)), abs(angle))
@@ -351,7 +353,7 @@ def _break(series: _Series, stop: int, start: int) -> Break:
 
 
 def _faded(series: _Series, moving: int) -> Segments | None:
-    """The record up to where its motion is lost in the noise permanently."""
+    """Return the record up to where its motion is lost in the noise permanently."""
     if moving < 2:
         return None
     last_s = float(series.t[moving - 1]) + series.spacing
@@ -360,12 +362,12 @@ def _faded(series: _Series, moving: int) -> Segments | None:
 
 
 def _held(conditioned: Conditioned, cycles: Cycles, periods: float) -> Segments | None:
-    """The longer side of a plateau on which the distance stays for the greater part of a period, and longer."""
+    """Return the longer side of a plateau on which a hand holds the bob; None without such a plateau."""
     rows = np.flatnonzero(conditioned.flags & np.uint8(Quality.CLIPPED))
     if not rows.size:
         return None
     t, used = conditioned.track.t, np.flatnonzero(conditioned.used)
-    # Noise takes a few samples off a plateau.
+    # Noise may move a few samples off a plateau.
     starts = np.concatenate([[0], np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1])
     ends = np.concatenate([starts[1:], [rows.size]]) - 1
     longest = int(np.argmax(t[rows[ends]] - t[rows[starts]]))

@@ -29,7 +29,7 @@ from pipeline.windows.modes import C16, Carrier, Mode, Sideways
 
 __all__ = ["Params", "find_sideways"]
 
-# Turns of (sideways mode, main oscillation) at which a range measured along a slant shows a product of both.
+# Multiples of the phases of (sideways mode, main oscillation) at which a slanted beam shows products of both.
 PRODUCTS = ((2, 0), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2), (3, 0))
 HARMONICS = ((0, 2), (0, 3))
 NO_MODE = Estimate(0.0, 0.0, "Hz")
@@ -42,15 +42,15 @@ class Params:
     Parameters
     ----------
     false_alarm : float
-        Probability that a record without any shows a mode or a harmonic, half for either.
+        Probability that a mode or a harmonic is found in a record without any; each has half of it.
     most : int
-        Modes sought, harmonics and products not counted.
+        Maximum number of modes, not counting harmonics and products.
     envelope : int
-        Highest degree of the polynomial that a mode's amplitude and phase may follow.
+        Maximum degree of the polynomial for a mode's amplitude and phase.
     least_windows : int
-        Fewer windows show no mode apart from the main oscillation.
+        Minimum number of windows; fewer cannot separate a mode from the main oscillation.
     most_periods : int
-        Longer records are not searched: the model of the blocks would outgrow the memory.
+        Maximum length of a record, periods; for longer ones the model of the blocks would outgrow the memory.
     """
 
     false_alarm: float = 0.01
@@ -61,13 +61,13 @@ class Params:
 
 
 def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None) -> Sideways:
-    """Look for lines beside the main oscillation.
+    """Search for lines beside the main oscillation.
 
     Parameters
     ----------
     conditioned : Conditioned
     demodulated : Demodulated
-        Its windows give the main oscillation, whatever law that follows, its flags the samples.
+        Its windows give the main oscillation, independent of any damping law; its flags select the samples.
     params : Params, optional
 
     Returns
@@ -76,10 +76,10 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
 
     Notes
     -----
-    The main oscillation is taken out as smooth curves through the windows' values, then, together with each line, by
-    least squares with slowly varying amplitude and phase, on block means of a twelfth of a period.
-    A mode nearer to the main frequency than a few reciprocals of the record's length beats too slowly to be
-    distinguished from a change of the amplitude and is not sought.
+    The main oscillation is first removed as smooth curves through the windows' values. Then it is fitted together with
+    each line by least squares, with slowly varying amplitude and phase, to block means over a twelfth of a period.
+    A mode within a few reciprocals of the record's length of the main frequency is not searched for. It beats too
+    slowly to be distinguished from a change of the amplitude.
     """
     params = params or Params()
     used = (demodulated.flags & UNUSABLE) == 0
@@ -110,7 +110,7 @@ def _band(carrier: Carrier, blocks: Blocks) -> Band:
 
 
 class _Search:
-    """The model of the blocks as it grows, mode by mode."""
+    """The model of the blocks, which grows mode by mode."""
 
     def __init__(self, carrier: Carrier, blocks: Blocks, band: Band, params: Params) -> None:
         self.carrier, self.blocks, self.band, self.params = carrier, blocks, band, params
@@ -118,7 +118,7 @@ class _Search:
         self.main = carrier.wave(self.t)
         self.first: C16 | None = None
         self.main_hz = carrier.angular_frequency / (2.0 * math.pi)
-        # Columns and data over their standard uncertainty; an orthonormal basis of the columns; what they leave.
+        # Data and columns over their standard uncertainty, an orthonormal basis of the columns, and the residual.
         self.data = blocks.y * blocks.weight
         self.columns = np.empty((self.t.size, 0))
         self.basis, self.left = self.columns, self.data
@@ -127,7 +127,7 @@ class _Search:
         self.waves = dict[tuple[tuple[int, int], float, float], C16]()
 
     def run(self) -> Sideways:
-        """Return modes, the strongest first, with their products, then harmonics; all fitted together."""
+        """Return the modes, strongest first, then products and harmonics, all fitted together."""
         self.locked(HARMONICS, NO_MODE)
         width = 2.0 / self.blocks.seconds
         self.hole(*((b * self.main_hz, width) for _, b in HARMONICS))
@@ -149,7 +149,7 @@ class _Search:
         return Sideways(tuple(sorted(self.together(), key=lambda mode: order.index(mode.kind))), self.carrier, first)
 
     def together(self) -> Iterator[Mode]:
-        """Fit the coefficients of all modes together: each was found before the later ones were known."""
+        """Fit the coefficients of all modes together, because each was first fitted without the later ones."""
         ends = np.cumsum([0, *(mode.coefficients.size for mode in self.found)])
         values = np.linalg.lstsq(self.columns, self.data)[0]
         envelopes: C16 = values[values.size - 2 * ends[-1] :].view(np.complex128)
@@ -158,7 +158,7 @@ class _Search:
             yield replace(refitted, amplitude=replace(mode.amplitude, value=self.size(refitted)))
 
     def size(self, mode: Mode) -> float:
-        """Root mean square of the mode's amplitude over the record, m."""
+        """Return the root mean square of the mode's amplitude over the record, m."""
         return _rms(mode.envelope(self.t) * self.wave(mode))
 
     def wave(self, mode: Mode) -> C16:
@@ -171,7 +171,7 @@ class _Search:
         self.band = replace(self.band, holes=(*self.band.holes, *holes))
 
     def add(self, columns: F8) -> None:
-        """Let the model hold further columns (b, k)."""
+        """Add further columns (b, k) to the model."""
         self.columns = np.concatenate([self.columns, columns], axis=1)
         self.basis = np.concatenate([self.basis, np.linalg.qr(beyond(self.basis, columns))[0]], axis=1)
         self.left = self.data - self.basis @ (self.basis.T @ self.data)
@@ -181,15 +181,15 @@ class _Search:
         return mode.columns(self.t, wave) * self.blocks.weight[:, None]
 
     def fitted(self, mode: Mode, values: F8, cofactors: F8, unit: float) -> Mode:
-        """Return the mode with its coefficients, and the amplitude of these; ``unit`` is the variance."""
+        """Return the mode with its coefficients and their amplitude; ``unit`` is the variance."""
         mode = replace(mode, coefficients=values.view(np.complex128))
         u = math.sqrt(0.5 * unit * float(cofactors[0, 0] + cofactors[1, 1])) * _rms(self.wave(mode))
         return replace(mode, amplitude=Estimate(self.size(mode), u, "m"))
 
     def locked(self, orders: tuple[tuple[int, int], ...], base: Estimate) -> None:
-        """Test what turns with the main oscillation and a mode of frequency ``base`` together: none is free.
+        """Test lines whose frequencies are combinations of the main frequency and ``base``, and so are not free.
 
-        One after another, each beyond those that were found before it.
+        They are tested one after another, each beyond those found before it.
         """
         trials = [
             self.blank((a, b), Estimate(abs(a * base.value + b * self.main_hz), abs(a) * base.u, "Hz"))
@@ -207,7 +207,7 @@ class _Search:
             evidence, f = 0.5 * (fall - fallen) / self.blocks.samples, trial.frequency.value
             smooth = smooth_density(left, f * self.blocks.step)
             if evidence <= least * smooth:
-                continue  # the density is no less than that
+                continue  # the density is at least the smooth one
             density = spectral_density(self.blocks, left, f, self.band, smooth)
             if evidence > least * density:
                 unit, chance = density * self.blocks.samples, false_alarm(evidence / density, len(orders))
@@ -218,9 +218,9 @@ class _Search:
             self.add(taken)
 
     def fit(self, columns: F8) -> tuple[F8, F8, F8]:
-        """Return coefficients (k,) of further columns, their covariance for data of unit variance, and what they fit.
+        """Return coefficients (k,) of further columns, their covariance for unit variance, and the fitted values.
 
-        What they fit is what they hold beyond the model, by which the sum of squares falls.
+        The fitted values are the contribution beyond the model; their squares are the reduction of the sum of squares.
         """
         own = beyond(self.basis, columns)
         q, r = np.linalg.qr(own)
@@ -229,20 +229,20 @@ class _Search:
         return np.asarray(inverse @ share), np.asarray(inverse @ inverse.T), np.asarray(q @ share)
 
     def sought(self, frequency_hz: float) -> bool:
-        """Whether the blocks show so high a frequency, and the model does not hold it already."""
+        """Return whether the blocks can resolve a frequency and the model does not contain it already."""
         known = any(abs(frequency_hz - centre) < half for centre, half in self.band.holes)
         return 0.1 * self.main_hz < frequency_hz < 0.4 / self.blocks.step and not known
 
     def blank(self, turns: tuple[int, int], frequency: Estimate) -> Mode:
-        """Return a mode that is still to be fitted."""
+        """Return a mode that has yet to be fitted."""
         span, unknown = (float(self.carrier.t[0]), float(self.carrier.t[-1])), Estimate(0.0, 0.0, "m")
         return Mode(turns, frequency, unknown, Estimate(0.0, 0.0, "1/s"), 1.0, span, np.zeros(1, np.complex128))
 
     def free(self, peak: Peak) -> tuple[Mode, F8]:
-        """Refine a peak's frequency, see whether it decays, and choose how far its envelope varies besides.
+        """Refine a peak's frequency, decide whether it decays, and choose the degree of its envelope.
 
-        Gauss-Newton in frequency and decay: with columns w and :math:`\\tau w`, the ratio of the second's complex
-        coefficient to the first's is :math:`-\\delta + 2\\pi i\\,\\Delta f`.
+        Frequency and decay come from Gauss-Newton steps with columns w and :math:`\\tau w`. The ratio of the second
+        column's complex coefficient to the first's is :math:`-\\delta + 2\\pi i\\,\\Delta f`.
         """
         unit = peak.density * self.blocks.samples
         f, rate, u_rate = peak.frequency_hz, 0.0, math.inf
@@ -259,7 +259,7 @@ class _Search:
             f += step
             if abs(step) < 2e-3 * longest:
                 break
-        # A mode that varies reaches further; it must not reach what the main oscillation may vary by.
+        # A varying mode has a wider spectrum, which must not overlap the variations of the main oscillation.
         room = int(2.0 * (abs(f - self.main_hz) * self.blocks.seconds - 1.0) - self.carrier.degree)
         degrees = np.arange(min(self.params.envelope, max(room, 0)) + 1)
         trial = replace(
@@ -269,7 +269,7 @@ class _Search:
             coefficients=np.zeros(degrees.size, np.complex128),
         )
         columns = self.columns_of(trial)
-        # The first two columns, the first four, ... lower the sum of squares by what lies along their own directions.
+        # The first two, four, ... columns lower the sum of squares by the residual's components along their directions.
         q, _ = np.linalg.qr(beyond(self.basis, columns))
         falls = np.cumsum((q.T @ self.left) ** 2)[1::2]
         criterion = -falls / unit + 2.0 * (degrees + 1) * math.log(self.blocks.t.size)
@@ -283,7 +283,7 @@ def _rms(wave: C16) -> float:
 
 
 def _main_columns(carrier: Carrier, t: F8) -> F8:
-    """Rest position, cosine and sine of the main oscillation, each times powers of time."""
+    """Return columns for rest position, cosine and sine of the main oscillation, each times Legendre polynomials."""
     x = np.clip(2.0 * (t - carrier.t[0]) / (carrier.t[-1] - carrier.t[0]) - 1.0, -1.0, 1.0)
     powers = np.polynomial.legendre.legvander(x, carrier.degree)
     phase = carrier.phase(t)

@@ -1,4 +1,4 @@
-"""Windows: a record cut into periods, the linear fit of all of them together, and the tuning that its basis needs."""
+"""Windows: a record cut into whole periods, the linear fit of all windows together, and the tuning of its basis."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from pipeline.track import F8
 
 __all__ = ["Solution", "Tuning", "Windows", "quantile", "refit", "retune", "solve", "unwrap"]
 
-# Determinant of the normal matrix per sample: 1/4 for a full period, less where the samples crowd into a part
-# of it, so that rest position and amplitude cannot be distinguished.
+# Minimum determinant of the normal matrix per sample. It is 1/4 for a full period and less where samples cover only a
+# part of a period, so that rest position and amplitude cannot be distinguished.
 LEAST_DETERMINANT = 0.003
 LEAST_SAMPLES = 6
-KNOWN = 3.3  # standard uncertainties by which an amplitude must exceed 0 for its phase to mean something
-GREATEST = 0.05  # share of the frequency beyond which a detuning or a decay is a failed fit
+KNOWN = 3.3  # least amplitude with a meaningful phase, in its standard uncertainties
+GREATEST = 0.05  # maximum detuning or decay, as a fraction of the frequency; beyond it the fit has failed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,18 +31,18 @@ class Windows:
     rows : (w, l) int64
         Index of each sample in the track.
     placed : (w, l) bool
-        Measured and at a time within reach of the window, fit for use or not; False for padding.
+        True for measured samples at a time within reach of the window, usable or not; False for padding.
     usable : (w, l) float64
         1 for samples that may be fitted, else 0.
     y : (w, l) float64, m
-        Distance less ``level``; 0 where not placed.
+        Distance less ``level``; 0 for samples that are not placed.
     tau : (w, l) float64, s
-        Time from the window's centre; 0 where not placed.
+        Time from the window's centre; 0 for samples that are not placed.
     centre : (w,) float64, s
     level : float, m
-        Taken off all distances, so that sums do not cancel.
+        Level subtracted from all distances to avoid cancellation in sums.
     tiny : float, m
-        What is nothing beside the motion: stands for zero where something is divided by a spread or an amplitude.
+        Length that is negligible beside the motion; it replaces zero in divisions by a spread or an amplitude.
     """
 
     rows: NDArray[np.int64]
@@ -67,7 +67,7 @@ class Windows:
         level = median(track.y[used])
         tiny = 1e-12 * float(np.max(np.abs(track.y[used] - level))) + 1e-150
         centre = np.where(usable, t, 0.0).sum(axis=1) / np.maximum(usable.sum(axis=1), 1)
-        # The middle of the window, not of its usable samples, so that centres stay one period apart.
+        # The middle of the whole window, not of its usable samples, so that centres are evenly spaced.
         middle = 0.5 * (track.t[bounds[:-1]] + track.t[bounds[1:] - 1])
         reach = float(np.ptp(track.t[used])) / lengths.size
         centre = np.where(np.abs(middle - centre) <= reach, middle, centre)
@@ -85,12 +85,12 @@ class Windows:
         )
 
     def basis(self, angular_frequency: F8, decay: F8) -> F8:
-        """Return (w, 4, l): rest position, decaying cosine and minus sine, and below them the distances themselves.
+        """Return (w, 4, l): rest position, decaying cosine, negative decaying sine, and the distances as the last row.
 
         Parameters
         ----------
         angular_frequency, decay : (w,) float64, rad/s, 1/s
-            Of each window.
+            Values of each window.
         """
         rows = np.empty((self.y.shape[0], 4, self.y.shape[1]))
         angle = angular_frequency[:, None] * self.tau
@@ -101,7 +101,7 @@ class Windows:
         return self.decaying(rows, decay) if decay.any() else rows
 
     def decaying(self, basis: F8, decay: F8) -> F8:
-        """Return a basis without decay with the windows' decays (w,) put in, 1/s."""
+        """Multiply a basis without decay, in place, by the windows' decays (w,), 1/s, and return it."""
         basis[:, 1:3] *= np.exp(-decay[:, None] * self.tau)[:, None, :]
         return basis
 
@@ -113,15 +113,15 @@ class Solution:
     Parameters
     ----------
     coefficients : (w, 3) float64, m
-        Rest position less level, a, b.
+        Rest position less level, and the coefficients a and b.
     normal : (w, 3, 3) float64
-        Weighted sums of the basis' products.
+        Normal matrices: weighted sums of products of the basis functions.
     residual : (w, l) float64, m
-        Of all samples placed, fitted or not.
+        Residuals of all placed samples, fitted or not.
     good : (w,) bool
-        Enough samples, well spread over the period.
+        True for windows with enough samples, well spread over the period.
     weights : (w, l) float64
-        That the samples were fitted with.
+        Weights of the samples in the fit.
     """
 
     coefficients: F8
@@ -132,14 +132,14 @@ class Solution:
 
     @property
     def inverse(self) -> F8:
-        """(w, 3, 3): of the normal matrix, 0 where the window is not good."""
+        """(w, 3, 3): inverse of the normal matrix; 0 where the window is not good."""
         inverse = np.zeros_like(self.normal)
         inverse[self.good] = np.linalg.inv(self.normal[self.good])
         return inverse
 
     @property
     def pair_variance(self) -> F8:
-        """(w,): sum of the variances of a and b for samples of variance 1, as in the inverse; 0 where not good."""
+        """(w,): sum of the variances of a and b for samples of variance 1; 0 where the window is not good."""
         count = np.where(self.good, self.normal[:, 0, 0], 1.0)
         c, s = self.normal[:, 0, 1] / count, self.normal[:, 0, 2] / count
         cc, cs = self.normal[:, 1, 1] / count - c * c, self.normal[:, 1, 2] / count - c * s
@@ -148,34 +148,34 @@ class Solution:
         return np.asarray(np.where(self.good, (cc + ss) / (count * determinant), 0.0))
 
     def put(self, rows: NDArray[np.int64], other: Solution) -> None:
-        """Replace the fits of some windows by those of another solution, which holds these alone."""
+        """Replace the fits of some windows by those of another solution that contains only these windows."""
         self.coefficients[rows], self.normal[rows] = other.coefficients, other.normal
         self.residual[rows], self.good[rows] = other.residual, other.good
         self.weights[rows] = other.weights
 
     def part(self, which: NDArray[np.bool_]) -> Solution:
-        """Return the fits of some windows."""
+        """Return the fits of the selected windows."""
         coefficients, normal, residual = self.coefficients[which], self.normal[which], self.residual[which]
         return Solution(coefficients, normal, residual, self.good[which], self.weights[which])
 
 
 def solve(basis: F8, weights: F8) -> Solution:
-    """Fit every window by weighted least squares: a regression on two columns, each less its mean, nearly orthogonal.
+    """Fit every window by weighted least squares, as a regression on two centred and nearly orthogonal columns.
 
-    In a third of the time that ``numpy.linalg`` takes for the determinants and inverses of 160 normal matrices.
+    This takes a third of the time that ``numpy.linalg`` needs for determinants and inverses of 160 normal matrices.
 
     Parameters
     ----------
     basis : (w, 4, l) float64
-        Of :meth:`Windows.basis`.
+        Basis from :meth:`Windows.basis`.
     weights : (w, l) float64
-        The solution holds them as they are, no copy.
+        Weights of the samples; the solution refers to this array and does not copy it.
     """
     sums = (basis[:, :3] * weights[:, None, :]) @ basis.transpose(0, 2, 1)
     count = np.maximum(sums[:, 0, 0], 1e-300)
     (_, c, s, y), (_, cc, cs, cy), (_, _, ss, sy) = sums.transpose(1, 2, 0) / count
     cc, cs, ss, cy, sy = cc - c * c, cs - c * s, ss - s * s, cy - c * y, sy - s * y
-    determinant = cc * ss - cs * cs  # of the normal matrix over the count
+    determinant = cc * ss - cs * cs  # determinant of the normal matrix per sample
     good = (count >= LEAST_SAMPLES) & (determinant > LEAST_DETERMINANT)
     scale = good / np.where(good, determinant, 1.0)
     a, b = (ss * cy - cs * sy) * scale, (cc * sy - cs * cy) * scale
@@ -186,7 +186,7 @@ def solve(basis: F8, weights: F8) -> Solution:
 
 
 def refit(basis: F8, solution: Solution, weights: F8) -> None:
-    """Fit again with other weights, and put that into the solution; windows whose weights stay are left as they are."""
+    """Update a solution, in place, for new weights; windows with unchanged weights are not fitted again."""
     changed = np.flatnonzero((weights != solution.weights).any(axis=1))
     if changed.size:
         solution.put(changed, solve(basis[changed], weights[changed]))
@@ -202,18 +202,18 @@ def quantile(size: F8, usable: F8, share: float) -> F8:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tuning:
-    """How the basis turns and decays.
+    """Frequency and decay of the basis.
 
     Parameters
     ----------
     angular_frequency : float, rad/s
-        Of the whole record.
+        Angular frequency of the whole record.
     turning : (w,) float64, rad/s
-        Of each window.
+        Angular frequency of each window.
     decay : (w,) float64, 1/s
-        Logarithmic decay in each window.
+        Logarithmic decay rate in each window.
     phase, amplitude : (w,) float64, rad, m, or None
-        Smooth curves through those of all windows that noise lets know their phase, at every window's centre.
+        Values, at every window's centre, of smooth curves through the windows whose phase is significant.
     """
 
     angular_frequency: float
@@ -224,22 +224,22 @@ class Tuning:
 
     @classmethod
     def constant(cls, angular_frequency: float, windows: int, decay: float = 0.0) -> Tuning:
-        """Return one frequency and one decay."""
+        """Return a tuning with one frequency and one decay for all windows."""
         return cls(angular_frequency, np.full(windows, angular_frequency), np.full(windows, decay))
 
 
 def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 3) -> Tuning:
-    """Return the tuning that phases and amplitudes of a fit show.
+    """Return the tuning that follows from the phases and amplitudes of a fit.
 
     Parameters
     ----------
     windows : Windows
     solution : Solution
     omega : float, rad/s
-        Of the fit.
+        Angular frequency of the fit.
     degree : int
-        Of the polynomials in time through logarithms of amplitudes and through phases, fewer where windows are few.
-        Drag makes the decay vary along a record, amplitude the frequency.
+        Degree of the polynomials in time for the phases and the logarithms of the amplitudes; lower for few windows.
+        Drag makes the decay vary along a record, and the amplitude makes the frequency vary.
     """
     if np.count_nonzero(solution.good) < 3:
         return _retune_short(windows, omega)
@@ -259,7 +259,7 @@ def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 
     curves = np.linalg.lstsq(powers[good] * weight[:, None], seen, rcond=None)[0]
     level, smooth = (powers @ curves).T
     growth, turning = (powers[:, :degree] @ np.polynomial.chebyshev.chebder(curves)).T * (2.0 / span)
-    # Beyond the windows that know their phase both go on as they were there.
+    # Outside the windows with a significant phase, both curves are continued as straight lines.
     beyond = 0.5 * span * (place - inside)
     mean = float(turning[good] @ weight**2 / (weight @ weight))
     bound = GREATEST * omega
@@ -273,17 +273,17 @@ def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 
 
 
 def _u_amplitude(windows: Windows, solution: Solution) -> F8:
-    """Standard uncertainty of each window's amplitude, m, at the noise that is typical of the record."""
+    """Return the standard uncertainty of each window's amplitude, m, for the record's typical noise."""
     counts = np.maximum(windows.usable.sum(axis=1), 4.0)
     squares = np.einsum("wl,wl,wl->w", windows.usable, solution.residual, solution.residual) / (counts - 3.0)
     return np.asarray(np.sqrt(0.5 * median(squares[solution.good]) * solution.pair_variance))
 
 
 def _retune_short(windows: Windows, omega: float) -> Tuning:
-    """The same for a record of one or two windows, from all its samples together.
+    """Return the tuning of a record with fewer than three good windows, from all its samples together.
 
-    The spectrum of so few periods places the frequency to a tenth of itself only, too far off for one window's phase.
-    Frequency and decay are sought, rest position and amplitudes solved for at each trial (variable projection).
+    The spectrum of so few periods gives the frequency to a tenth only, which is too inaccurate for a window's phase.
+    Frequency and decay are searched; rest position and amplitudes are solved for at each trial (variable projection).
     """
     inside = windows.usable > 0
     t, y = (windows.tau + windows.centre[:, None])[inside], windows.y[inside]
@@ -300,6 +300,6 @@ def _retune_short(windows: Windows, omega: float) -> Tuning:
 
 
 def unwrap(angle: F8, t: F8, omega: float) -> F8:
-    """Total phase: the angle plus the turns that ``omega`` says lie between the windows."""
+    """Return the total phase: the angle plus the full turns between the windows, as predicted by ``omega``."""
     rotating = omega * (t - t[0])
     return np.asarray(np.unwrap(angle - rotating) + rotating)

@@ -1,4 +1,4 @@
-"""Steps: jumps of the rest position, separated from smooth drift and located to the sample."""
+"""Steps: jumps of the rest position, distinguished from smooth drift and located to the sample."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pipeline.windows.modes import Carrier
 
 __all__ = ["Params", "Step", "find_steps", "staircase", "weighed"]
 
-POSSIBLE_DRAW = 5.1  # standard deviation of a jump's place over (noise/height)^2, samples: root of 26 [Yao 1987]
+POSSIBLE_DRAW = 5.1  # standard deviation of a jump's position over (noise/height)^2, samples: sqrt(26) [Yao 1987]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,9 +30,10 @@ class Params:
     Parameters
     ----------
     changes : pipeline.windows.change_points.Params
-        Of the search for jumps.
+        Options of the search for jumps.
     sudden : float
-        Fall of chi-square by which a jump must beat a glide: the 95 % quantile for one degree of freedom.
+        Chi-square difference by which a jump must fit better than a gradual change: the 95 % quantile for one degree of
+        freedom.
     """
 
     changes: change_points.Params = field(default_factory=change_points.Params)
@@ -46,11 +47,11 @@ class Step:
     Parameters
     ----------
     time : Estimate
-        s.
+        Time of the jump, s.
     height : Estimate
-        From before to after, m.
+        Change from before to after the jump, m.
     false_alarm : float
-        Probability that a rest position that does not jump shows as much anywhere in the record.
+        Probability that a rest position without jumps shows one as significant anywhere in the record.
     """
 
     time: Estimate
@@ -64,9 +65,9 @@ def find_steps(conditioned: Conditioned, demodulated: Demodulated, params: Param
     Parameters
     ----------
     conditioned : Conditioned
-        Its samples place each jump.
+        Its samples locate each jump.
     demodulated : Demodulated
-        Its windows show whether there are any.
+        Its windows show whether there are any jumps.
     params : Params, optional
 
     Returns
@@ -75,9 +76,9 @@ def find_steps(conditioned: Conditioned, demodulated: Demodulated, params: Param
 
     Notes
     -----
-    The rest positions of the windows are searched by :func:`pipeline.windows.change_points.find_changes`. What the
-    samples show as a glide over a period or more is no step. The uncertainty of a place is that of a maximum of a
-    random walk's likelihood [1]_.
+    :func:`pipeline.windows.change_points.find_changes` searches the rest positions of the windows. A change that the
+    samples show as gradual, over a period or more, is not a step. The uncertainty of a step's time is that of the
+    maximum-likelihood estimate of a change point [1]_.
 
     References
     ----------
@@ -106,18 +107,18 @@ def staircase(steps: tuple[Step, ...], t: F8) -> F8:
 
 
 def weighed(steps: tuple[Step, ...], demodulated: Demodulated) -> tuple[tuple[Step, ...], Demodulated]:
-    """Fit the heights of all steps together, to windows from which the steps were taken out.
+    """Fit the heights of all steps together to windows from which the steps have been subtracted.
 
     Returns
     -------
     steps : tuple of Step
     demodulated : Demodulated
-        With its rest positions less what the heights changed.
+        The windows, with rest positions corrected for the changes of the heights.
 
     Notes
     -----
-    Only now do the windows that hold a step know their rest position. A line is fitted along, so that a drift does not
-    pass for height.
+    Windows that contain a step have a valid rest position only after the subtraction. A straight line is fitted at the
+    same time, so that a drift does not pass for a step's height.
     """
     rest = _Windows.of(demodulated, change_points.Params().false_alarm)
     after = np.array([rest.t >= step.time.value for step in steps], np.float64)
@@ -136,9 +137,9 @@ def weighed(steps: tuple[Step, ...], demodulated: Demodulated) -> tuple[tuple[St
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Windows:
-    """Rest positions of the windows, and their uncertainty; single windows far off are left out.
+    """Rest positions of the windows, without single outliers, and their uncertainty.
 
-    ``u`` holds what neighbours differ, so that beats do not count as steps.
+    ``u`` includes the differences between neighbours, so that beats do not count as steps.
     """
 
     t: F8
@@ -161,7 +162,7 @@ class _Windows:
 
 
 def _place(t: F8, still: F8, rest: _Windows, index: int, chances: dict[int, float], params: Params) -> Step | None:
-    """Find the sample at which the rest position jumps, near where the windows see it; None where it glides."""
+    """Locate a jump of the rest position to the sample, near where the windows show it; None if it is gradual."""
     apart, edges = params.changes.apart, [0, *chances, rest.t.size]
     here = edges.index(index)
     first, last = max(edges[here - 1], index - 2 * apart), min(edges[here + 1], index + 2 * apart) - 1
@@ -173,7 +174,7 @@ def _place(t: F8, still: F8, rest: _Windows, index: int, chances: dict[int, floa
     if not cuts.size:
         return None
     noise = mad_sigma(np.diff(y)) / math.sqrt(2.0)
-    # Heavy tails would draw the place towards themselves.
+    # Clipped, because outliers would attract the position of the jump.
     middle, apart_m = float(np.median(y)), float(np.median(y[: cuts[0]]) - np.median(y[cuts[-1] :]))
     reach = 4.0 * noise + 0.5 * abs(apart_m)
     y = np.clip(y, middle - reach, middle + reach)
@@ -186,20 +187,20 @@ def _place(t: F8, still: F8, rest: _Windows, index: int, chances: dict[int, floa
     height = float(np.median(y[cut:]) - np.median(y[:cut]))
     doubt = POSSIBLE_DRAW * (noise / height) ** 2 if height else y.size
     u_time = float(np.median(np.diff(seconds))) * math.hypot(0.5, min(doubt, 0.5 * y.size))
-    # Of a difference of medians.
+    # Uncertainty of a difference of medians.
     u_height = 1.25 * rest.u * math.sqrt(1.0 / max(index - first, 1) + 1.0 / max(last - index + 1, 1))
     when = 0.5 * float(seconds[cut - 1] + seconds[cut])
     return Step(Estimate(when, u_time, "s"), Estimate(height, u_height, "m"), chances[index])
 
 
 def _gains(sums: F8, cuts: NDArray[np.int64]) -> F8:
-    """Fall of the sum of squares that a jump at each sample brings, of values whose sums from the start are given."""
+    """Return the reduction of the sum of squares by a jump at each cut, from the values' cumulative sums."""
     before, n = cuts.astype(np.float64), float(sums.size)
     return np.asarray(sums[cuts - 1] ** 2 * n / (before * (n - before)))
 
 
 def _best_ramp(t: F8, y: F8, centre: float, period: float) -> float:
-    """The same for the best of several ramps, a period long to all of the span, around a time."""
+    """Return the reduction of the sum of squares by the best of several ramps, one period or longer, around a time."""
     centred, best = y - y.mean(), 0.0
     for width in (period, 2.0 * period, 4.0 * period, 8.0 * period, 2.0 * float(np.ptp(t))):
         for shift in np.linspace(-0.75, 0.75, 7):

@@ -1,4 +1,4 @@
-"""One run, analysed, as a notebook wants it: estimates by name, a page-wide summary, figures, frames and datasets."""
+"""One analysed run for a notebook: estimates by name, a page-wide summary, figures, frames and datasets."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ __all__ = ["Analysis"]
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Analysis(Found):
-    """One run, analysed: what :func:`springmass.analyse` returns.
+    """An analysed run, as :func:`springmass.analyse` returns it.
 
     Parameters
     ----------
     name : str
-        Of the run; its file's, where it came from one.
+        Name of the run; the name of its file if it came from a file.
 
     Notes
     -----
-    ``a["period"]`` is an :class:`~pipeline.numerics.estimate.Estimate`; names are those of
-    ``docs/reference/estimates.md``, their symbols (``a["k"]``, ``a["T"]``), the coefficients of the selected law
-    (``a["gamma"]``), ``LAW.PARAMETER`` of any law (``a["quadratic.beta"]``), and ``LAW.NAME`` of any estimate if the
-    law that is clearly ahead holds (``a["linear.damping_rate"]``). Estimates of one analysis are
-    correlated, and calculate so; estimates of two analyses are taken as independent: :func:`springmass.compare` knows
-    what two runs share.
+    ``a["period"]`` is an :class:`~pipeline.numerics.estimate.Estimate`. Valid names are those of
+    ``docs/reference/estimates.md``, their symbols (``a["k"]``, ``a["T"]``) and the coefficients of the selected law
+    (``a["gamma"]``). ``LAW.PARAMETER`` is a parameter of any law (``a["quadratic.beta"]``). ``LAW.NAME`` is any
+    estimate under the law that is clearly ahead (``a["linear.damping_rate"]``). Estimates of one analysis are
+    correlated, and arithmetic takes this into account. Estimates of two analyses are treated as independent;
+    :func:`springmass.compare` accounts for what two runs share.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Analysis(Found):
         return self.keys()
 
     def ufloat(self, name: str) -> Any:
-        """Return an estimate as an ``uncertainties.UFloat``; a plain number where it is exact.
+        """Return an estimate as an ``uncertainties.UFloat``, or as a plain number if it is exact.
 
         Parameters
         ----------
@@ -102,7 +102,7 @@ class Analysis(Found):
         Raises
         ------
         KeyError
-            If there is none of that name.
+            If no estimate has that name.
         """
         return self[name].ufloat
 
@@ -117,13 +117,13 @@ class Analysis(Found):
         Parameters
         ----------
         correlations : bool
-            Whether columns ``r(NAME)`` with the coefficients of correlation follow.
+            Whether to append columns ``r(NAME)`` with the correlation coefficients.
 
         Returns
         -------
         pandas.DataFrame
-            With the columns quantity, symbol, value, u, unit, dof, coverage_factor and expanded; the last three, as in
-            the budget of the JSON, are NaN where there is none.
+            A frame with the columns quantity, symbol, value, u, unit, dof, coverage_factor and expanded. The last three
+            are those of the budget in the JSON output, and are NaN for an estimate without a budget.
         """
         return estimates_frame(self, correlations=correlations)
 
@@ -133,10 +133,10 @@ class Analysis(Found):
         Returns
         -------
         xarray.Dataset
-            On ``time``: distance, quality, and of an oscillation fit, residual and the smoothed motion with its
-            uncertainties; on ``window``: amplitude_of_window, u_amplitude_of_window, kept and phase_of_window; on
-            ``law`` and ``window``: law_amplitude. Estimates are without a dimension, each with its ``u`` and
-            ``units`` as attributes.
+            Along ``time``: distance and quality and, for an oscillation, fit, residual, rest and the smoothed motion
+            with its uncertainties. Along ``window``: amplitude_of_window, u_amplitude_of_window, kept and
+            phase_of_window. Along ``law`` and ``window``: law_amplitude. Estimates have no dimension; their ``u`` and
+            ``units`` are attributes.
         """
         return run_dataset(self)
 
@@ -148,7 +148,7 @@ class Analysis(Found):
 
 
 class _NoEstimate(KeyError):
-    """A name that no estimate has; shown as a sentence, not as the repr of one."""
+    """The error for a name that no estimate has; its message is shown as a plain sentence, not as a repr."""
 
     def __str__(self) -> str:
         return str(self.args[0])

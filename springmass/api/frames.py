@@ -1,4 +1,4 @@
-"""Analyses and comparisons as the frames of pandas and the datasets of xarray."""
+"""Analyses and comparisons as pandas frames and xarray datasets."""
 
 from __future__ import annotations
 
@@ -54,13 +54,13 @@ def _expanded(budget: Budget | None) -> dict[str, float]:
 
 
 def comparison_frame(found: Comparison, periods: dict[str, Estimate]) -> pd.DataFrame:
-    """Return one row per run and one for their mean, by name.
+    """Return one row per run and one for their mean, indexed by name.
 
     Parameters
     ----------
     found : Comparison
     periods : dict of str to Estimate
-        Of each run.
+        Period of each run, by name.
     """
     import pandas as pd
 

@@ -1,4 +1,4 @@
-"""A recording in a notebook, drawn while it goes on: the page's chart and the page's messages, in a widget."""
+"""A notebook widget that draws a recording while it goes on, with the page's chart and the page's messages."""
 
 from __future__ import annotations
 
@@ -25,36 +25,37 @@ TURN_S = 0.05
 
 
 def script() -> str:
-    """Return the widget's module: uPlot and the page's store of samples, and the chart."""
+    """Return the widget's JavaScript module: uPlot, the page's store of samples, and the chart."""
     names = ("uPlot.iife.min.js", "samples.js", "notebook.js")
     return "\n".join((STATIC / name).read_text(encoding="utf-8") for name in names)
 
 
 def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0, **options: Any) -> anywidget.AnyWidget:
-    """Return a chart of a recording for a notebook, which goes on as long as the recording does.
+    """Return a notebook chart of a recording, which is updated until the recording ends.
 
     Parameters
     ----------
     source : path
         The wire log of a recording, or any recording that :func:`springmass.load` reads.
     seconds : float or None
-        How much of its end is shown, s; None: all of it. A recording that is over is shown whole.
+        Duration that is shown, counted back from the latest sample, s; None shows everything. A finished recording is
+        always shown whole.
     **options
-        Of a recording that is over, as :func:`springmass.load` takes them.
+        Options for a finished recording, as :func:`springmass.load` takes them.
 
     Raises
     ------
     ProgramError
         If anywidget is not installed.
     acquisition.errors.NeedsAnswer
-        If the file leaves something open that was not given.
+        If the file lacks information that was not given.
     springmass.errors.ProgramError, storage.errors.StorageError
         If the source cannot be read.
 
     Notes
     -----
-    The log is read and nothing is written: a notebook cannot delay or end a recording. Samples travel as the page's
-    binary messages do (``docs/reference/page-messages.md``). ``chart.stop()`` ends the reading.
+    The log is only read, so a notebook cannot delay or end a recording. Samples are sent as the page's binary messages
+    (``docs/reference/page-messages.md``). ``chart.stop()`` stops the reading.
     """
     try:
         from springmass.api.live_widget import LiveChart
@@ -68,13 +69,13 @@ def live(source: str | os.PathLike[str], *, seconds: float | None = 10.0, **opti
 
 
 class Transmission:
-    """Sends the samples of one recording to one chart, from its beginning and as they come.
+    """Sends all samples of one recording to one chart: first the earlier ones, then new ones as they arrive.
 
     Parameters
     ----------
     view : View
     poll : callable
-        Takes what has come into the view.
+        Adds newly arrived samples to the view.
     """
 
     def __init__(self, view: View, poll: Callable[[], None]) -> None:
@@ -83,18 +84,18 @@ class Transmission:
         self._sent = 0
 
     def start(self, chart: Chart) -> None:
-        """Send in a thread until the recording has ended."""
+        """Start a thread that sends new samples until the recording has ended."""
         threading.Thread(target=self._go_on, args=(chart,), name="springmass-live", daemon=True).start()
 
     def begin(self, chart: Chart) -> None:
-        """Send all from the beginning to a chart that asks for it."""
+        """Send all samples from the beginning to a chart that requests them."""
         with self._lock:
             self._sent = 0
             chart.send(self._view.hello(controls=False))
             self._send(chart)
 
     def stop(self) -> None:
-        """Read no further."""
+        """Stop reading the recording."""
         self._over.set()
 
     def _send(self, chart: Chart) -> None:
@@ -108,12 +109,12 @@ class Transmission:
         while not self._over.wait(TURN_S) and not (self._view.ended or self._view.error):
             with self._lock:
                 self._poll()
-                if self._sent:  # nobody asked to begin yet
+                if self._sent:  # zero until the chart has requested the samples
                     self._send(chart)
 
 
 class Chart(Protocol):
-    """What samples are sent to."""
+    """The receiver of the samples."""
 
     def send(self, content: Any, buffers: list[bytes] | None = None) -> None:
         """Send a message to the browser."""

@@ -1,4 +1,4 @@
-"""The chart in a notebook; its import needs anywidget."""
+"""The chart for a notebook; importing this module requires anywidget."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class LiveChart(anywidget.AnyWidget):
     Parameters
     ----------
     transmission : Transmission
-        What sends the samples.
+        The sender of the samples.
     **traits
-        ``seconds``: how much of the end is shown, s; 0: all of it.
+        ``seconds``: the duration that is shown, counted back from the latest sample, s; 0 shows everything.
     """
 
     _esm = script()
@@ -34,7 +34,7 @@ class LiveChart(anywidget.AnyWidget):
         transmission.start(self)
 
     def stop(self) -> None:
-        """Read no further."""
+        """Stop reading the recording."""
         self._transmission.stop()
 
     def _take(self, _: Any, content: Any, _buffers: Any) -> None:

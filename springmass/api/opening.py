@@ -1,4 +1,4 @@
-"""Run files opened for scripts: parts of them by time, and their analyses."""
+"""Run files opened by scripts: selection of a part by time, and analysis."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ __all__ = ["Part", "Run", "open_run"]
 
 
 class Run(Stored):
-    """An open run file, with what can be done to it by name: :meth:`sel` and :meth:`analyse`.
+    """An open run file with the additional methods :meth:`sel` and :meth:`analyse`.
 
-    All else as in :class:`storage.run_file.reading.Run`.
+    Everything else is as in :class:`storage.run_file.reading.Run`.
     """
 
     __slots__ = ()
@@ -32,7 +32,7 @@ class Run(Stored):
         Parameters
         ----------
         time : slice
-            In s, both ends included: ``slice(5, 60)``, ``slice(5, None)``.
+            Start and end in s, both included: ``slice(5, 60)``, ``slice(5, None)``.
 
         Raises
         ------
@@ -56,7 +56,7 @@ class Part:
     ----------
     run : Run
     from_s, to_s : float or None
-        Both included; None: from the first, to the last.
+        Start and end in s, both included; None means the first or the last sample.
     """
 
     run: Run
@@ -68,23 +68,23 @@ class Part:
         return analyse(self.run, scene, from_s=self.from_s, to_s=self.to_s, **how)
 
     def dataset(self) -> xr.Dataset:
-        """Return these samples as a dataset that reads them when they are asked for."""
+        """Return these samples as a dataset that reads them on first use."""
         return self.run.dataset().sel(time=slice(self.from_s, self.to_s))
 
 
 def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
-    """Open a run file for reading; to be used in a ``with``, or closed.
+    """Open a run file for reading; use it in a ``with`` block or close it.
 
     Parameters
     ----------
     path : str or PathLike
     unverified : bool
-        Whether to give what does not fit its digest, to look at it.
+        Whether to return data that do not match their digest, for inspection.
 
     Raises
     ------
     storage.errors.NotARun, storage.errors.RunDamaged
-        As :func:`storage.run_file.reading.open_run`.
+        Under the same conditions as in :func:`storage.run_file.reading.open_run`.
     """
     found = open_stored(Path(path), unverified=unverified)
     return Run(found.path, found.handle, found.header, found.sha256, found.unverified)

@@ -1,4 +1,4 @@
-"""The report's figures, drawn into axes of one's own."""
+"""The report's figures, drawn into the caller's axes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ __all__ = ["Plot"]
 class Plot:
     """The figures of an analysis.
 
-    Every one takes ``ax``, a matplotlib ``Axes`` to draw into, and returns it; left out, a new figure of pyplot is
-    made. What is drawn is the report's main panel, in the reader's own style.
+    Every method draws into ``ax``, a matplotlib ``Axes``, and returns it; without ``ax`` it makes a new pyplot figure.
+    It draws the main panel of the report's figure in the caller's matplotlib style.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Plot:
     analysis: Analysis
 
     def __call__(self, ax: Axes | None = None) -> Axes:
-        """Draw the distance with its fit; as :meth:`position`."""
+        """Draw the distance with its fit, as :meth:`position` does."""
         return self.position(ax=ax)
 
     def position(self, ax: Axes | None = None, *, from_s: float | None = None, to_s: float | None = None) -> Axes:
@@ -46,7 +46,7 @@ class Plot:
         ----------
         ax : Axes, optional
         from_s, to_s : float, optional
-            Of these seconds only.
+            Limits of the time range to draw, s; default: the whole run.
         """
         panel, t = _axes(ax), self.analysis.track.t
         start = float(np.nanmin(t)) if from_s is None else from_s
@@ -60,7 +60,7 @@ class Plot:
         ----------
         ax : Axes, optional
         laws : sequence of str, optional
-            Names of those to draw; left out, all that were fitted.
+            Names of the laws to draw; default: all that were fitted.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class Plot:
         return _finished(panel, "time / s")
 
     def phase(self, ax: Axes | None = None) -> Axes:
-        """Draw velocity against displacement, the time as a colour.
+        """Draw velocity against displacement, with the time as colour.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class Plot:
         return _finished(panel, "displacement / mm")
 
     def energy(self, ax: Axes | None = None) -> Axes:
-        """Draw the mechanical energy against time with its band.
+        """Draw the mechanical energy against time with its uncertainty band.
 
         Raises
         ------
@@ -99,12 +99,12 @@ class Plot:
         return _finished(panel, "time / s")
 
     def drag(self, ax: Axes | None = None) -> Axes:
-        """Draw the drag coefficient against amplitude with its band.
+        """Draw the drag coefficient against amplitude with its uncertainty band.
 
         Raises
         ------
         AnalysisError
-            If scene or record give none.
+            If the scene or the recording does not determine a drag coefficient.
         ValueError
             If nothing oscillates.
         """
@@ -118,7 +118,7 @@ class Plot:
 
 
 def _axes(ax: Axes | None) -> Axes:
-    """Return the axes given, or those of a new figure."""
+    """Return the given axes, or the axes of a new figure."""
     if ax is not None:
         return ax
     from matplotlib import pyplot

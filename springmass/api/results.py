@@ -25,17 +25,17 @@ def results(
     folder : path
         The folder of results.
     form : {"frame", "dataset"}
-        A :class:`pandas.DataFrame`, or an :class:`xarray.Dataset` along ``run`` with ``units``.
+        A :class:`pandas.DataFrame`, or an :class:`xarray.Dataset` with the dimension ``run`` and attributes ``units``.
 
     Returns
     -------
     pandas.DataFrame or xarray.Dataset
-        Columns as in the reference of a course's results: NAME and NAME_u in SI units, NaN where a run gives nothing.
+        Columns as in the reference of a course's results: NAME and NAME_u in SI units, NaN where a run has no value.
 
     Raises
     ------
     springmass.errors.ProgramError
-        If the folder holds no complete course, or its rows are damaged.
+        If the folder contains no complete course, or its rows are damaged.
     """
     import pandas as pd
 

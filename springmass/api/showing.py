@@ -1,4 +1,4 @@
-"""An analysis shown: 15 lines in a terminal, a page-wide summary in a notebook."""
+"""Summaries of an analysis: at most 15 lines for a terminal, and page-wide HTML for a notebook."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["html_summary", "text_summary"]
 
 WIDTH = 79
 MOST_ROWS = 10
-# The quantities shown first where not all have room.
+# Quantities that the text summary may show, in this order; it shows at most MOST_ROWS of them.
 FIRST = (
     "period",
     "spring_constant",
@@ -44,7 +44,7 @@ def text_summary(analysis: Analysis) -> str:
     Parameters
     ----------
     analysis : Analysis
-        Its ``name`` stands first where it has one.
+        Its ``name``, if it has one, comes first.
     """
     rows = {row.name: row for row in table_rows([analysis])}
     shown = [name for name in FIRST if name in rows][:MOST_ROWS]
@@ -60,7 +60,7 @@ def text_summary(analysis: Analysis) -> str:
 
 
 def html_summary(analysis: Analysis) -> str:
-    """Return an analysis as a piece of HTML without scripts: its estimates, its laws, its findings.
+    """Return an analysis as an HTML fragment without scripts: estimates, laws and findings.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whatever a user has in hand, analysed: paths, open runs, datasets, frames, arrays."""
+"""Analysis of every kind of input: paths, open runs, datasets, frames, arrays."""
 
 from __future__ import annotations
 
@@ -56,31 +56,32 @@ def analyse(
     Parameters
     ----------
     source : path, Run, Loaded, Track, Dataset, DataArray, DataFrame, Series, mapping or pair of arrays
-        A recording, run file or wire log by its path, or what :func:`springmass.open_run` and
-        :func:`springmass.load` give: these know clock, calibration and scene. Of a dataset, a frame or a mapping
-        ``"time"`` (s) and ``"distance"`` (m) are taken, and ``"quality"`` where there is one; of a data array or a
-        series its values against ``time`` or its index; of a pair ``(t, y)`` both. Values that are NaN are missing.
+        The path of a recording, run file or wire log, or a result of :func:`springmass.open_run` or
+        :func:`springmass.load`; these include clock, calibration and scene. A dataset, a frame or a mapping has
+        ``"time"`` (s), ``"distance"`` (m) and optionally ``"quality"``. The values of a data array or a series are
+        distances, and its ``time`` or its index gives the times. A pair is ``(t, y)``. NaN marks missing values.
     scene : Scene, path or mapping, optional
-        What is known of the bench. Left out: of ``NAME.h5`` the ``[scene]`` of ``NAME.about.toml`` beside it, else the
+        Known values of the bench. Default for ``NAME.h5``: the ``[scene]`` of ``NAME.about.toml`` beside it, else the
         scene inside the run file, else nothing.
     params : pipeline.analyse.Params, optional
-        Options of every stage, in place of a tier's.
+        Options of every stage, instead of the options of a tier.
     accuracy : {"fast", "standard", "best"}, optional
-        Tier, "standard" where it is left out; not together with ``params``.
+        Tier; default: "standard". It cannot be combined with ``params``.
     law : str or Law, optional
         The damping law, if it is known: a name of :data:`springmass.LAWS` or a law of :func:`springmass.make_law`. The
-        results are stated by it alone, and findings say whether the run contradicts it. "any" leaves the choice to the
-        run, whatever the scene states; left out, the scene's counts.
+        results are based on it alone, and findings report whether the run contradicts it. "any" lets the run choose,
+        regardless of the scene. Default: the law of the scene.
     laws : sequence of str or Law, optional
         The damping laws to try: names of :data:`springmass.LAWS`, laws of :func:`springmass.make_law`, and ``...`` for
-        all that ship.
+        all built-in laws.
     options : mapping, optional
-        Single options of stages by the names of :class:`springmass.Params`: ``{"damping": {"evidence": 10.0}}``.
+        Individual options of stages, under the names of :class:`springmass.Params`:
+        ``{"damping": {"evidence": 10.0}}``.
     from_s, to_s : float, optional
-        Use samples of these seconds only.
+        Limits of the time range to use, s; default: the whole run.
     **completions
-        What a recording leaves open, as :func:`springmass.load` takes it: velocity, channel, rate_hz, unit, run, time,
-        time_unit, clock_ppm, unverified.
+        Options for reading a recording, as :func:`springmass.load` takes them: velocity, channel, rate_hz, unit, run,
+        time, time_unit, clock_ppm, unverified.
 
     Returns
     -------
@@ -89,11 +90,12 @@ def analyse(
     Raises
     ------
     AnalysisError
-        If fewer than eight samples are usable, or a law or an option is not known.
+        If fewer than eight samples are usable, or a law or an option is unknown.
     TrackError
-        If the arrays are no track.
+        If the arrays do not form a track.
     acquisition.errors.NeedsAnswer
-        If the file leaves something open that was not given. Its ``question`` lists what is missing and every answer.
+        If the file lacks information that was not given. The error's ``question`` lists what is missing and every
+        answer.
     acquisition.errors.FormatError, storage.errors.StorageError, springmass.errors.ProgramError
         If a file or a scene cannot be read.
 
@@ -137,25 +139,26 @@ def load(path: str | os.PathLike[str], **options: Any) -> Loaded:
     ----------
     path : path
     **options
-        The fields of :class:`springmass.runs.options.ReadOptions`: what the file leaves open (velocity, channel, run,
-        rate_hz, unit, time, time_unit), and from_s, to_s, clock_ppm, unverified.
+        The fields of :class:`springmass.runs.options.ReadOptions`: information that the file may lack (velocity,
+        channel, run, rate_hz, unit, time, time_unit), and from_s, to_s, clock_ppm, unverified.
 
     Raises
     ------
     acquisition.errors.NeedsAnswer
-        If the file leaves something open that was not given. Its ``question`` lists what is missing and every answer.
+        If the file lacks information that was not given. The error's ``question`` lists what is missing and every
+        answer.
     acquisition.errors.FormatError, storage.errors.StorageError
-        If it cannot be read; one line.
+        If the file cannot be read; the message is one line.
     ProgramError
-        If no sample lies within the seconds asked for.
+        If no sample lies between ``from_s`` and ``to_s``.
     TypeError
-        If an option is not known.
+        If an option is unknown.
     """
     return load_file(path, "springmass.load", options)
 
 
 def load_file(path: str | os.PathLike[str], function: str, options: Mapping[str, Any]) -> Loaded:
-    """Load a file; what it leaves open is asked as arguments of the function that was called."""
+    """Load a file; an error about missing information names the arguments of the called function."""
     given = ReadOptions.of(options)
     try:
         return read(Path(path), given)
@@ -165,7 +168,7 @@ def load_file(path: str | os.PathLike[str], function: str, options: Mapping[str,
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Comparison(Compared):
-    """What several runs of one spring say together: what :func:`springmass.compare` returns.
+    """The joint result of several runs of one spring, as :func:`springmass.compare` returns it.
 
     Parameters
     ----------
@@ -175,13 +178,13 @@ class Comparison(Compared):
     runs: Mapping[str, Analysis]
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return one row per run and one, "together", for their mean.
+        """Return one row per run, and a row "together" for their mean.
 
         Returns
         -------
         pandas.DataFrame
-            With the columns period and u_period (s), spring_constant, u and u_own (N/m), pull and agree; the mean is
-            NaN where the runs disagree.
+            A frame with the columns period and u_period (s), spring_constant, u and u_own (N/m), pull and agree; the
+            mean is NaN where the runs disagree.
         """
         return comparison_frame(self.comparison, {name: run["period"] for name, run in self.runs.items()})
 
@@ -196,18 +199,18 @@ def compare(
     mass_correlation: float = 0.0,
     **how: Any,
 ) -> Comparison:
-    """Say whether runs agree on one spring, and whether one damping law holds across those of one bob.
+    """Test whether runs agree on one spring constant, and whether one damping law fits all runs of one bob.
 
     Parameters
     ----------
     sources : sequence
-        Two at least: analyses, or whatever :func:`analyse` takes.
+        At least two analyses, or sources that :func:`analyse` takes.
     scene : optional
-        As for :func:`analyse`: one for all runs, or a list with one for each; left out, that of each run.
+        As for :func:`analyse`: one for all runs, or a list with one for each; default: each run's own scene.
     mass_correlation : float
-        Of the errors of two bobs' masses, 0 to 1.
+        Correlation between the errors of two bobs' masses, 0 to 1.
     **how
-        As for :func:`analyse`.
+        Keyword arguments of :func:`analyse`.
 
     Raises
     ------
@@ -231,18 +234,18 @@ def compare(
 
 
 def with_options(params: Params, options: Mapping[str, Mapping[str, Any]]) -> Params:
-    """Return options with single ones changed.
+    """Return the options with individual ones changed.
 
     Parameters
     ----------
     params : Params
     options : mapping
-        By stage, then by name.
+        The changed options, by stage and then by name.
 
     Raises
     ------
     AnalysisError
-        If a stage or an option is not known.
+        If a stage or an option is unknown.
     """
     for stage, changed in options.items():
         stages = [each.name for each in fields(Params)]
@@ -259,7 +262,7 @@ def with_options(params: Params, options: Mapping[str, Mapping[str, Any]]) -> Pa
 
 
 def track_of(source: Any) -> Track:
-    """Return the track of arrays, however they are held; see :func:`analyse`.
+    """Return a track from arrays in any supported container; see :func:`analyse`.
 
     Parameters
     ----------
@@ -268,7 +271,7 @@ def track_of(source: Any) -> Track:
     Raises
     ------
     TrackError
-        If it holds no times and distances.
+        If the source contains no times and distances.
     """
     if isinstance(source, Track):
         return source
@@ -304,7 +307,7 @@ def track_of(source: Any) -> Track:
 
 
 def _seconds(t: Any) -> F8:
-    """Return times in s; of durations and dates those since the first."""
+    """Return times in s; dates become the time since the first date."""
     times = np.asarray(t)
     if times.dtype.kind == "M":
         times = times - times[0]
@@ -314,7 +317,7 @@ def _seconds(t: Any) -> F8:
 
 
 def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:
-    """Return the laws asked for, ``...`` replaced by all that ship and are not named."""
+    """Return the requested laws, with ``...`` replaced by all built-in laws that are not named."""
     if isinstance(wanted, str):
         raise AnalysisError(f"laws must be a list of names and laws, got the text {wanted!r}")
     named = [law for law in wanted if not isinstance(law, EllipsisType)]
@@ -328,7 +331,7 @@ def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:
 
 
 def _scene(given: Any) -> Scene | None:
-    """Return the scene that was given, in whatever form."""
+    """Return the given scene as a ``Scene``, or None if none was given."""
     if given is None or isinstance(given, Scene):
         return given
     return Scene.from_mapping(given) if isinstance(given, Mapping) else read_scene(given)

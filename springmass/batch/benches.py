@@ -1,4 +1,4 @@
-"""Compare the runs of a course: springs, discs, scatter between and within benches, runs noted wrongly."""
+"""Compare the runs of a course: springs, discs, scatter within and between benches, and wrongly labelled runs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from springmass.errors import UNREADABLE, USAGE, ProgramError
 __all__ = ["CourseComparison", "compare_rows", "compared_json", "compared_text"]
 
 BENCHES = ("bench", "group", "section", COURSE)
-"""Columns that distinguish benches; the first that the course has is used."""
+"""Candidate columns that distinguish benches; the first one that the course has is used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +28,15 @@ class CourseComparison:
     Parameters
     ----------
     runs : int
-        Runs with a period.
+        Number of runs with a period.
     bench : str
         The column that distinguishes benches.
     agreements : tuple of Agreement
-        Spring constants by spring, drag coefficients by disc; without the suspects.
+        Agreement of spring constants for each spring and of drag coefficients for each disc, without the suspects.
     suspects : tuple of Suspect
+        Runs that differ from their course.
     laws : mapping of str to int
-        How many runs each damping law was selected for.
+        Number of runs for which each damping law was selected.
     """
 
     runs: int
@@ -51,15 +52,15 @@ def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None)
     Parameters
     ----------
     rows : sequence of mapping
-        Of the table, by column. The columns ``spring`` and ``disc`` distinguish springs and discs if the course has
-        them, else the spring's mass and the disc's diameter.
+        Rows of the table by column. The columns ``spring`` and ``disc`` distinguish springs and discs if a row has
+        them; otherwise the spring's mass and the disc's diameter do.
     bench : str, optional
-        The column that distinguishes benches; left out, the first of :data:`BENCHES` that is there.
+        The column that distinguishes benches; if omitted, the first of :data:`BENCHES` that exists.
 
     Raises
     ------
     ProgramError
-        With exit code 2 if there is no such column, 3 if fewer than two runs have a period.
+        With exit code 2 if the column does not exist, 3 if fewer than two runs have a period.
     """
     moving = [row for row in rows if row["status"] == "ok"]
     if len(moving) < 2:
@@ -130,7 +131,7 @@ def _number(row: Mapping[str, Any], name: str) -> float:
 
 
 def compared_json(comparison: CourseComparison) -> dict[str, Any]:
-    """Return a comparison as a mapping that JSON can hold."""
+    """Return a comparison as a JSON-serialisable mapping."""
     from springmass.runs.json_results import SCHEMA, plain
 
     fields: dict[str, Any] = plain(comparison)
@@ -138,7 +139,7 @@ def compared_json(comparison: CourseComparison) -> dict[str, Any]:
 
 
 def compared_text(comparison: CourseComparison) -> str:
-    """Return a comparison in lines."""
+    """Return a comparison as lines of text."""
     lines = [f"{comparison.runs} runs; benches distinguished by {comparison.bench}", ""]
     for group in comparison.agreements:
         of = f" of {group.group}" if group.group else ""

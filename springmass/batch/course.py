@@ -1,4 +1,4 @@
-"""``runs.csv``: the known values of each run of a course, in rows for files or for patterns."""
+"""Read ``runs.csv``, a table of known values for the runs of a course, with rows for files or patterns."""
 
 from __future__ import annotations
 
@@ -33,27 +33,27 @@ TEMPLATE = (
     "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
     "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
 )  # fmt: skip
-LARGEST = 64 << 20  # bytes
+LARGEST = 64 << 20  # maximum size of a table of runs, bytes
 _UNIT = re.compile(r"_(kg|g|m|mm|cm|s|hz|c|pa|n_per_m|per_s)(_u)?$")
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What one row states about a run, or all rows that match it.
+    """The values that one row states about a run, or all matching rows together.
 
     Parameters
     ----------
     scene_file : str
-        Empty if none is named.
+        Path of the scene file; empty if none is named.
     scene : mapping
-        By attribute of a scene, the name of a position or (value, u).
+        The name of a position, or (value, u), by attribute of a scene.
     answers : mapping
-        What the recording leaves open, as :func:`springmass.runs.loading.load` takes it.
+        Answers to what the recording leaves open: reading options of :class:`springmass.runs.options.ReadOptions`.
     tags : mapping of str to str
     line : int
-        Number in the file; of several rows the first.
+        Line number in the file; for several rows, that of the first.
     law : str
-        Damping law that is stated; empty where none is.
+        Stated damping law; empty if none is stated.
     """
 
     scene_file: str = ""
@@ -72,9 +72,9 @@ class Course:
     ----------
     path : Path
     tags : tuple of str
-        Names of its columns that are no part of a scene or a recording.
+        Names of columns that describe neither a scene nor a recording.
     rows : tuple of (str, Entry)
-        A path or pattern, and what its row states.
+        Path or pattern of each row, with the values that the row states.
     """
 
     path: Path
@@ -82,17 +82,17 @@ class Course:
     rows: tuple[tuple[str, Entry], ...]
 
     def files(self) -> list[str]:
-        """Return the files that it names without a pattern; relative paths begin at its folder."""
+        """Return the files named without a pattern; relative paths start from the table's folder."""
         named = [os.path.join(self.path.parent, text) for text, _ in self.rows if not self.is_pattern(text)]
         return list(dict.fromkeys(named))
 
     def is_pattern(self, text: str) -> bool:
-        """Return whether a row's path is a pattern, and not the name of a file such as ``run [1].txt``."""
+        """Return whether a row's path is a pattern rather than the name of a file such as ``run [1].txt``."""
         return any(mark in text for mark in "*?[") and not os.path.exists(os.path.join(self.path.parent, text))
 
 
 def template(paths: Sequence[str]) -> str:
-    """Return a ``runs.csv`` to fill in, a row for each path."""
+    """Return a ``runs.csv`` to fill in, with one row per path."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(TEMPLATE)
@@ -101,12 +101,14 @@ def template(paths: Sequence[str]) -> str:
 
 
 def read_course(path: str | Path) -> Course:
-    """Read a table of runs: commas, semicolons or tabs, a decimal comma where commas do not part the columns.
+    """Read a table of runs separated by commas, semicolons or tabs.
+
+    Numbers may have a decimal comma unless commas separate the columns.
 
     Raises
     ------
     ProgramError
-        With exit code 2 if it is no such table; the line names row, column and value.
+        With exit code 2 if the file is not such a table; the message names row, column and value.
     """
     path = Path(path)
     table = list(_table(path))
@@ -132,7 +134,7 @@ def read_course(path: str | Path) -> Course:
 
 
 def _table(path: Path) -> Iterator[tuple[int, list[str], bool]]:
-    """Yield line number, cells and whether numbers may have a decimal comma."""
+    """Yield line number, cells and whether numbers may have a decimal comma, for each row."""
     try:
         if path.stat().st_size > LARGEST:
             raise ProgramError(f"{path}: a table of runs must be at most {LARGEST >> 20} MB", USAGE)
@@ -154,7 +156,7 @@ def _table(path: Path) -> Iterator[tuple[int, list[str], bool]]:
 
 
 def _checked(path: Path, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the tags among the names of columns."""
+    """Return the tags among the column names; refuse unknown or repeated columns."""
     if "path" not in names:
         raise ProgramError(f"{path}: no column path, got {', '.join(names)}; see batch --template", USAGE)
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -206,10 +208,10 @@ def _entry(path: Path, line: int, values: Mapping[str, str], tags: Sequence[str]
 
 
 def join(course: Course, files: Sequence[InputFile]) -> tuple[list[tuple[InputFile, Entry]], list[str], list[str]]:
-    """Return each file with what the table states about it, rows without a file, and files without a row.
+    """Return each file with its values from the table, rows without a file, and files without a row.
 
-    A file has a run for each row that names it by its path with another ``run`` or ``channel``. A row with a path
-    takes precedence over one with a pattern.
+    A file has one run for each row that names its path with a different ``run`` or ``channel``. A row with a path
+    takes precedence over a row with a pattern.
 
     Raises
     ------
@@ -248,7 +250,7 @@ def join(course: Course, files: Sequence[InputFile]) -> tuple[list[tuple[InputFi
 
 
 def _together(course: Course, path: str, rows: Sequence[Entry]) -> Entry:
-    """Return what all patterns state that a file matches."""
+    """Return the combined values of all patterns that match a file."""
     whole = Entry()
     for entry in rows:
         for part in ("scene", "answers", "tags"):
@@ -270,7 +272,7 @@ def _over(under: Entry, over: Entry) -> Entry:
 
 
 def _matches(whole: str, pattern: str, here: str) -> bool:
-    """Return whether a path matches; a pattern without a slash is compared only with its name."""
+    """Return whether a path matches a pattern; a pattern without a slash is compared only with the file name."""
     if "/" not in pattern:
         return fnmatchcase(os.path.basename(whole), pattern)
     return fnmatchcase(whole, os.path.normpath(os.path.join(here, pattern)))

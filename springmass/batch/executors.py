@@ -1,4 +1,4 @@
-"""The workers: this process, processes of this machine, or the workers of a dask cluster; one loop for all."""
+"""Run tasks in this process, in processes of this machine, or on a dask cluster, with one loop for all of them."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ __all__ = ["BATCH", "LOST", "Lost", "Workers", "dask_workers", "local_workers", 
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-BATCH = 100  # tasks of a batch at most: to hand out one run by dask takes three times as long as to analyse it
-AHEAD = 2  # batches a worker, so that none waits for the next
-FEW = 3  # tasks for which to start a second process takes longer than it saves
+BATCH = 100  # maximum tasks per batch; to hand out a single run, dask takes three times as long as its analysis
+AHEAD = 2  # batches handed out per worker, so that no worker waits for its next batch
+FEW = 3  # up to this many tasks, starting a second process takes longer than it saves
 
 
 class Lost:
-    """Stands for the result of a task whose worker died."""
+    """Placeholder for the result of a task whose worker died."""
 
 
 LOST = Lost()
@@ -32,18 +32,18 @@ LOST = Lost()
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Where work is done.
+    """The workers that do the tasks.
 
     Parameters
     ----------
     start : callable
-        Returns a context that gives an executor; called again for a new one after a worker has died.
+        Returns a context manager for an executor; called again for a new one after a worker has died.
     count : int or None
-        How many tasks are done at the same time; None where workers come and go.
+        Number of tasks done at the same time; None if workers come and go.
     died : tuple of type
-        What a future raises if the worker of its task died.
+        Exceptions that a future raises if the worker of its task died.
     address : str
-        Of the scheduler; empty where all is done on this machine.
+        Address of the scheduler; empty if all work is done on this machine.
     """
 
     start: Callable[[], AbstractContextManager[Executor]]
@@ -53,7 +53,7 @@ class Workers:
 
 
 class _ThisProcess(Executor):
-    """Do a task at the moment when it is submitted."""
+    """Executor that does each task as soon as it is submitted."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
@@ -62,7 +62,7 @@ class _ThisProcess(Executor):
 
 
 def local_workers(tasks: int, processes: int | None = None) -> Workers:
-    """Return processes of this machine, by default one per core; for a few tasks, only this process."""
+    """Return processes of this machine, by default one per core; for a few tasks, return only this process."""
     number = min(processes or cores(), tasks)
     if number <= 1 or tasks <= FEW:
         return Workers(_ThisProcess, 1)
@@ -71,7 +71,7 @@ def local_workers(tasks: int, processes: int | None = None) -> Workers:
 
 @contextlib.contextmanager
 def _pool(processes: int) -> Iterator[Executor]:
-    """Give a pool whose processes are ended on an error or Ctrl-C: a batch may take minutes."""
+    """Yield a pool whose processes are terminated on an error or Ctrl-C, because a batch may take minutes."""
     others = set(active_children())
     with pool(processes) as executor:
         try:
@@ -84,12 +84,12 @@ def _pool(processes: int) -> Iterator[Executor]:
 
 @contextlib.contextmanager
 def dask_workers(address: str) -> Iterator[Workers]:
-    """Give the workers of a dask cluster, which find the inputs at the same paths as this process.
+    """Yield the workers of a dask cluster, which must find the inputs at the same paths as this process.
 
     Raises
     ------
     ProgramError
-        With exit code 2 without dask or a scheduler at the address.
+        With exit code 2 if dask is not installed or no scheduler answers at the address.
     """
     try:
         from distributed import Client, KilledWorker
@@ -117,25 +117,26 @@ def dask_workers(address: str) -> Iterator[Workers]:
 def outcomes(
     work: Callable[[Sequence[Task]], Result], tasks: Sequence[Task], workers: Workers, *, batch: int = BATCH
 ) -> Iterator[tuple[Sequence[Task], Result | Lost]]:
-    """Yield batches of tasks with the result of each, as they are finished.
+    """Yield batches of tasks with their results, as they are finished.
 
-    A worker that dies costs the batches that were handed out. Their tasks are done again, each as a separate batch;
-    the result of one under which a worker dies again is :data:`LOST`.
+    If a worker dies, the batches that were handed out are lost. Their tasks are repeated, each as a separate batch. If
+    a worker dies again during such a task, its result is :data:`LOST`.
 
     Parameters
     ----------
     work : callable
-        Of a batch; a function that can be pickled.
+        Picklable function that takes a batch and returns its result.
     tasks : sequence
     workers : Workers
     batch : int
-        Tasks of a batch at most. Where the number of workers is known, there are four batches for each, so that none
-        waits long for the last, and :data:`AHEAD` of them are handed out at a time; else all are.
+        Maximum number of tasks per batch. If the number of workers is known, each gets at least four batches, so that
+        none waits long for the last worker. Only :data:`AHEAD` batches per worker are then handed out at a time;
+        otherwise all batches are handed out immediately.
 
     Raises
     ------
     ProgramError
-        With exit code 1 if the workers of another machine were taken away or cannot do this work.
+        With exit code 1 if the workers of a cluster disappear or cannot do this work.
     """
     size = batch if workers.count is None else max(1, min(batch, len(tasks) // (4 * workers.count)))
     waiting: deque[Sequence[Task]] = deque(tasks[at : at + size] for at in range(0, len(tasks), size))
@@ -155,7 +156,10 @@ def outcomes(
 def _until_one_dies(
     work: Callable[[Sequence[Task]], Result], waiting: deque[Sequence[Task]], workers: Workers, ahead: int
 ) -> Iterator[tuple[Sequence[Task], Result | Lost]]:
-    """Yield batches and results of one executor; those that were lost with a worker at last, the others wait."""
+    """Yield batches and results of one executor until a worker dies.
+
+    Batches lost with the worker are yielded last, with :data:`LOST`; batches not yet handed out stay in ``waiting``.
+    """
     running: dict[Future[Result], Sequence[Task]] = {}
     lost: list[Sequence[Task]] = []
     with workers.start() as executor:

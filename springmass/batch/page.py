@@ -1,4 +1,4 @@
-"""The page of a course: every run in a table that sorts, the runs that need a look first."""
+"""Write the page of a course: a sortable table of all runs, with those that most need inspection first."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHOWN = (
     ("damping_rate", "λ", "1/s"),
     ("drag_coefficient", "C_d", ""),
 )
-"""Estimates that have a column."""
+"""Estimates with a column: name, symbol and unit; an empty unit means none, or that of the run."""
 
 
 def write_page(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[str], reports: set[str]) -> None:
@@ -31,15 +31,15 @@ def write_page(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[
     ----------
     store : Store
     lines : sequence of mapping
-        Of :func:`line_of`, one a run.
+        One line per run, from :func:`line_of`.
     tags : sequence of str
-        Columns of the course's own.
+        The course's own columns.
     reports : set of str
-        Folders of reports that can be linked.
+        Names of report folders that can be linked.
     """
     from springmass.report.html import template
 
-    there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in lines)]  # no column without a number
+    there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in lines)]  # only with numbers
     shown = [
         {**line, "cells": [line["cells"][i] for i in there], "link": _link(line["name"], reports)} for line in lines
     ]
@@ -58,7 +58,7 @@ def _link(name: str, reports: set[str]) -> str:
 
 
 def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
-    """Return what the page shows of a run, from its row and the course's own columns."""
+    """Return the line that the page shows for a run, from its row and the course's own columns."""
     failed = row["status"] in FAILED
     look = "failed" if failed else "error" if row["errors"] else "warning" if row["warnings"] else "fine"
     return {
@@ -75,7 +75,7 @@ def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
 
 
 def _cell(row: Mapping[str, Any], quantity: str, unit: str) -> tuple[str, str, str]:
-    """Return an estimate's label, its text, and the number by which it sorts."""
+    """Return an estimate's label, its text, and its value as the sort key."""
     value, u = row["estimates"].get(quantity, (None, None))
     label = next(symbol for name, symbol, _ in SHOWN if name == quantity)
     if value is None or u is None:

@@ -1,4 +1,4 @@
-"""From inputs to jobs: which runs there are, and what is known of each."""
+"""Turn inputs into jobs: find the runs and the known values of each."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ class Job:
     Parameters
     ----------
     path : str
-        As the inputs name it.
+        Path as given in the inputs.
     folder : str
-        Where relative paths begin: the folder in which the plan was made.
+        Start of relative paths: the folder in which the plan was made.
     answers : mapping
-        What the recording leaves open, as :func:`springmass.runs.loading.load` takes it.
+        Answers to what the recording leaves open: reading options of :class:`springmass.runs.options.ReadOptions`.
     scene : mapping or None
-        Scene that was given for this run, by table and key; None: what the recording carries.
+        Scene given for this run, by table and key; None: the scene that the recording carries.
     tags : mapping of str to str
     accuracy : str
     law : str or None
-        Damping law that is stated, as :func:`springmass.runs.analysing.with_law` takes it.
+        Stated damping law, in the form that :func:`springmass.runs.analysing.with_law` takes.
     """
 
     path: str
@@ -60,13 +60,13 @@ class Job:
 
     @property
     def key(self) -> str:
-        """What distinguishes this run from others: its path, and which run and channel of the file."""
+        """Key that distinguishes this run from others: its path, and the run and channel within the file."""
         which = [self.answers.get(name) for name in ("run", "channel")]
         return dumped([self.path, *which]) if any(which) else self.path
 
     @property
     def scene_sha256(self) -> str:
-        """Digest of the scene that was given; empty where none was."""
+        """Digest of the given scene; empty if none was given."""
         return "" if self.scene is None else _digest(self.scene)
 
     @property
@@ -75,31 +75,31 @@ class Job:
         return _digest({"accuracy": self.accuracy, "answers": self.answers, "law": self.law})
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return what a row keeps of it, to analyse the run again: all but the folder, which may be another."""
+        """Return the job as stored in a row for a later analysis: everything except the folder, which may change."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "folder"}
 
     @classmethod
     def from_mapping(cls, job: Mapping[str, Any], folder: str) -> Job:
-        """Return the job that a row keeps; its relative paths begin at the folder."""
+        """Return the job stored in a row; its relative paths start from the folder."""
         return cls(**job, folder=folder)
 
     def whole(self, path: str) -> str:
-        """Return a path as any process finds it."""
+        """Return a path that every process can find."""
         return os.path.join(self.folder, path)
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is to be done.
+    """The jobs of a course.
 
     Parameters
     ----------
     jobs : tuple of Job
-        By path.
+        Jobs sorted by path.
     tags : tuple of str
         The course's own columns.
     notes : tuple of str
-        What to tell the user before work begins, one line each.
+        Messages for the user before the work begins, one line each.
     """
 
     jobs: tuple[Job, ...]
@@ -118,38 +118,38 @@ def plan(
     known: Collection[str] = (),
     but: Collection[str] = (),
 ) -> Plan:
-    """Find the runs of a course and what is known of each.
+    """Find the runs of a course and the known values of each.
 
     Parameters
     ----------
     inputs : sequence of str
-        Files, folders with all in them, patterns, and lists: ``@FILE`` names one with a path a line. Without any, what
-        the table of runs names.
+        Files, folders with all their contents, patterns, and lists: ``@FILE`` names a file with one path per line. If
+        there are no inputs, the files that the table of runs names are used.
     runs_csv : str, optional
         Table of runs, see :func:`springmass.batch.course.read_course`.
     scene : str, optional
-        Scene file for all runs, under what the table says.
+        Scene file for all runs; values in the table take precedence.
     accuracy : str
     law : str, optional
-        Damping law of all runs, under what the table says.
+        Damping law of all runs; the table takes precedence.
     answers : mapping, optional
-        For all runs, under what the table says.
+        Reading options for all runs; the table takes precedence.
     known : collection of str
-        Paths that an earlier pass saw to be recordings.
+        Paths that an earlier pass identified as recordings.
     but : collection of str
         Absolute paths of files and folders to leave out.
 
     Raises
     ------
     ProgramError
-        With exit code 2 or 3; one line.
+        With exit code 2 or 3 and a message of one line.
     """
     course = None if runs_csv is None else read_course(runs_csv)
     out = {*but, *(() if runs_csv is None else (os.path.abspath(runs_csv),))}
     texts = list(_expanded(inputs)) if inputs or course is None else course.files()
     recordings, notes = files_of(texts, deep=True, known=known, but=out)
     first: dict[str, InputFile] = {}
-    for recording in recordings:  # a file that several inputs name is one run
+    for recording in recordings:  # a file named by several inputs is one run
         first.setdefault(os.path.abspath(recording.path), recording)
     files = sorted(first.values(), key=lambda recording: recording.path)
     if course is None:
@@ -223,7 +223,7 @@ def _job(
 
 
 def names_of(jobs: Sequence[Job]) -> list[str]:
-    """Return a name for each run: its path below the folder that holds all, without suffix; later ones numbered.
+    """Return a name per run: its path below the common folder, without suffix, with repeated names numbered.
 
     Examples
     --------
@@ -240,8 +240,8 @@ def names_of(jobs: Sequence[Job]) -> list[str]:
 
 @functools.cache
 def code_sha256() -> str:
-    """Digest of what a row depends on besides its run: this program, its libraries' versions, the user's dialects."""
-    # In a wheel the packages are elsewhere; without this, rows of an older program would count as unchanged.
+    """Return the digest of a row's dependencies except its run: program, library versions and the user's dialects."""
+    # In a wheel the packages are in another place; without ``part``, rows of an older program would count as unchanged.
     rooms = [*map(part, PACKAGES), *(Path(__file__).resolve().parents[1] / room for room in ("batch", "runs"))]
     parts = [f"{name} {version(name)}".encode() for name in _LIBRARIES]
     files = [file for room in rooms for file in sorted(room.rglob("*.py"))]

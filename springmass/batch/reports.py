@@ -1,4 +1,4 @@
-"""Full reports of single runs of a course: of those that most need a look, and of any run on request."""
+"""Write full reports of single runs of a course: those that most need inspection, and any run on request."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from storage.errors import WriteFailed, one_line
 __all__ = ["REPORTS", "find_run", "linked", "need_of", "report_name", "worst", "write_one", "write_reports"]
 
 REPORTS = "reports"
-TIME = "in batch.log"  # so that a pass gives the same bytes whenever it is made
+TIME = "in batch.log"  # fixed text in place of a time, so that a pass at any time gives the same bytes
 
 
 def need_of(row: Mapping[str, Any]) -> tuple[int, int, int, float]:
-    """Return how much a run needs a look, larger for more: failure, errors, warnings, misfit of its law."""
+    """Return a run's sort key for inspection, larger if more urgent: failure, errors, warnings, misfit of its law."""
     status = {"ok": 0, "no_oscillation": 1}.get(row["status"], 2)
     misfit = row.get("reduced_chi2") or 0.0
     return status, row.get("errors") or 0, row.get("warnings") or 0, misfit
 
 
 def worst(runs: Iterable[tuple[tuple[int, int, int, float], str, str]], count: int) -> set[str]:
-    """Return the names of the runs that need a look most, among those that can be drawn.
+    """Return the names of the runs that most need inspection, among those that can be drawn.
 
-    Each run has how much it needs a look, its name and its status.
+    Each run consists of its need from :func:`need_of`, its name and its status.
     """
     drawn = ((need, name) for need, name, status in runs if status in ("ok", "no_oscillation"))
     return {name for _, name in heapq.nlargest(count, drawn)}
 
 
 def report_name(run: str) -> str:
-    """Return the folder of a run's report: its name, with a digest if it has other characters or is long."""
+    """Return the folder of a run's report: the run's name, with a digest if it is long or has unsafe characters."""
     safe = re.sub(r"[^A-Za-z0-9.+_-]+", "_", run).strip("._")
     if safe == run and len(safe) <= 100:
         return f"{safe}.results"
@@ -51,7 +51,7 @@ def report_name(run: str) -> str:
 
 
 def linked(folder: Path) -> set[str]:
-    """Return the folders of the reports that are there."""
+    """Return the names of existing report folders."""
     return {page.parent.name for page in (folder / REPORTS).glob("*.results/report.html")}
 
 
@@ -61,25 +61,25 @@ def write_reports(
     jobs: int | None,
     progress: Callable[[int, int], None] = lambda *_: None,
 ) -> dict[str, str]:
-    """Write the reports of these runs, and remove those of other runs that an earlier pass wrote.
+    """Write the reports of the chosen runs, and remove earlier reports of other runs.
 
-    A report that is there is written again: its run may have changed.
+    An existing report is written again, because its run may have changed.
 
     Parameters
     ----------
     folder : Path
-        Of the course.
+        Folder of the course.
     chosen : sequence of (str, Job)
-        The runs by name.
+        Names and jobs of the chosen runs.
     jobs : int or None
-        Processes; None: one for each core.
+        Number of processes; None: one per core.
     progress : callable
-        Takes how many reports are done, of how many.
+        Called with the number of finished reports and their total number.
 
     Returns
     -------
     dict of str to str
-        By the name of its folder, why a report could not be written or removed.
+        Reasons why reports could not be written or removed, by the name of the report's folder.
     """
     tasks = [(run, job, folder / REPORTS / report_name(run)) for run, job in chosen]
     failed: dict[str, str] = {}
@@ -108,7 +108,7 @@ def _attempts(tasks: Sequence[_Task]) -> list[str]:
 
 
 def _attempt(run: str, job: Job, folder: Path) -> str:
-    """Write the report of a run; return in one line why it cannot be written, empty if it was."""
+    """Write the report of a run; return a one-line reason if it cannot be written, or an empty string."""
     try:
         write_one(run, job, folder)
     except (ProgramError, WriteFailed) as error:
@@ -117,18 +117,18 @@ def _attempt(run: str, job: Job, folder: Path) -> str:
         return f"no report could be written ({one_line(error)}); run batch again"
     except MemoryError:
         return NO_MEMORY
-    except Exception as error:  # a defect costs this report, and not those of the other runs
+    except Exception as error:  # a defect in the program must not stop the reports of other runs
         return internal_error(error)
     return ""
 
 
 def write_one(run: str, job: Job, folder: Path) -> Path:
-    """Write the report of a run; return its page.
+    """Write the report of a run, and return the path of its page.
 
     Raises
     ------
     ProgramError
-        With exit code 3 if its recording cannot be analysed.
+        With exit code 3 if the recording cannot be analysed.
     """
     from acquisition.errors import AcquisitionError
     from pipeline.errors import PipelineError
@@ -149,25 +149,26 @@ def write_one(run: str, job: Job, folder: Path) -> Path:
 
 
 def find_run(folder: Path, jobs: Mapping[str, Job], run: str) -> tuple[str, Job]:
-    """Return the name and the job of a run of a course, given by its name or its path.
+    """Return the name and the job of a run, which is identified by its name or its path.
 
     Parameters
     ----------
     folder : Path
-        Of the course.
+        Folder of the course.
     jobs : mapping
-        By the name of the run.
+        Jobs by the name of the run.
     run : str
+        Name or path of the run.
 
     Raises
     ------
     ProgramError
-        With exit code 2 if there is none.
+        With exit code 2 if the course has no such run.
     """
     from difflib import get_close_matches
 
     for name, job in jobs.items():
-        # The table shows control characters as escapes, and a name may be copied from there.
+        # The table shows control characters as escapes, and a user may copy a name from it.
         if run in (name, job.path, visible(name)) or os.path.abspath(run) == os.path.abspath(job.whole(job.path)):
             return name, job
     near = get_close_matches(run, jobs, n=1)

@@ -1,4 +1,4 @@
-"""The table of a course: CSV, and Parquet where pyarrow is installed."""
+"""Write the table of a course as CSV and, if pyarrow is installed, as Parquet."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from storage.atomic import writing
 
 __all__ = ["text_of", "write_tables"]
 
-GROUP = 1000  # rows of a row group: what is held together
+GROUP = 1000  # rows per Parquet row group, which are held in memory together
 _WHOLE, _NUMBERS = frozenset(WHOLE), frozenset(NUMBERS)
 _FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠", "\t")
 
 
 def write_tables(store: Store, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> None:
-    """Write the table as CSV in UTF-8 and, where pyarrow is installed, as Parquet: the same bytes for the same rows.
+    """Write the table as CSV in UTF-8 and, if pyarrow is installed, as Parquet; equal rows give equal bytes.
 
-    In the CSV numbers keep all their digits, and what is not known is empty.
+    In the CSV, numbers keep all their digits, and unknown values are empty.
 
     Raises
     ------
     storage.errors.WriteFailed
-        If one of them cannot be written; the earlier one stays then.
+        If a table cannot be written; its earlier version is then kept.
     """
     try:
         import pyarrow as pa
@@ -38,7 +38,7 @@ def write_tables(store: Store, rows: Iterable[Mapping[str, Any]], tags: Sequence
         pa = pq = None
         store.keep_edited(PARQUET)
         with writing(store.folder / PARQUET):
-            (store.folder / PARQUET).unlink(missing_ok=True)  # one of an earlier pass would state other numbers
+            (store.folder / PARQUET).unlink(missing_ok=True)  # the file of an earlier pass would state outdated numbers
     columns = columns_of(tags)
     with writing(store.folder / CSV), contextlib.ExitStack() as stack:
         temporary = stack.enter_context(store.output(CSV))
@@ -60,7 +60,7 @@ def _cell(value: Any) -> Any:
     if not isinstance(value, str):
         return "" if value is None else value
     shown = visible(value)
-    # A spreadsheet takes a text that begins like a formula for one.
+    # A spreadsheet would evaluate text that begins like a formula.
     return f"'{shown}" if shown.startswith(_FORMULA) else shown
 
 

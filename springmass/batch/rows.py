@@ -1,4 +1,4 @@
-"""What a row of a course holds: its schema in the store, and the columns of the table that it becomes."""
+"""Rows of a course: their schema in the store, and the columns of the table made from them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ ESTIMATES = (
     "own_mass_kg", "first_mode_period", "second_mode_period", "first_mode_amplitude", "second_mode_amplitude",
     "relaxation_rate", "relaxation_rate_slow", "relaxation_rate_fast",
 )  # fmt: skip
-"""Each a column with its value and one, ``_u``, with its standard uncertainty, in SI units."""
+"""Estimates with two columns each: the value, and with ``_u`` the standard uncertainty, in SI units."""
 POSITIVE = ("period", "frequency", "angular_frequency", "natural_angular_frequency", "own_mass_kg")
 QUALITY = (
     "used", "missing", "false_echo", "clipped", "duplicate_time", "non_monotonic_time", "outside", "malformed_rows",
@@ -71,22 +71,22 @@ UNITS = {
     "air_temperature_c": "degC",
     "air_pressure_pa": "Pa",
 }
-"""Of the columns that have the same in every run; that of the others is by the column ``unit``."""
+"""Units of columns whose unit is the same in every run; for the others it follows from the column ``unit``."""
 DETAILS = ("findings", "messages", "correlations", "drag_points")
-"""Columns of JSON."""
+"""Columns that contain JSON."""
 LAW_COLUMNS = ("law", "admissible", "stated_law", "one_law", "undetermined")
 COLUMNS = (*_FIRST, *_INPUT, *LAW_COLUMNS, *WHOLE, *NUMBERS, *_HASHES, *DETAILS)
 COURSE = "course"
-"""Column of the folder of a course, where several are read together."""
+"""Column with the folder of the course, used when several courses are read together."""
 RESERVED = frozenset((COURSE, *COLUMNS))
 """Names that no tag may have."""
 FAILED = ("failed", "ended", "no_oscillation")
-"""Values of ``status`` of runs without a period; "ended" is a run whose worker process died."""
+"""Values of ``status`` for runs without a period; "ended" means that the worker process died."""
 
 LARGEST = 1e100
-"""Bound of the numbers in a row: its square is a number too. A row states no estimate beyond it."""
+"""Maximum magnitude of numbers in a row, whose square is still finite. Larger estimates are left out."""
 TAG = re.compile(r"[a-z][a-z0-9_]*")
-_DEEPEST = 5  # a row, its job, the scene, the table of one part of the bench, and a value with its u
+_DEEPEST = 5  # nesting depth: row, job, scene, table of one part of the bench, and a value with its u
 
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 NoDigest = Annotated[str, Meta(pattern="^([0-9a-f]{64})?$")]
@@ -98,7 +98,7 @@ _Path = Annotated[str, Meta(pattern=r"^[^\x00]+$")]
 
 
 class _Answers(Struct, forbid_unknown_fields=True):
-    """What was stated about a recording, as :func:`springmass.runs.loading.load` takes it."""
+    """Stated reading options of a recording, see :class:`springmass.runs.options.ReadOptions`."""
 
     velocity: _Path | None = None
     channel: str | None = None
@@ -135,7 +135,7 @@ class _Correlations(Struct, forbid_unknown_fields=True):
 
 
 class _Row(Struct, forbid_unknown_fields=True, kw_only=True):
-    """A row as :mod:`springmass.batch.worker` makes it and :mod:`springmass.batch.store` keeps it."""
+    """A row, made by :mod:`springmass.batch.worker` and stored by :mod:`springmass.batch.store`."""
 
     run: str = ""
     path: _Path
@@ -166,9 +166,9 @@ class _Row(Struct, forbid_unknown_fields=True, kw_only=True):
     messages: list[tuple[Literal["error", "warning"], str]]
     correlations: _Correlations
     drag_points: list[tuple[_Size, _Size, _Number, _Size]]
-    # The page shows it as it stands, as the path of a drawing.
+    # The page inserts this text unchanged as an SVG path.
     thumbnail: Annotated[str, Meta(pattern="^(M[-+0-9.eL ]+Z)?$")]
-    # Of every file that the run was read from: path, bytes, time of modification in ns.
+    # Path, size in bytes and modification time in ns of every file from which the run was read.
     stamps: list[tuple[_Path, int, int]]
     hashes: dict[str, Digest]
     input_sha256: Digest | None
@@ -194,19 +194,19 @@ def _demand_names(table: Mapping[str, Any], key: str, allowed: Collection[str]) 
 
 
 def checked_row(text: bytes, key: str) -> dict[str, Any]:
-    """Return a row of the store, its types, ranges and names checked.
+    """Return a row of the store after checking its types, ranges and names.
 
     Parameters
     ----------
     text : bytes
         A JSON object.
     key : str
-        What a message calls the row.
+        Name of the row in error messages.
 
     Raises
     ------
     storage.schema.ValueRefused
-        For the first value that a row cannot have.
+        For the first value that is invalid in a row.
     """
     row: dict[str, Any] = parsed(text, key)
     decoded(row, _Row, key, _DEEPEST)
@@ -214,28 +214,28 @@ def checked_row(text: bytes, key: str) -> dict[str, Any]:
 
 
 def columns_of(tags: Sequence[str]) -> tuple[str, ...]:
-    """Return the columns of a course's table, its tags after the status."""
+    """Return the columns of a course's table, with its tags after the status."""
     return (*_FIRST, *tags, *COLUMNS[len(_FIRST) :])
 
 
 def dumped(value: object) -> str:
-    """Return JSON in one line, the same for the same value."""
+    """Return canonical JSON in one line: equal values give equal text."""
     return json.dumps(value, allow_nan=False, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
 
 
 def flat(row: Mapping[str, Any], run: str, tags: Sequence[str]) -> dict[str, Any]:
-    """Return a row of the table by column: text, whole numbers, numbers, None where nothing is known.
+    """Return a row of the table by column: text, integers, floats, or None for unknown values.
 
-    Control characters, marks of direction and halves of characters, which a file's name may hold, become escapes.
+    Control characters, direction marks and lone surrogates, which a file name may contain, become escapes.
 
     Parameters
     ----------
     row : mapping
-        Of the store.
+        Row of the store.
     run : str
-        The run's name.
+        Name of the run.
     tags : sequence of str
-        The columns that are the course's own.
+        The course's own columns.
     """
     cells: dict[str, Any] = {"run": run, **{tag: row["job"]["tags"].get(tag) for tag in tags}}
     for name, (value, u) in {**row["estimates"], **row["scene"]}.items():

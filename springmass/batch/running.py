@@ -1,4 +1,4 @@
-"""One pass over a course: analyse what is new or has changed, then make tables, page and reports of all rows."""
+"""Make one pass over a course: analyse new and changed runs, then write tables, page and reports of all rows."""
 
 from __future__ import annotations
 
@@ -34,19 +34,20 @@ Rows = Sequence[Mapping[str, Any]]
 
 @dataclass(slots=True)
 class Outcome:
-    """What a pass did.
+    """The outcome of a pass.
 
     Parameters
     ----------
     runs, unchanged, analysed : int
+        Numbers of all runs, of unchanged runs and of analysed runs.
     failures : list of str
-        One line a run without a period.
+        One line for each run without a period.
     unwritten : list of str
-        One line a report, or the log, that could not be written.
+        One line for each report, or the log, that could not be written.
     damaged : list of str
-        One line a part of the results that was damaged; its runs were analysed again.
+        One line for each damaged part of the results; its runs were analysed again.
     edited : list of (str, str)
-        Tables that somebody had edited, and the names under which they were kept.
+        Tables or page edited by the user, with the names under which they were kept.
     """
 
     runs: int = 0
@@ -75,35 +76,35 @@ def run_course(
     progress: Callable[[Rows, int, int], None] = lambda *_: None,
     reported: Callable[[int, int], None] = lambda *_: None,
 ) -> Outcome:
-    """Analyse the runs of a course that are new or have changed, and make tables, page and reports of all.
+    """Analyse the new and changed runs of a course, and write tables, page and reports of all runs.
 
     Parameters
     ----------
     inputs, runs_csv, scene, accuracy, law, answers
-        As :func:`springmass.batch.plan.plan` takes them.
+        As in :func:`springmass.batch.plan.plan`.
     output : str
-        Folder for the results; one that is there is continued.
+        Folder for the results; the course in an existing folder is continued.
     jobs : int, optional
-        Processes; left out, one a core.
+        Number of processes; if omitted, one per core.
     dask : str, optional
         Address of a scheduler, whose workers analyse the runs.
     rehash : bool
-        Whether every file is read to see whether it has changed.
+        Whether every file is read to check whether it has changed.
     reports : int
-        Number of runs, those that most need a look, that get a full report.
+        Number of runs with a full report; those that most need inspection are chosen.
     note : callable
-        Called with lines for the user, before the work begins.
+        Called with each line for the user before the work begins.
     progress : callable
-        Called with rows that were just made, how many there are by now, and how many there will be.
+        Called with the rows just made, the number of rows made so far, and their final number.
     reported : callable
-        Called with how many reports are done, and of how many.
+        Called with the number of finished reports and their final number.
 
     Raises
     ------
     ProgramError
-        With one line and exit code: for inputs that cannot be, a folder that another pass uses, no scheduler.
+        If an input is invalid, another pass is using the folder, or no scheduler answers.
     storage.errors.WriteFailed
-        If rows, tables or the page cannot be written. The rows that were written before stay.
+        If rows, tables or the page cannot be written. Rows already written are kept.
     """
     folder = make_folder(output)
     store = Store(folder)
@@ -138,7 +139,7 @@ def run_course(
 
 
 def _todo(course: Plan, store: Store, outcome: Outcome, *, rehash: bool) -> list[Job]:
-    """Return the jobs without a row that is up to date; count the others and note what changed but their content."""
+    """Return the jobs without an up-to-date row; count the others, and store new stamps and jobs of unchanged runs."""
     todo, touched = [], []
     for job in course.jobs:
         row, stamps = _kept(job, store, rehash=rehash)
@@ -158,7 +159,7 @@ def _todo(course: Plan, store: Store, outcome: Outcome, *, rehash: bool) -> list
 
 
 def _kept(job: Job, store: Store, *, rehash: bool) -> tuple[dict[str, Any] | None, list[list[Any]] | None]:
-    """Return a run's row that is up to date, if there is one, and the stamps of its files."""
+    """Return a run's up-to-date row, if there is one, and the stamps of its files."""
     for row in store.rows(job.key):
         if (stamps := unchanged(job, row, rehash=rehash)) is not None:
             return row, stamps
@@ -166,7 +167,7 @@ def _kept(job: Job, store: Store, *, rehash: bool) -> tuple[dict[str, Any] | Non
 
 
 def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterator[list[dict[str, Any]]]:
-    """Yield the rows of jobs, batch by batch. A run under which worker processes die is a row that says so."""
+    """Yield the rows of jobs in batches; a run during which worker processes die gets a row stating this."""
     if not todo:
         return
     with contextlib.ExitStack() as stack:
@@ -190,9 +191,9 @@ def _make(
     jobs: int | None,
     reported: Callable[[int, int], None],
 ) -> bool:
-    """Make parts in the order of the runs, tables, reports and page; return whether they had to be made.
+    """Write parts in the order of the runs, tables, reports and page; return whether this was necessary.
 
-    A report that cannot be written is missing on the page, and the next pass makes all of this again.
+    A report that cannot be written is missing from the page, and the next pass repeats this whole step.
     """
     names = names_of(course.jobs)
     made_of = hashlib.sha256(
@@ -214,7 +215,7 @@ def _make(
     def kept() -> Iterator[dict[str, Any]]:
         for job, name in zip(course.jobs, names, strict=True):
             row, _ = _kept(job, store, rehash=False)
-            # A file that changed while it was analysed, or whose worker died: the next pass analyses it again.
+            # Without an up-to-date row, a file changed during the analysis or a worker died; the next pass repeats it.
             yield {**(row or next(store.rows(job.key))), "job": job.to_mapping(), "run": name}
 
     needs, lines = [], []
@@ -237,14 +238,14 @@ def _make(
 
 
 def _report_code_sha256() -> str:
-    """Digest of the code of the page and the reports, besides that of the rows."""
+    """Return the digest of the code for page and reports, which is separate from the code for rows."""
     folder = Path(__file__).resolve().parent.parent / "report"
     files = sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".j2", ".css"))
     return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def _log(folder: Path, line: str, outcome: Outcome) -> None:
-    """Append a line with the time of day to the log, the one file of a course with times of day."""
+    """Append a line with the time of day to the log, which is the only file of a course with times of day."""
     try:
         with writing(folder / LOG), (folder / LOG).open("a", encoding="utf-8") as log:
             log.write(f"{datetime.now(UTC).isoformat(timespec='seconds')} {line}\n")

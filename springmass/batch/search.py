@@ -1,4 +1,4 @@
-"""Courses behind one search: which runs are there for which an expression holds."""
+"""Search courses for the runs that satisfy an expression."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ __all__ = ["SearchResult", "search"]
 
 @dataclass(frozen=True, slots=True)
 class SearchResult:
-    """The runs for which an expression holds.
+    """The runs that satisfy an expression.
 
     Parameters
     ----------
     columns : tuple of str
     rows : list of mapping
-        By column.
+        Values of each row by column.
     total : int
-        Runs of the courses.
+        Number of runs in the courses.
     """
 
     columns: tuple[str, ...]
@@ -41,24 +41,25 @@ def search(
     sort: str | None = None,
     limit: int | None = None,
 ) -> SearchResult:
-    """Return the runs of courses for which an expression holds.
+    """Return the runs of courses that satisfy an expression.
 
     Parameters
     ----------
     folders : sequence of str
-        Of results.
+        Folders of results.
     where : str
-        An expression of SQLite over the columns and ``course``, the folder; empty: all runs.
+        SQLite expression in the columns and in ``course``, which is the folder; empty: all runs.
     columns : sequence of str, optional
-        Left out: the courses' own and those ``shown``; where these are left out too, all.
+        Columns to return; if omitted, the courses' own columns and ``shown``. If both are omitted, all columns.
     shown : sequence of str
+        Columns to return in addition to the courses' own.
     sort, limit
         As in :func:`storage.catalog.search_rows`.
 
     Raises
     ------
     ProgramError
-        With exit code 2 if a folder holds no course, 3 if a course is not complete or is damaged.
+        With exit code 2 if a folder contains no course, 3 if a course is not complete or is damaged.
     storage.errors.QueryRefused
         If the expression is not valid.
     """

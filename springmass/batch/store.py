@@ -1,12 +1,12 @@
-"""The folder of a course: rows in parts, tables and page made of them, and a list of both with their digests.
+"""The folder of a course: parts with rows, tables and page made from them, and a list of both with their digests.
 
-1. A part is a file of JSON lines named by its SHA-256, written whole: one whose name and content differ is damaged, and
-   so is one with a row that the schema refuses. Its runs are analysed again.
-2. While runs are analysed, each batch becomes a part. When all are there, the rows are written anew in the order of
-   the runs, a hundred to a part, and other parts are removed.
-3. ``course.json`` lists the parts in their order, and the digest of every table and page that was written. It is
-   written before a table takes its place: a table with another digest was edited, and is kept under another name.
-4. The course is complete when ``course.json`` names what it was made of, and the parts are those that it lists.
+1. A part is a file of JSON lines named by its SHA-256 digest and written atomically. It is damaged if its name does not
+   match its content, or if the schema refuses one of its rows. The runs of a damaged part are analysed again.
+2. While runs are analysed, each batch becomes a part. When all runs have a row, the rows are rewritten in the order of
+   the runs, a hundred rows per part, and all other parts are removed.
+3. ``course.json`` lists the parts in order, and the digest of every table and page that was written. It is updated
+   before a table is replaced. A table with a different digest was edited, and is kept under another name.
+4. The course is complete if ``course.json`` states the digest of its inputs and lists exactly the existing parts.
 """
 
 from __future__ import annotations
@@ -39,25 +39,25 @@ __all__ = ["CSV", "PAGE", "PARQUET", "PART", "Store", "is_course", "open_course"
 
 CSV, PARQUET, PAGE = "results.csv", "results.parquet", "index.html"
 PARTS = "parts"
-PART = 100  # rows of a part: what damage costs, and what is held in memory at a time
+PART = 100  # rows per part, which limits the loss by damage and the memory used at a time
 _LISTING = "course.json"
 _LOCK = "lock"
 _NAME = re.compile(r"rows-([0-9a-f]{64})\.jsonl")
 
 
 class _Listing(Struct, forbid_unknown_fields=True, frozen=True):
-    """What ``course.json`` holds.
+    """The contents of ``course.json``.
 
     Parameters
     ----------
     made_of : str
-        Digest of all that the tables and the page were made of; empty where they are not complete.
+        Digest of the inputs from which the tables and the page were made; empty if they are not complete.
     tags : list of str
-        The columns of the course's own.
+        The course's own columns.
     parts : list of str
         Names of the parts, in the order of the runs.
     outputs : mapping
-        Digests by the name of the file: of the present one, and of the one that is about to replace it.
+        By file name, the digests of the existing file and of the file that is about to replace it.
     """
 
     made_of: NoDigest = ""
@@ -78,12 +78,12 @@ class Store:
     damaged : list of str
         One line for each part that cannot be read or has a checksum mismatch.
     kept : list of (str, str)
-        Names of tables that were edited, and the names that they were given.
+        Names of edited tables or page, with the names under which they are kept.
 
     Raises
     ------
     storage.errors.WriteFailed
-        Of every method that writes, if it cannot.
+        By every method that writes, if writing fails.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -93,21 +93,21 @@ class Store:
         self._parts = folder / PARTS
         self._listing = _Listing()
         self._whole: list[str] = []  # names of the parts that are not damaged
-        self._places: dict[str, list[tuple[str, int]]] = {}  # by run: part and line
+        self._places: dict[str, list[tuple[str, int]]] = {}  # part and line of each row, by run
         self._rows = functools.lru_cache(maxsize=4)(self._read_part)
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Hold the folder for one pass; it is made if it is not there.
+        """Lock the folder for one pass, and create it if it does not exist.
 
         Raises
         ------
         ProgramError
-            With exit code 2 if another pass holds it.
+            With exit code 2 if another pass has locked it.
         """
         with writing(self._parts):
             self._parts.mkdir(parents=True, exist_ok=True)
-        if sys.platform == "win32":  # there are no such locks
+        if sys.platform == "win32":  # Windows has no such locks
             yield
             return
         with writing(self._parts / _LOCK):
@@ -120,17 +120,17 @@ class Store:
                     f"{self.folder}: another pass is using this folder; wait for its end", USAGE
                 ) from error
             except OSError:
-                pass  # a network disk without locks
+                pass  # a network drive without locks
             yield
 
     def read_listing(self) -> None:
-        """Read the listing; without one that can be read the course is not complete."""
+        """Read the listing; if it cannot be read, the course counts as incomplete."""
         with contextlib.suppress(OSError, ValueRefused):
             text = read_regular(self._parts / _LISTING)
             self._listing = decoded(parsed(text, _LISTING), _Listing, _LISTING, 3)
 
     def read(self) -> None:
-        """Read the listing and every part; note which parts are damaged."""
+        """Read the listing and every part, and record which parts are damaged."""
         self.read_listing()
         listed = {name: number for number, name in enumerate(self._listing.parts)}
         for name in sorted(self._names(), key=lambda name: (listed.get(name, len(listed)), name)):
@@ -142,7 +142,7 @@ class Store:
                 self._add_places(name, rows)
 
     def rows(self, key: str) -> Iterator[dict[str, Any]]:
-        """Yield the rows of a run, the latest first."""
+        """Yield the rows of a run, starting with the latest."""
         for name, number in reversed(self._places.get(key, ())):
             yield self._rows(name)[number]
 
@@ -161,21 +161,21 @@ class Store:
                 raise ProgramError(_damage(self._parts / name, error), UNREADABLE) from error
 
     def paths(self) -> set[str]:
-        """Return the paths of all runs with a row."""
+        """Return the paths of all runs that have a row."""
         return {row["path"] for name in self._whole for row in self._read_part(name)}
 
     @property
     def tags(self) -> tuple[str, ...]:
-        """The columns of the course's own."""
+        """The course's own columns."""
         return tuple(self._listing.tags)
 
     def is_complete(self, made_of: str | None = None) -> bool:
-        """Return whether all rows are there and tables were made of them, and, where it is given, of just this."""
+        """Return whether rows and tables are complete and, if ``made_of`` is given, were made from these inputs."""
         expected = self._listing.made_of if made_of is None else made_of
         return expected != "" and self._listing.made_of == expected and set(self._listing.parts) == set(self._names())
 
     def is_intact(self, name: str) -> bool:
-        """Return whether a table or the page is there as it was written."""
+        """Return whether a table or the page exists and is unchanged since it was written."""
         try:
             return sha256_of(self.folder / name) in self._listing.outputs.get(name, ())
         except OSError:
@@ -186,9 +186,9 @@ class Store:
         self._add_places(self._write_part(rows), rows)
 
     def put_together(self, rows: Iterable[dict[str, Any]], tags: Sequence[str]) -> Iterator[dict[str, Any]]:
-        """Write all rows in this order, and yield each one.
+        """Write all rows in the given order, and yield each one.
 
-        After the last one all other parts are removed.
+        After the last row, all other parts are removed.
         """
         names, part = [], []
         for row in rows:
@@ -205,19 +205,19 @@ class Store:
                 (self._parts / name).unlink()
 
     def begin(self) -> None:
-        """Note that tables and page are not complete."""
+        """Record that tables and page are not complete."""
         if self._listing.made_of:
             self._list(made_of="")
 
     def complete(self, made_of: str) -> None:
-        """Note that tables and page are complete, and what they were made of."""
+        """Record that tables and page are complete, with the digest of their inputs."""
         self._list(made_of=made_of)
 
     @contextlib.contextmanager
     def output(self, name: str) -> Iterator[Path]:
-        """Give a temporary file to write, and put it in place of a table or the page when the ``with`` ends well.
+        """Yield a temporary file, which replaces a table or the page if the ``with`` block succeeds.
 
-        A file that this program did not write is kept under another name.
+        An existing file that this program did not write is kept under another name.
         """
         with whole_file(self.folder / name) as temporary:
             yield temporary
@@ -229,12 +229,12 @@ class Store:
         self._list(outputs={**self._listing.outputs, name: [digest]})
 
     def keep_edited(self, name: str, digest: str = "") -> None:
-        """Give a table or page another name if it is neither what was written there nor has this digest."""
+        """Rename a table or page if its digest is neither the given one nor one recorded when it was written."""
         path = self.folder / name
         try:
             standing = sha256_of(path)
         except OSError:
-            return  # if a folder is in its place, the write that follows names it in its error
+            return  # if the path is a folder, the error of the write that follows names it
         if standing == digest or standing in self._listing.outputs.get(name, ()):
             return
         ends = (".edited" if number == 1 else f".edited-{number}" for number in count(1))
@@ -262,7 +262,7 @@ class Store:
         return write_whole(self._parts / f"rows-{hashlib.sha256(data).hexdigest()}.jsonl", data).name
 
     def _read_part(self, name: str) -> list[dict[str, Any]]:
-        """Return the rows of a part. Raises OSError and ValueRefused."""
+        """Return the rows of a part; raise OSError or ValueRefused if it is unreadable or damaged."""
         data = read_regular(self._parts / name)
         named = _NAME.fullmatch(name)
         if named is None or hashlib.sha256(data).hexdigest() != named[1]:
@@ -271,7 +271,7 @@ class Store:
 
 
 def sha256_of(path: str | os.PathLike[str]) -> str:
-    """Return the SHA-256 of a regular file in hexadecimal digits."""
+    """Return the SHA-256 digest of a regular file in hexadecimal digits."""
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -282,7 +282,7 @@ def _damage(path: Path, error: OSError | ValueRefused) -> str:
 
 
 def is_course(folder: str | os.PathLike[str]) -> bool:
-    """Return whether a folder is one that ``springmass batch`` made."""
+    """Return whether a folder was made by ``springmass batch``."""
     return os.path.isdir(os.path.join(folder, PARTS))
 
 
@@ -292,7 +292,7 @@ def open_course(folder: str | os.PathLike[str]) -> Store:
     Raises
     ------
     ProgramError
-        With exit code 2 if the folder holds none, 3 if it is not complete.
+        With exit code 2 if the folder contains no course, 3 if the course is not complete.
     """
     if not is_course(folder):
         raise ProgramError(f"{folder}: expected a folder that springmass batch made; name that of its -o", USAGE)
@@ -304,5 +304,5 @@ def open_course(folder: str | os.PathLike[str]) -> Store:
 
 
 def table_rows(store: Store) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a complete course by column, as its tables have them."""
+    """Return an iterator over the rows of a complete course by column, as in its tables."""
     return (flat(row, row["run"], store.tags) for row in store.all())

@@ -1,4 +1,4 @@
-"""From a run to its row: what every process does, here or on another machine."""
+"""Turn a run into its row: the work of every process, on this machine or another."""
 
 from __future__ import annotations
 
@@ -32,23 +32,23 @@ from storage.errors import StorageError
 
 __all__ = ["analyse_job", "analyse_many", "blank_row", "stamps_of", "unchanged"]
 
-BINS, FEWEST_BINS = 60, 8  # of a thumbnail
+BINS, FEWEST_BINS = 60, 8  # maximum and minimum number of bins in a thumbnail
 DRAG_POINTS = 8
-DIGITS = 6  # of a correlation
+DIGITS = 6  # decimal places of a correlation
 
 
 def analyse_many(jobs: Sequence[Job]) -> list[dict[str, Any]]:
-    """Analyse runs one after the other; one that fails is a row as well."""
-    # Messages about a recording go into its row. Threads are limited once, not by each analysis.
+    """Analyse runs one after the other; a run that fails gets a row as well."""
+    # Messages about a recording go into its row. Threads are limited once instead of in every analysis.
     with quietly(), one_thread:
         return [analyse_one(job) for job in jobs]
 
 
 def analyse_one(job: Job) -> dict[str, Any]:
-    """Return a run's row: JSON-able, and the same wherever and whenever it is made."""
+    """Return a run's row: JSON-serialisable, and identical on every machine and at every time."""
     row = blank_row(job)
     try:
-        row["stamps"] = stamps_of(job)  # first: a file that changes meanwhile is another by the next pass
+        row["stamps"] = stamps_of(job)  # first, so that the next pass detects a change during analysis
         row["hashes"] = {path: sha256_of(job.whole(path)) for path, *_ in row["stamps"]}
         row["input_sha256"] = row["hashes"].get(job.path)
         run = analyse_job(job)
@@ -59,13 +59,13 @@ def analyse_one(job: Job) -> dict[str, Any]:
         row["error"] = _one_line(job, str(error))
     except MemoryError:
         row["error"] = f"{job.path}: {NO_MEMORY}"
-    except Exception as error:  # a defect: the other runs of a thousand do not wait for its repair
+    except Exception as error:  # a defect in the program must not stop the analysis of the other runs
         row["error"] = _one_line(job, f"{job.path}: {internal_error(error)}")
     return row
 
 
 def analyse_job(job: Job) -> AnalysedRun:
-    """Read a run of a course and analyse it as the course states."""
+    """Read a run of a course and analyse it with the scene and options of its job."""
     options = ReadOptions.of(job.answers)
     if options.velocity is not None:
         options = replace(options, velocity=job.whole(str(options.velocity)))
@@ -74,7 +74,7 @@ def analyse_job(job: Job) -> AnalysedRun:
 
 
 def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, Any]:
-    """Return the row of a run of which only the job is known."""
+    """Return the row of a run for which only the job is known."""
     return {
         "path": job.path,
         "status": status,
@@ -98,7 +98,7 @@ def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, An
 
 
 def stamps_of(job: Job) -> list[list[Any]]:
-    """Return path, size and time of modification in ns of every file that a run is read from, if it is there."""
+    """Return path, size and modification time in ns of every existing file from which a run is read."""
     stamps = []
     for path in (job.path, job.answers.get("velocity"), str(about_path(Path(job.path)))):
         if path:
@@ -113,8 +113,8 @@ def stamps_of(job: Job) -> list[list[Any]]:
 def unchanged(job: Job, row: Mapping[str, Any], *, rehash: bool) -> list[list[Any]] | None:
     """Return the stamps of a run's files if a row is up to date; None if the run has to be analysed again.
 
-    Files of the same path, size and time of modification count as unchanged unless ``rehash`` asks for all to be read;
-    others are unchanged where their digests are.
+    Files with the same path, size and modification time count as unchanged, unless ``rehash`` requires all files to be
+    read. All other files are unchanged if their digests are equal.
     """
     digests = (row["scene_sha256"], row["parameters_sha256"], row["code_sha256"])
     if row["status"] == "ended" or digests != (job.scene_sha256, job.parameters_sha256, code_sha256()):
@@ -171,7 +171,7 @@ def _fill(row: dict[str, Any], loaded: Loaded, analysis: Analysis) -> None:
         try:
             spring = SpringRun.of("", derived, clock=track.clock)
         except AnalysisError:
-            return  # no mass, no spring to compare
+            return  # without a mass, no spring constant can be compared
         row["u_clock"] = _number(spring.u_clock)
         row["estimates"] |= _numbers(
             {"natural_angular_frequency": spring.angular_frequency, "own_mass_kg": spring.mass_kg}
@@ -187,7 +187,7 @@ def _number(x: Any) -> float | None:
 
 
 def _drag_points(analysis: Analysis, motion: Oscillation) -> list[list[float]]:
-    """Return Re, KC, drag coefficient and its u at amplitudes from the first to the last, evenly in their logarithm."""
+    """Return Re, KC, drag coefficient and its u at amplitudes spaced evenly on a logarithmic scale."""
     diameter, derived = analysis.scene.disc_diameter_m, motion.derived
     curve = derived.drag_curve(motion.damping, motion.demodulated)
     estimates = analysis.estimates
@@ -199,7 +199,7 @@ def _drag_points(analysis: Analysis, motion: Oscillation) -> list[list[float]]:
         return []
     at = np.geomspace(lengths[order[0]], lengths[order[-1]], DRAG_POINTS)
     value, u = (np.interp(at, lengths[order], each[order]) for each in (curve.y, curve.u))
-    # Re is that of the whole run by its rms velocity; at one amplitude that velocity is omega A / sqrt 2.
+    # The Re estimate uses the rms velocity of the whole run; at amplitude A the rms velocity is omega A / sqrt 2.
     per_velocity = estimates["reynolds_number"].value / estimates["velocity_rms"].value
     reynolds = per_velocity * estimates["angular_frequency"].value * at / np.sqrt(2.0)
     points = np.column_stack([reynolds, 2.0 * np.pi * at / diameter.value, value, u])
@@ -211,12 +211,12 @@ def _drag_points(analysis: Analysis, motion: Oscillation) -> list[list[float]]:
 
 
 def _period_s(analysis: Analysis) -> float:
-    """Return the period; without one, a time so short that it limits nothing."""
+    """Return the period, or, if there is none, a time too short to limit the number of bins."""
     return analysis.estimates["period"].value if "period" in analysis.estimates else 1e-9
 
 
 def _thumbnail(t: F8, y: F8, period_s: float) -> str:
-    """Return an outline of the recording, an SVG path in a box of 120 by 30; empty if nothing was measured."""
+    """Return an outline of the recording as an SVG path in a box of 120 by 30; empty if nothing was measured."""
     there = np.isfinite(t) & np.isfinite(y)
     if not there.all():
         t, y = t[there], y[there]
@@ -226,11 +226,11 @@ def _thumbnail(t: F8, y: F8, period_s: float) -> str:
         order = np.argsort(t, kind="stable")
         t, y = t[order], y[order]
     span = t[-1] - t[0]
-    count = int(np.clip(span / period_s, FEWEST_BINS, BINS))  # a bin without a whole period is no outline
+    count = int(np.clip(span / period_s, FEWEST_BINS, BINS))  # a bin shorter than a period would not show the outline
     ends = np.searchsorted(t, t[0] + span * np.arange(count + 1) / count)
     filled = np.flatnonzero(np.diff(ends))
     low, high = (edge.reduceat(y, ends[filled]) for edge in (np.minimum, np.maximum))
-    beyond = y.size // 200  # without the extreme 0.5 %, false echoes do not flatten the outline of the motion
+    beyond = y.size // 200  # the extreme 0.5 % are ignored, so that false echoes do not flatten the outline
     bottom, top = np.partition(y, (beyond, -1 - beyond))[[beyond, -1 - beyond]]
     scale = 28.0 / max(top - bottom, 1e-300)
     above, below = (np.clip(29.0 - (edge - bottom) * scale, 0.0, 30.0).round() for edge in (high, low))
@@ -240,6 +240,6 @@ def _thumbnail(t: F8, y: F8, period_s: float) -> str:
 
 
 def _one_line(job: Job, message: str) -> str:
-    """Return a message in one line that names the run's path as the inputs do."""
+    """Return a message in one line that names the run by its path as given in the inputs."""
     line = " ".join(message.replace(job.whole(job.path), job.path).split())
     return line if job.path in line else f"{job.path}: {line}"

@@ -66,7 +66,7 @@ READING = ("velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_pp
 RESOLVED = ("accuracy", "method", "law", "strict")
 TOGETHER = "together.results"
 STDIN_NAME = "stdin"
-LONGEST_INPUTS = 48  # characters: names that are repeated in what to type next
+LONGEST_INPUTS = 48  # maximum length of input names repeated in a suggested command
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class _Task:
     bench: Amendments
     alone: bool
     writes: bool = False  # whether files may be written at all
-    report: Path | None = None  # the folder for it
+    report: Path | None = None  # folder for the report
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +96,8 @@ class _Done:
     table: Mapping[TableKey, Estimate] = field(default_factory=dict)
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
     page: Path | None = None
-    remembered: bool = False  # whether its scene was noted beside it
-    law: str = ""  # the line that names the law which its scene states
+    remembered: bool = False  # whether the scene was noted next to the recording
+    law: str = ""  # line that names the damping law stated by the scene
 
 
 def run(recordings: Sequence[str | Path], options: AnalyseOptions, read: ReadOptions, bench: BenchOptions) -> int:
@@ -271,7 +271,7 @@ def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
         return _Done(task.name, error.exit_code, (str(error),))
     except NeedsAnswer as question:
         if task.alone:
-            raise  # answered by the command line as it was typed
+            raise  # the caller answers it with the typed command line
         remedy = for_command(question.question, _words(task), replace(task.read, velocity=None).given())
         return _Done(task.name, UNREADABLE, (str(question.with_remedy(remedy)),))
     except (AcquisitionError, StorageError) as error:

@@ -29,7 +29,7 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them", USAGE)
     if options.template:
         table = template([job.path for job in plan(inputs).jobs])
-        # A file gets the paths as they are, for they are read from it again.
+        # A file gets the paths unchanged, because they are read back from it.
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK
     if options.output is None:
@@ -48,7 +48,7 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
             runs.update(done, total)
 
         def reported(done: int, total: int) -> None:
-            if not reports:  # the bar of the runs gives its place to that of the reports
+            if not reports:  # the bar for reports replaces that for runs
                 shown.pop_all().close()
                 reports.append(shown.enter_context(TaskProgress("reports", lines=True, quiet=quiet)))
             reports[0].update(done, total)

@@ -35,7 +35,7 @@ def run(recordings: Sequence[str | Path], options: CompareOptions, read: ReadOpt
             f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one", USAGE
         )
     names = distinct_names(inputs)
-    # Scenes first: what is wrong with them is known before an hour of records is read.
+    # Scenes are read first, so that their errors are found before an hour of recordings is read.
     given = read_scenes(options.scene, len(inputs))
     out = None if options.output is None else make_folder(options.output)
     loaded = [load(path, read) for path in inputs]

@@ -142,7 +142,7 @@ def _names_apart(originals: Sequence[Original]) -> list[str]:
     """Name the originals of a pair; if both have the same name, in separate folders, number the second."""
     names: list[str] = []
     for original in originals:
-        # Names came from outside: only their last part may choose a place.
+        # Names are external input, so only their last part is used for the path.
         path, count = PurePath(original.name), 1
         while (name := path.name if count == 1 else f"{path.stem}-{count}{path.suffix}") in names:
             count += 1

@@ -61,7 +61,7 @@ class Check:
 
 def run(options: JsonOption) -> int:
     """Print every check; exit with 1 where one failed."""
-    from acquisition.errors import visible  # a foreign package of this name is one of the things that are checked
+    from acquisition.errors import visible  # imported here because doctor checks for a foreign package of this name
 
     checks = examine()
     if options.json:
@@ -80,7 +80,7 @@ def examine() -> tuple[Check, ...]:
     """Run every check."""
     checks = (*_interpreter(), *_packages(), *_libraries())
     if not all(check.ok for check in checks):
-        return checks  # what follows runs these packages and libraries
+        return checks  # the remaining checks run these packages and libraries
     return (*checks, _bundled(), _round_trip())
 
 
@@ -92,7 +92,7 @@ def foreign_packages() -> dict[str, str]:
     """
     foreign: dict[str, str] = {}
     for name in PACKAGES:
-        spec = importlib.util.find_spec(PREFIX + name)  # looks for it without running it
+        spec = importlib.util.find_spec(PREFIX + name)  # finds the package without running it
         place = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent
         if place != part(name):
             foreign[name] = "nowhere" if spec is None else str(place or "a folder that is no package")
@@ -104,7 +104,7 @@ def _interpreter() -> Iterator[Check]:
     yield Check("python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")
     own = sys.prefix != sys.base_prefix
     found = sys.prefix if own else "no virtual environment"
-    # Not a failure: an installation without one works until another distribution brings a package of our names.
+    # Not a failure: without a virtual environment, all works until another distribution uses one of our package names.
     yield Check("environment", True, found)
 
 

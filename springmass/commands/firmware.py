@@ -79,7 +79,7 @@ def _flash(port: str) -> None:
             SENSOR,
         )
     with contextlib.closing(SerialPort(port, FAMILY.baud)):
-        pass  # absent, busy or without permission: said in one line of ours
+        pass  # reports a port that is absent, busy or without permission in one line
     reason = ""
     for baud in BAUDS:
         command = avrdude_arguments(port, baud)

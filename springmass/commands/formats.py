@@ -189,7 +189,7 @@ def _lines(facts: dict[str, Any]) -> Iterator[str]:
             for trap in value:
                 where = f" (line {trap['line']})" if trap["line"] else ""
                 yield f"{'trap':<16} {trap['code']}: {trap['message']}{where}"
-        elif name != "question":  # what "needs" says, as data
+        elif name != "question":  # the question repeats "needs" as data
             yield f"{name:<16} {_shown(value)}"
 
 

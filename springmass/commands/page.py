@@ -63,8 +63,8 @@ def _ready(options: PageOptions, opening: Opening) -> Callable[[int, str | None,
         if opening.secret:
             _say({"type": "open", "port": port})
         if address is None:
-            return  # started again: its browsers know the way
-        # Of a page that belongs to a recording the recorder prints the lines: its progress would overwrite them here.
+            return  # a restarted page: its browsers know the address
+        # For the page of a recording, the recorder prints these lines, because its progress would overwrite them here.
         say = _say_line if opening.secret else tell
         say(f"page: {address}")
         if network:

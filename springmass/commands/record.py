@@ -50,7 +50,7 @@ __all__ = ["run"]
 
 U_RULER_M = 0.5e-3
 SIMULATED_FAMILY = "line-protocol"
-UNLIMITED_S = 3600.0  # how long a run without --seconds is taken to be, for the look at the disk
+UNLIMITED_S = 3600.0  # assumed duration of a run without --seconds, for the check of disk space
 
 
 def run(options: RecordOptions, page_options: PageOptions) -> int:
@@ -101,7 +101,7 @@ def run(options: RecordOptions, page_options: PageOptions) -> int:
         except KeyboardInterrupt:
             if not os.path.lexists(log):
                 raise
-            # The log is whole as far as the disk has taken it; nothing of it is removed.
+            # The log is intact up to the last data written to the disk; none of it is removed.
             lost = "" if session.given_up is None else f"; {_given_up(session.given_up)}"
             console.line(
                 f"springmass: stopped immediately by {END_WORDS[stops.by or EndReason.CTRL_C]}{lost}; "
@@ -125,7 +125,7 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple
     whole = not status.error and not status.dropped_records
     try:
         if status.astray:
-            out.parent.mkdir(parents=True, exist_ok=True)  # its folder may have gone with the log
+            out.parent.mkdir(parents=True, exist_ok=True)  # the folder may have been moved with the log
         report = recover(ended.log, out, remove_log=whole, provenance=made_now())
     except Exception as error:
         left = f"{status.astray}, so it is under another name or lost" if status.astray else _what_to_do(log)
@@ -287,7 +287,7 @@ class _Bench:
                     replace(listeners, begun=operator.recording, changed=changed),
                 )
             except Disarmed:
-                ready = True  # a trigger of the command line, too, is given up on the page
+                ready = True  # the page can also disarm a trigger from the command line
 
     def _rest(self, seconds: float) -> StillPoint:
         """Measure the rest position, at the distances by the ruler first, which set offset and scale."""
@@ -374,7 +374,7 @@ def _simulated(
     rate = options.rate_hz or family.rate_hz
     model = VirtualSensor(rate_hz=rate, crystal_ppm=options.crystal_ppm)
     rng = np.random.default_rng(options.seed)
-    # It must still speak while the session listens, waits and closes.
+    # The simulated sensor must keep sending while the session listens, waits and closes.
     seconds = (options.seconds or UNLIMITED_S) + (options.still or 0.0) + 60.0
     with VirtualPort(
         family,

@@ -34,7 +34,7 @@ from springmass.terminal.printing import wrapped
 
 __all__ = ["run"]
 
-FAR_BELOW = 0.01  # of the band: a tolerance below it buys nothing
+FAR_BELOW = 0.01  # fraction of the band; a smaller tolerance gives no benefit
 OF_OUTPUT = ("sensor", "noise_m", "echoes")
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["run", "trade_of_scene"]
 
 SIMULATED = ("seeds", "noise_m", "seconds", "damping", "echoes", "output")
-SPACING_S, LONG_S = 0.01, 120.0  # of the samples of a scene's motion, and how long it is unless it is said
+SPACING_S, LONG_S = 0.01, 120.0  # sample spacing and default duration of a scene's motion
 
 
 def run(recording: str | Path | None, options: TradeOptions, read: ReadOptions) -> int:

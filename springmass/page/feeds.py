@@ -1,4 +1,4 @@
-"""Sources of the page's samples: a log that grows, or a complete run."""
+"""Sources of the page's samples: a growing log, or a complete run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["LogFeed", "view_of"]
 
 MOST_NOTES = 1000
 NOT_LISTED = frozenset({"calibration", "ended"})
-"""Events that a person at the bench need not read."""
+"""Kinds of events that the page does not list, because a person at the bench need not read them."""
 
 
 class LogFeed:
@@ -35,7 +35,7 @@ class LogFeed:
     Raises
     ------
     NotALog
-        If it is none.
+        If the file is not a wire log.
     """
 
     def __init__(self, path: Path) -> None:
@@ -75,7 +75,7 @@ class LogFeed:
         chain, port = self._decoder.chains[0], self._decoder.sensors[0].port
         for number, block in blocks:
             self.view.series[number].push(block)
-            # The kind of clock is known after the first reading.
+            # The kind of clock is unknown until the first reading.
             self.view.info = chain.info(port, "simulated" if self.view.simulated else "live")
 
     def close(self) -> None:
@@ -97,7 +97,7 @@ class LogFeed:
     def _place_marks(self) -> None:
         """Give marks and triggers the times that the run file will give them.
 
-        t = 0 is known once a sample came, and better with each of the first thousand, so earlier times are replaced.
+        The first sample determines t = 0, and each of the first thousand improves it, so earlier times are replaced.
         """
         marks, events = [], []
         for record in self._timed:
@@ -113,7 +113,7 @@ class LogFeed:
 
 
 def _in_words(kind: str, facts: Mapping[str, Any]) -> str:
-    """Return an event in words; if its kind has none here, its facts by their names."""
+    """Return an event in words; for other kinds, return the names and values of its facts."""
     try:
         if kind == "still":
             return f"Zero {1e3 * facts['rest_m']:.1f} mm, noise {1e3 * facts['noise_m']:.2f} mm"
@@ -130,7 +130,7 @@ def _in_words(kind: str, facts: Mapping[str, Any]) -> str:
 
 
 def _zero_of(event: Mapping[str, Any]) -> dict[str, float]:
-    """Return rest position and noise by an event of kind still, m; empty where it states none."""
+    """Return rest position and noise in m from an event of kind still; empty if it does not state both."""
     facts = event["facts"]
     numbers = {name: facts.get(name) for name in ("rest_m", "noise_m")}
     return numbers if all(isinstance(value, float) for value in numbers.values()) else {}
@@ -146,7 +146,7 @@ def _calibration(numbers: Mapping[str, Any] | None) -> str:
 
 
 def view_of(loaded: Loaded) -> View:
-    """Return a view of a run that was recorded before."""
+    """Return a view of a saved run."""
     block: Block = loaded.samples
     view = View(
         "REPLAY",

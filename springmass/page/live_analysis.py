@@ -1,4 +1,4 @@
-"""The motion of the samples so far, analysed again and again in a thread; the server never waits for it."""
+"""Repeated analysis of the samples so far, in a thread; the server never waits for it."""
 
 from __future__ import annotations
 
@@ -31,29 +31,29 @@ from storage.errors import StorageError
 __all__ = ["Watcher", "drawn", "motion_of"]
 
 LIVE_TIER, WHOLE_TIER = "fast", "standard"
-"""Tiers of the analysis during a recording, and of a complete run, where every command uses it by default."""
+"""Tiers of the analysis during a recording, and of a complete run; the latter is the default of every command."""
 SHARE, NOW_SHARE = 0.03, 0.02
-"""Largest share of a core for the analysis of all samples, and for that of the last seconds: 5 % together."""
+"""Maximum fraction of a core for analyses of all samples, and for those of the last seconds; together 5 %."""
 NOW_S, NOW_SWINGS = 10.0, 8.0
-"""The amplitude now is by so many seconds, or by so many swings if these last longer."""
+"""Duration of the samples for the current amplitude, in seconds and in swings; the longer duration counts."""
 LEAST_WAIT_S = 1.0
 NAMES = ("period", "spring_constant", "damping_rate", "noise", "offset", "quality_factor")
 CURVE_POINTS = 200
 FIT_BEFORE_S, FIT_AFTER_S, FIT_POINTS = 40.0, 60.0, 101
-"""The latest fit is drawn from so long before its last window to so long after it."""
+"""Time range of the latest fit before and after its last window in s, and its number of points."""
 LAST_WINDOWS = 4
 U_CLOCK_REACH = 2.0
-"""Coverage factor of the unknown but fixed rate of the clock, which does not depend on when one stops."""
+"""Coverage factor of the clock's rate error, which is unknown but constant and independent of the stopping time."""
 WANTED = 4e-5
-"""Wanted u as a share of the period: a little above the u of a crystal of 50 ppm, so that it can be reached."""
+"""Wanted u relative to the period: a little above the u of a 50 ppm crystal, so that it can be reached."""
 MOST_POINTS = 600
-"""Largest number of amplitudes in a message."""
+"""Maximum number of amplitudes in a message."""
 SPECTRUM_SAMPLES = 1 << 13
 SPECTRUM_POINTS = 1024
 MAIN_LOBE = 4
-"""Width of a line by a Hann window, in frequencies."""
+"""Width of a spectral line under a Hann window, in frequency steps."""
 NEIGHBOURS = 129
-"""Frequencies whose median is the noise around one; with its scatter 2 of 800 spectra of white noise have a peak."""
+"""Frequencies whose median estimates the noise level; due to its scatter, 2 of 800 white-noise spectra have a peak."""
 PEAK_FALSE_ALARM = 1e-3
 MOST_PEAKS = 5
 
@@ -67,18 +67,18 @@ def motion_of(
     law: str | None = None,
     accuracy: str = LIVE_TIER,
 ) -> dict[str, Any]:
-    """Analyse samples and return the message on their motion.
+    """Analyse samples and return the message about their motion.
 
     Parameters
     ----------
     track : Track
     scene : Scene
     wanted_u_s : float, optional
-        Standard uncertainty of the period to record for, s; left out, 40 ppm of the period.
+        Standard uncertainty of the period to reach, s; default: 40 ppm of the period.
     traps : sequence of Trap
-        What the reader noticed.
+        Traps that the reader found in the file.
     law : str, optional
-        Damping law that is stated, as :func:`springmass.runs.analysing.with_law` takes it.
+        Stated damping law, as :func:`springmass.runs.analysing.with_law` takes it.
     accuracy : {"fast", "standard", "best"}
         Tier of the analysis; the message names it.
     """
@@ -87,7 +87,7 @@ def motion_of(
 
 
 def _message(analyse: Callable[[], Analysis], track: Track, accuracy: str, wanted_u_s: float | None) -> dict[str, Any]:
-    """Return the message on an analysis, or on why there is none."""
+    """Return the message about an analysis, or about the reason why there is none."""
     message: dict[str, Any] = {
         "type": "motion",
         "why": "",
@@ -116,10 +116,11 @@ def _estimates(analysis: Analysis) -> dict[str, dict[str, Any]]:
 
 
 def _sampling(track: Track) -> dict[str, Estimate]:
-    """Return the rate, Hz, and the share of samples that are missing, %.
+    """Return the sampling rate in Hz and the fraction of missing samples in %.
 
-    The u of the rate combines that of the clock with the scatter of the times. The u of the share is that of its
-    posterior under Jeffreys' prior: none missing among a few samples does not prove that none will be.
+    The u of the rate combines the u of the clock with the scatter of the times. The u of the fraction is the standard
+    deviation of its posterior under Jeffreys' prior: a few samples without a missing one do not prove that the fraction
+    is zero.
     """
     steps = np.diff(track.t[np.isfinite(track.t)])
     n, missing = len(track), int(np.count_nonzero(np.isnan(track.y)))
@@ -146,7 +147,7 @@ def _oscillation(analysis: Analysis, motion: Oscillation, aim_s: float | None) -
         estimates["amplitude_now"] = _in_message(now)
     period, frequency = analysis.estimates["period"], motion.phase.angular_frequency
     wanted_u_s = WANTED * period.value if aim_s is None else aim_s
-    # The uncertainty by the samples shrinks with the recording; that of the sensor's clock does not.
+    # The uncertainty from the samples shrinks as the recording grows; that from the sensor's clock does not.
     u_samples = min(period.value * frequency.u / frequency.value, period.u)
     u_clock = math.sqrt(period.u**2 - u_samples**2)
     wanted_u_samples_s = math.sqrt(wanted_u_s**2 - u_clock**2) if wanted_u_s > u_clock else None
@@ -185,7 +186,7 @@ def _oscillation(analysis: Analysis, motion: Oscillation, aim_s: float | None) -
 
 
 def _now(amplitude: F8, u: F8) -> Estimate | None:
-    """Return the mean amplitude of the last windows, which is over three to five swings, as people read it."""
+    """Return the mean amplitude of the last windows; they span three to five swings, as in a reading by eye."""
     values, weights = amplitude[-LAST_WINDOWS:], u[-LAST_WINDOWS:] ** -2.0
     if values.size < 2 or not np.isfinite(weights).all():
         return None
@@ -193,9 +194,9 @@ def _now(amplitude: F8, u: F8) -> Estimate | None:
 
 
 def _latest_fit(motion: Oscillation, end: float) -> dict[str, Any]:
-    """Return the last window's sine, position = rest + amplitude decay(t) cos(omega (t - moment) + phase).
+    """Return the sinusoid of the last window: rest + amplitude decay(t) cos(omega (t - moment) + phase).
 
-    ``decay`` is the damping law's amplitude by that of the moment, in even steps of time from the moment.
+    ``decay`` is the amplitude of the damping law divided by its amplitude at ``moment``, in even steps of time.
     """
     windows, damping = motion.demodulated, motion.damping
     after = np.linspace(-FIT_BEFORE_S, FIT_AFTER_S, FIT_POINTS)
@@ -214,7 +215,7 @@ def _latest_fit(motion: Oscillation, end: float) -> dict[str, Any]:
 
 
 def drawn(values: NDArray[np.floating[Any]]) -> list[float]:
-    """Round the numbers (n,) of a curve to seven digits: finer than any screen, and half as long in a message."""
+    """Round the numbers (n,) of a curve to seven digits: finer than any screen, and half the size in a message."""
     with np.errstate(divide="ignore", invalid="ignore"):
         digits = np.clip(np.nan_to_num(6.0 - np.floor(np.log10(np.abs(values))), posinf=0.0, neginf=0.0), -15, 290)
     factor = 10.0**digits
@@ -228,23 +229,25 @@ def _in_message(estimate: Estimate) -> dict[str, Any]:
 
 
 def spectrum(track: Track) -> dict[str, Any]:
-    """Return the spectrum of the latest samples, by a Hann window; missing samples count as the mean.
+    """Return the spectrum of the latest samples under a Hann window; missing samples are replaced by the mean.
 
     Returns
     -------
     dict
-        Frequencies ``f`` in Hz and amplitudes ``value`` in the unit of the samples, at most 1024 each, and ``peaks``,
-        the highest five, each with ``f``, ``value`` and ``step``, the distance in Hz of neighbouring frequencies.
+        Frequencies ``f`` in Hz and amplitudes ``value`` in the unit of the samples, fewer than 2048 each, and
+        ``peaks``, the highest five at most. Each peak has ``f``, ``value`` and ``step``, the spacing of neighbouring
+        frequencies in Hz.
 
     Notes
     -----
-    A peak exceeds the level that the highest of n frequencies of noise exceeds with a probability of 0.001. The
-    amplitudes of noise follow Rayleigh's distribution, whose quantiles are multiples of its median m. Here m is the
-    median of the neighbouring frequencies, because a swing and outliers raise the noise around them:
-    :math:`A(\\alpha) = m \\sqrt{\\log_2(n/\\alpha)}`. A peak also stands out by a factor of two from the lowest point
-    between it and any higher one.
+    A peak exceeds the level that the maximum of n frequencies of pure noise exceeds with a probability of 0.001. The
+    amplitudes of noise follow a Rayleigh distribution, whose quantiles are multiples of its median m. Here m is the
+    median over the neighbouring frequencies, because a swing and outliers raise the noise around them:
+    :math:`A(\\alpha) = m \\sqrt{\\log_2(n/\\alpha)}`. A peak also exceeds the lowest point between it and any higher
+    peak by a factor of at least two.
     """
-    # While the bob hangs before its release there is no line, and the step would put lines into the spectrum.
+    # Samples before the release are omitted: they contain no oscillation, and the step at the release would add lines
+    # to the spectrum.
     y = track.y if track.trigger_s is None else track.y[track.t >= track.trigger_s]
     y = y[-SPECTRUM_SAMPLES:]
     seen = np.isfinite(y)
@@ -258,7 +261,7 @@ def spectrum(track: Track) -> dict[str, Any]:
     whole = f.size // group * group
     return {
         "f": drawn(f[:whole].reshape(-1, group)[:, 0]),
-        "value": drawn(amplitude[:whole].reshape(-1, group).max(axis=1)),  # a line stays as high as it is
+        "value": drawn(amplitude[:whole].reshape(-1, group).max(axis=1)),  # the maximum keeps the height of a line
         "peaks": _peaks(f, amplitude),
     }
 
@@ -267,9 +270,9 @@ def _peaks(f: NDArray[np.floating[Any]], amplitude: NDArray[np.floating[Any]]) -
     from scipy.ndimage import median_filter
     from scipy.signal import find_peaks
 
-    inner = amplitude[MAIN_LOBE:]  # the lowest frequencies hold a drift
+    inner = amplitude[MAIN_LOBE:]  # the lowest frequencies may contain a drift
     noise = median_filter(inner, NEIGHBOURS) * math.sqrt(math.log2(inner.size / PEAK_FALSE_ALARM))
-    floor = float(inner.max()) * 1e-12  # of a spectrum without noise
+    floor = float(inner.max()) * 1e-12  # for a spectrum without noise
     if not floor > 0.0:
         return []
     decibels, level = (20.0 * np.log10(np.maximum(each, floor)) for each in (inner, noise))
@@ -277,7 +280,8 @@ def _peaks(f: NDArray[np.floating[Any]], amplitude: NDArray[np.floating[Any]]) -
     step = float(f[1] - f[0])
     peaks = []
     for i in sorted(sorted(map(int, at), key=lambda i: -inner[i])[:MOST_PEAKS]):
-        # The parabola through three levels in decibels: within a fiftieth of a step of a line by a Hann window.
+        # A parabola through three levels in decibels finds a line under a Hann window to a fiftieth of a frequency
+        # step.
         below, top, above = decibels[i - 1 : i + 2]
         shift = 0.5 * float((below - above) / (below - 2.0 * top + above))
         peaks.append({"f": float(f[i + MAIN_LOBE]) + shift * step, "value": float(inner[i]), "step": step})
@@ -287,26 +291,26 @@ def _peaks(f: NDArray[np.floating[Any]], amplitude: NDArray[np.floating[Any]]) -
 class Watcher:
     """Analyses the first sensor's samples in a thread, as often as its share of a core allows.
 
-    While a recording goes on, the fast tier analyses all samples so far, and in between the latest seconds alone for
-    the amplitude. A run that is complete is analysed once, as ``springmass analyse`` does it.
+    While a recording goes on, the fast tier analyses all samples so far and, in between, only the latest seconds for
+    the amplitude. A complete run is analysed once, as by ``springmass analyse``.
 
     Parameters
     ----------
     view : View
     scene : mapping or None
-        What the recording states about its bench.
+        The bench as the recording states it.
     wanted_u_s : float or None
-        Standard uncertainty of the period to record for, s; None: 40 ppm of the period.
+        Standard uncertainty of the period to reach, s; None means 40 ppm of the period.
     law : str or None
-        Damping law that is stated, as :func:`springmass.runs.analysing.with_law` takes it.
+        Stated damping law, as :func:`springmass.runs.analysing.with_law` takes it.
 
     Attributes
     ----------
     text : str
-        The latest message on all samples as JSON, made here so that the server does not wait; its ``count``
-        distinguishes it from the one before.
+        The latest message about all samples as JSON, encoded in this thread so that the server does not wait. Its
+        ``count`` distinguishes it from the previous message.
     now_text : str
-        The latest message on the last seconds as JSON; empty before there is one.
+        The latest message about the last seconds as JSON; empty before the first one.
     """
 
     def __init__(
@@ -325,32 +329,32 @@ class Watcher:
         self._thread.start()
 
     def close(self) -> None:
-        """Ask for no more; the thread ends with its analysis."""
+        """Request the end of the thread, which finishes its current analysis first."""
         self._closed = True
         self._wake.set()
 
     def complete(self, path: Path) -> None:
-        """Analyse from here on the file of the run, as every command does, and no more samples of its log."""
+        """From now on, analyse the run file, as every command does, instead of the samples of its log."""
         if path != self._complete:
             self._complete = path
             self._wake.set()
 
     @property
     def accuracy(self) -> str:
-        """Tier of the analysis."""
+        """The tier of the analysis."""
         return WHOLE_TIER if self._view.recorded is not None or self._run is not None else LIVE_TIER
 
     def track(self, low: float = -math.inf, high: float = math.inf) -> Track:
-        """Return the first sensor's samples between two times."""
+        """Return the first sensor's samples between two times in s."""
         return between(self._view.track() if self._run is None else self._run.loaded.track, low, high)
 
     def region(self, low: float, high: float) -> str:
-        """Return the message on the motion between two times, as JSON."""
+        """Return the message about the motion between two times as JSON."""
         found = self._analysed(self.track(low, high))
         return json_of({**found, "type": "region", "from": low, "to": high})
 
     def moment(self, to: float) -> str:
-        """Return what a live page would have shown at a moment of a complete run, without a forecast, as JSON."""
+        """Return as JSON what a live page would have shown at a moment of a complete run, without a forecast."""
         found = motion_of(self.track(high=to), self._scene, law=self._law)
         found.pop("stop", None)
         return json_of({**found, "type": "moment", "to": to})
@@ -362,7 +366,7 @@ class Watcher:
         return motion_of(track, scene, self._wanted_u_s, traps, law=self._law, accuracy=self.accuracy)
 
     def _motion(self) -> dict[str, Any]:
-        """Analyse all samples, or the file of the run once that is complete."""
+        """Analyse all samples, or the run file once it is complete."""
         if self._complete is None:
             return self._analysed(self.track())
         try:
@@ -373,7 +377,7 @@ class Watcher:
         return _message(lambda: run.analysis, run.loaded.track, WHOLE_TIER, self._wanted_u_s)
 
     def _now(self, swing_s: float) -> dict[str, Any]:
-        """Analyse the last seconds alone; return the message on the amplitude in them."""
+        """Analyse only the last seconds, and return the message about their amplitude."""
         last_s = float(self._view.series[0].columns()[0][-1])
         recent = self._analysed(self.track(last_s - max(NOW_S, NOW_SWINGS * swing_s)))
         amplitude = recent.get("estimates", {}).get("amplitude_now")
@@ -390,7 +394,7 @@ class Watcher:
             samples, complete = len(self._view.series[0]), self._complete is not None
             if self._closed or (samples == seen and complete == is_complete) or is_complete:
                 continue
-            start_s = time.thread_time()  # of work, not of waiting for a core that others hold
+            start_s = time.thread_time()  # CPU time, without waiting for a core that other programs use
             try:
                 if complete or time.monotonic() >= due_s:
                     seen, is_complete, count = samples, complete, count + 1
@@ -398,11 +402,11 @@ class Watcher:
                     swing_s = message.get("estimates", {}).get("period", {}).get("value", 0.0)
                     self.text = json_of(message)
                     cost_s = time.thread_time() - start_s
-                    # One that loads a library takes longer once, and the next one need not wait for that.
+                    # An analysis that first loads a library takes longer; the next one need not wait for that.
                     due_s = time.monotonic() + min(cost_s, last_cost_s) / SHARE
                     last_cost_s = cost_s
                 elif swing_s:
                     self.now_text = json_of(self._now(swing_s))
                     wait_s = max(wait_s, (time.thread_time() - start_s) / NOW_SHARE)
-            except Exception as error:  # a defect of the analysis is shown, and the samples go on
+            except Exception as error:  # a defect of the analysis is shown, and the samples are still displayed
                 self.text = json_of({"type": "motion", "count": count, "why": f"{type(error).__name__}: {error}"})

@@ -1,7 +1,7 @@
-"""The page during a recording: a separate process, to which the recorder writes a line now and then.
+"""The page during a recording: a separate process to which the recorder writes lines.
 
-One thread writes the recorder's state to the page, and only that thread may wait for it; another one reads what is
-asked for on the page. Neither can delay a reading. A page that dies is started again under the same address.
+One thread writes the recorder's state to the page, and only that thread may wait for the page. Another thread reads the
+requests of the page. Neither can delay a reading. A page that dies is started again under the same address.
 """
 
 from __future__ import annotations
@@ -24,39 +24,39 @@ __all__ = ["PageProcess"]
 
 ENDS_WITHIN_S = 5.0
 STARTS = 5
-"""A page that died is started so often at most; one that dies more often has a defect."""
+"""Maximum number of starts of the page; a page that dies more often has a defect."""
 MOST_UNREAD = 100
-"""Lines that wait for a page that reads none; later ones are dropped."""
+"""Maximum number of lines that wait for a page that reads none; further lines are dropped."""
 
 _AGAIN: Mapping[str, Any] = {"phase": "sent again"}
-"""In place of a state: the last one is sent to a page that has just been started."""
+"""An item in place of a state: the last state is sent again to a page that has just been started."""
 
 
 class PageProcess:
-    """Starts the page; used in a ``with``.
+    """Starts and ends the page, as a context manager.
 
-    The recording goes on whatever happens to the page; the end of the page is noted.
+    The recording goes on even if the page dies; the page's death is recorded as a failure.
 
     Parameters
     ----------
     arguments : sequence of str
         Options of ``springmass page``.
     log : Path
-        The log that will be recorded to; the page names the run by it.
+        The log of the future recording; the page derives the name of the run from it.
     marks : queue of str
-        Receives the marks that are made on the page.
+        Receives the marks that are set on the page.
     stops : Stops
-        Is asked when the page asks for the end of the recording.
+        Receives the page's request to end the recording.
     failures : Failures
     say : callable
-        Takes a line of the page's for the terminal, such as its address.
+        Receives lines of the page for the terminal, such as its address.
 
     Attributes
     ----------
     marks : queue of str
-        May be changed before the recording begins.
+        Receives the marks; it may be replaced before the recording begins.
     requests : queue of dict
-        Other requests of the page.
+        Receives the other requests of the page.
     """
 
     def __init__(
@@ -85,24 +85,24 @@ class PageProcess:
         return self
 
     def tell(self, phase: str, **facts: Any) -> None:
-        """Send the phase of the recording to the page; never waits."""
+        """Send the phase of the recording to the page without waiting."""
         if self._states.qsize() < MOST_UNREAD:
             self._states.put({"phase": phase, **facts})
 
     def ended(self) -> None:
-        """End the input of the page; it shows that and ends."""
+        """Close the input of the page, which then shows the end of the recording and exits."""
         with self._lock:
             self._over = True
         self._states.put(None)
 
     def attend(self) -> None:
-        """Return when the page has ended because somebody closed it or nobody looked at it any more."""
+        """Wait until the page has ended because somebody closed it or nobody views it any more."""
         with self._lock:
             self._over = True
         self._kept.join()
 
     def __exit__(self, *_: object) -> None:
-        """Return when the page has ended; kill it if it does not end in time."""
+        """Wait until the page has ended, and kill it if it does not end in time."""
         self.ended()
         self._kept.join(ENDS_WITHIN_S)
         if self._process is not None and self._process.poll() is None:
@@ -121,7 +121,7 @@ class PageProcess:
             except OSError as error:
                 self._failures.note("page", error)
                 return
-            # The gate is the page's first line, so it is written before the page is known to the thread that writes.
+            # The gate must be the page's first line, so it is written before the writing thread can access the process.
             _write(process, {"gate": self._gate})
             self._process = process
             self._states.put(_AGAIN)
@@ -166,13 +166,13 @@ class PageProcess:
                 self._failures.note("page", error)
 
     def _note(self, text: str) -> None:
-        """Write a note into the log as an event; there is a log only during the recording."""
+        """Write a note to the log as an event; a log exists only during the recording."""
         if text and (tell := self._failures.tell) is not None:
             tell("note", {"text": text})
 
 
 def _write(process: subprocess.Popen[bytes], content: Mapping[str, Any]) -> None:
-    """Write one line to a page; if it has ended, the next one gets the last state when it starts."""
+    """Write one line to a page; if that page has ended, its successor gets the last state when it starts."""
     if process.stdin is None:
         return
     with contextlib.suppress(OSError, ValueError):

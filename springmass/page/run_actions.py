@@ -1,4 +1,4 @@
-"""Actions on a run that is recorded: make its report, add notes, set it aside. Nothing is deleted."""
+"""Actions on a recorded run: make its report, add notes, or discard it. Nothing is deleted."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from springmass.runs.about import about_of, write_about
 __all__ = ["ASIDE", "Afterwards"]
 
 ASIDE = "discarded"
-"""Folder next to the runs, which holds those that somebody set aside."""
+"""Folder next to the runs for discarded runs."""
 
 
 class Afterwards:
-    """Works on one run, whose path the recorder or the command line named; no name comes from the network.
+    """Works on one run; its path comes from the recorder or the command line, never from the network.
 
     Parameters
     ----------
     run : Path
     ours : bool
-        Whether it was recorded just now: no other run can be set aside.
+        Whether the run was recorded just now; no other run can be discarded.
     law : str or None
-        Damping law that is stated, for the report.
+        Stated damping law, for the report.
     """
 
     def __init__(self, run: Path, *, ours: bool, law: str | None = None) -> None:
@@ -43,11 +43,11 @@ class Afterwards:
 
     @property
     def report(self) -> Path | None:
-        """The report, once it is made."""
+        """The path of the report; None until it is made."""
         return self._report
 
     def make_report(self) -> None:
-        """Start a process that analyses the run; a second call during that does nothing."""
+        """Start a process that analyses the run, unless one is already running."""
         if self._making:
             return
         self._making, self._failed, self._report = True, "", None
@@ -62,7 +62,7 @@ class Afterwards:
             self._failed = f"not noted ({error})"
 
     def discard(self) -> None:
-        """Move the run and its notes into the folder of discarded runs; nothing there is replaced."""
+        """Move the run and its notes to the folder of discarded runs, without replacing any file there."""
         if self._making or self._aside:
             return
         folder = self._run.parent / ASIDE

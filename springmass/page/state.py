@@ -1,4 +1,4 @@
-"""What the page shows: one run at a time, and the state that its recorder reported."""
+"""The state of the page: the run that it shows, and the state that the recorder reported."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BEFORE = frozenset({"zero", "ruler", "arm", "disarm", "record", "close"})
 DURING = frozenset({"mark", "note", "stop"})
 AFTER = frozenset({"report", "note", "discard", "close"})
 PHASES = {"ready": BEFORE, "still": frozenset[str](), "armed": BEFORE, "recording": DURING}
-"""Requests that a recorder takes in each phase."""
+"""Requests that a recorder accepts in each phase."""
 
 
 class PageState:
@@ -30,22 +30,22 @@ class PageState:
     Parameters
     ----------
     wanted_u_s : float or None
-        Standard uncertainty of the period to record for, s; None: 40 ppm of the period.
+        Standard uncertainty of the period to reach, s; None means 40 ppm of the period.
     controls : callable or None
         Passes requests to the recorder; None if there is none.
     law : str or None
-        Damping law that is stated, as :func:`springmass.runs.analysing.with_law` takes it.
+        Stated damping law, as :func:`springmass.runs.analysing.with_law` takes it.
 
     Attributes
     ----------
     view : View or None
-        None before there is anything to show.
+        The run that is shown; None before there is one.
     name : str
-        Name of the run that will be recorded.
+        Name of the run that will be recorded; empty if none is planned.
     closed : bool
         Whether somebody closed the page.
     bench : dict
-        The last state of the recorder: its ``phase`` and what belongs to it.
+        The last state of the recorder: its ``phase`` and the facts of this phase.
     """
 
     def __init__(
@@ -65,19 +65,19 @@ class PageState:
         self._recorder_states: queue.SimpleQueue[Mapping[str, Any]] = queue.SimpleQueue()
 
     def show(self, view: View, scene: Mapping[str, Any] | None, path: Path | None = None) -> None:
-        """Show a complete run; given its path, notes and a report can be made."""
+        """Show a complete run; if its path is given, notes and a report are possible."""
         self._folder = None if path is None else path.parent
         self._lay(view, scene)
         if path is not None:
             self.after = Afterwards(path, ours=False, law=self._law)
 
     def follow(self, log: Path) -> None:
-        """Show a log that grows.
+        """Show a growing log.
 
         Raises
         ------
         NotALog
-            If it is none.
+            If the file is not a wire log.
         """
         feed = LogFeed(log)
         feed.view.name = self.name or feed.view.name
@@ -87,11 +87,11 @@ class PageState:
         self._lay(feed.view, feed.scene)
 
     def put_recorder_state(self, message: Mapping[str, Any]) -> None:
-        """Take a state of the recorder, from any thread."""
+        """Queue a state of the recorder; any thread may call this."""
         self._recorder_states.put(message)
 
     def poll(self) -> None:
-        """Read what is new; called from the server's thread only."""
+        """Read new samples and states; only the server's thread may call this."""
         while not self._recorder_states.empty():
             self._take(self._recorder_states.get())
         if self._feed is not None:
@@ -125,7 +125,7 @@ class PageState:
         if log and log != self._log:
             try:
                 self.follow(Path(log))
-            except Exception as error:  # the recording goes on, whatever keeps the page from showing it
+            except Exception as error:  # the recording goes on, even if the page cannot show it
                 self.bench["said"] = f"it cannot be shown ({error})"
         if message["phase"] == "built":
             self.after = Afterwards(Path(message["run"]), ours=True, law=self._law)
@@ -141,5 +141,5 @@ class PageState:
     def _free(self) -> int | None:
         try:
             return None if self._folder is None else shutil.disk_usage(self._folder).free
-        except OSError:  # a folder that was renamed; the recorder says so
+        except OSError:  # the folder was renamed; the recorder reports that
             return None

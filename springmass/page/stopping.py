@@ -1,7 +1,8 @@
-"""When to stop: intervals that cover whenever somebody stops, and how long until a wanted uncertainty is reached.
+"""When to stop: intervals valid at any stopping time, and the time until a wanted uncertainty is reached.
 
 Somebody who watches an interval shrink and stops when it looks good has looked many times. An interval of two standard
-uncertainties then misses far more often than one time in twenty; a confidence sequence covers at all times together.
+uncertainties then misses the true value far more often than one time in twenty. A confidence sequence covers the true
+value at all times simultaneously.
 """
 
 from __future__ import annotations
@@ -17,33 +18,33 @@ __all__ = ["ALPHA", "more_seconds", "widening"]
 
 ALPHA = 0.05
 TIGHTEST = 0.12
-"""Ratio of the mixture's information to the record's at which the sequence is tightest, for 95 %."""
+"""Ratio of the mixture's information to the record's at which a 95 % sequence is tightest."""
 FARTHEST = 50.0
 """The longest forecast, in multiples of the time recorded so far."""
 
 
 def widening(u: float, wanted_u: float) -> float:
-    """Return by how many u an interval reaches to both sides that covers 95 % whenever one stops.
+    """Return the half-width in units of u of an interval with 95 % coverage at any stopping time.
 
     Parameters
     ----------
     u : float
         Standard uncertainty of the estimate now.
     wanted_u : float
-        The one to record for, in the same unit and chosen before the recording: there the interval is tightest.
+        Standard uncertainty to reach, in the unit of ``u`` and chosen before the recording; the interval is tightest
+        there.
 
     Returns
     -------
     float
-        3.0 at ``wanted_u``, more before and after.
+        The factor: 3.0 at ``wanted_u``, and larger before and after.
 
     Notes
     -----
     The normal mixture of Robbins: with the information :math:`V = u^{-2}` and :math:`\\rho` fixed beforehand,
-    :math:`|\\hat\\theta - \\theta| < u\\sqrt{(1 + \\rho/V)\\ln((1 + V/\\rho)/\\alpha^2)}` for all V together, with a
-    probability of at least :math:`1 - \\alpha`. The increments of the estimate in V must be independent, as those of a
-    phase's slope are.
-    Howard, Ramdas, McAuliffe, Sekhon, Annals of Statistics 49 (2021) 1055, eq. 14.
+    :math:`|\\hat\\theta - \\theta| < u\\sqrt{(1 + \\rho/V)\\ln((1 + V/\\rho)/\\alpha^2)}` for all V simultaneously,
+    with a probability of at least :math:`1 - \\alpha`. The increments of the estimate in V must be independent, as they
+    are for the slope of a phase. Howard, Ramdas, McAuliffe, Sekhon, Annals of Statistics 49 (2021) 1055, eq. 14.
 
     Examples
     --------
@@ -60,21 +61,22 @@ def more_seconds(u: float, wanted_u: float, seconds: float, amplitude: Callable[
     Parameters
     ----------
     u, wanted_u : float
-        Now, and wanted.
+        Standard uncertainty now, and the wanted one.
     seconds : float
-        Recorded so far.
+        Duration of the recording so far.
     amplitude : callable
-        Of times (n,) in s from the start: the fitted law, which is extrapolated.
+        The fitted law, which is extrapolated: it returns amplitudes at times (n,) in s from the start.
 
     Returns
     -------
     float
-        0 where it is reached; infinity where the swing dies out first, or it takes more than fifty times as long.
+        Time in s: 0 if the wanted uncertainty is already reached; infinity if the swing dies out first, or if the
+        recording would have to last more than fifty times as long as now.
 
     Notes
     -----
-    The information on the slope of the phase grows as :math:`J(t) = \\int A^2 (s - \\bar s)^2 ds` with
-    :math:`\\bar s` the mean time by :math:`A^2`; u falls as :math:`J^{-1/2}`.
+    The information on the slope of the phase grows as :math:`J(t) = \\int A^2 (s - \\bar s)^2 ds` where :math:`\\bar s`
+    is the mean time weighted by :math:`A^2`; u falls as :math:`J^{-1/2}`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What the page shows: the samples, marks and notes of the log, held once for all viewers."""
+"""The contents of the page: samples, marks and notes of the log, stored once for all viewers."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from springmass.runs.tracks import to_track
 __all__ = ["VERSION", "Series", "View", "json_of"]
 
 VERSION = 1
-"""Of the messages."""
+"""Version of the messages."""
 MOST_PER_MESSAGE = 50_000
 _HEAD, _F8 = struct.Struct("<4I"), np.dtype("<f8")
 FIRST_SAMPLES = 1000
-"""Samples whose stamps determine t = 0; later ones would add the difference of the clocks' rates."""
+"""Number of samples whose time stamps determine t = 0; later ones would add the difference of the clocks' rates."""
 SAMPLES = 1
-"""First number of a binary message: what follows are samples."""
+"""First number of a binary message that contains samples."""
 
 
 class Series:
-    """One sensor's samples; room grows by doubling, so that a sample costs the same at any length."""
+    """One sensor's samples; the storage grows by doubling, so that the cost per sample stays constant."""
 
     def __init__(self) -> None:
         self._t, self._y, self._flags = np.empty(1024), np.empty(1024), np.empty(1024, np.uint8)
@@ -43,7 +43,7 @@ class Series:
         return self._count
 
     def push(self, block: Block) -> None:
-        """Take samples."""
+        """Append samples."""
         stop = self._count + len(block)
         if stop > self._t.size:
             room = max(stop, 2 * self._t.size) - self._count
@@ -55,7 +55,7 @@ class Series:
         self._host_ns[new] = -1 if block.host_ns is None else block.host_ns
         early = min(len(block), FIRST_SAMPLES - self._count)
         if block.host_ns is not None and early > 0:
-            # A stamp may come late, never early.
+            # A time stamp may be late, but never early.
             moment_ns = float((block.host_ns[:early] - 1e9 * block.t[:early]).min())
             self._moment_ns = moment_ns if self._moment_ns is None else min(self._moment_ns, moment_ns)
         self._count = stop
@@ -76,11 +76,11 @@ class Series:
         return Block(0, t, y, flags, self._host_ns[: self._count])
 
     def time_of(self, host_ns: int) -> float:
-        """Return the record's time of a moment by the host's clock, s; NaN before the first sample."""
+        """Convert a time of the host's clock in ns to a time of the record in s; NaN before the first sample."""
         return float("nan") if self._moment_ns is None else (host_ns - self._moment_ns) * 1e-9
 
     def message(self, sensor: int, first: int) -> bytes:
-        """Return samples from a number on as a binary message, at most 50,000 of them.
+        """Return at most 50,000 samples, starting at index ``first``, as a binary message.
 
         Four little-endian unsigned integers of 32 bits (1, sensor, first, count), then ``count`` times in s and
         ``count`` values as 64-bit floats; a missing sample is NaN.
@@ -92,44 +92,45 @@ class Series:
 
 @dataclass(eq=False)
 class View:
-    """A run as the page has it.
+    """A run as the page shows it.
 
     Parameters
     ----------
     source : {"LIVE", "REPLAY"}
     name, title : str
     rate_hz : float
-        Nominal.
+        Nominal sampling rate.
     sensors : list of str
     quantity, unit : str
-        Of the values.
+        Quantity and unit of the values.
     clock : {"nominal", "device", "host"}
         Source of the times.
     simulated : bool
-        Simulated data never pass for measured ones.
+        Whether the data are simulated; such data are always marked as simulated.
     calibration : str
-        How distances were calibrated, in words; empty where nobody says.
+        How distances were calibrated, in words; empty if unknown.
     series : list of Series
-        One a sensor.
+        One series per sensor.
     session : str
-        Differs between starts, so that a page that reconnects to another run begins anew.
+        Identifier that differs between starts, so that a page that reconnects to another run begins anew.
     marks : list of (float, str)
         Time in s and text.
     notes : list of str
         Events of the recording, in words.
     ended : bool
     error : str
-        Why nothing more is shown; empty without an error.
+        Why no further samples are shown; empty without an error.
     recorded : Track or None
-        Of a run that was recorded before: its first sensor's samples as an analysis takes them.
+        For a saved run: the first sensor's samples in the form for an analysis.
     info : SourceInfo or None
-        Of a run that is being recorded: properties of its first sensor.
+        For a run that is being recorded: properties of its first sensor.
     provenance : mapping
-        What the log states so far, as a run file states it: sensor, events, and once it has ended how it was decoded.
+        The provenance from the log so far, in the form of a run file: sensor, events and, after the end, how the log
+        was decoded.
     traps : tuple of Trap
-        What the reader noticed.
+        Traps that the reader found in the file.
     zero : mapping
-        ``rest_m`` and ``noise_m``, as they were measured before the run; empty where they were not.
+        ``rest_m`` and ``noise_m`` as measured before the run; empty if they were not measured.
     """
 
     source: Literal["LIVE", "REPLAY"]
@@ -155,7 +156,7 @@ class View:
     zero: dict[str, float] = field(default_factory=dict)
 
     def track(self) -> Track:
-        """Return the first sensor's samples so far as an analysis takes them."""
+        """Return the first sensor's samples so far, in the form for an analysis."""
         if self.recorded is not None:
             return self.recorded
         info = self.info or SourceInfo("live", self.name, self.rate_hz, clock=self.clock)
@@ -172,7 +173,7 @@ class View:
         return {"type": "hello", "version": VERSION, **fields, **more}
 
     def state(self) -> dict[str, Any]:
-        """Return the state of the run by its log."""
+        """Return the state of the run according to its log."""
         return {
             "type": "state",
             "samples": [len(series) for series in self.series],
@@ -185,10 +186,10 @@ class View:
 
 
 def json_of(content: Any) -> str:
-    """Return JSON that browsers read: a number that is not finite is null."""
+    """Return JSON that browsers can read, with null for numbers that are not finite."""
     try:
         return json.dumps(content, allow_nan=False)
-    except ValueError:  # rarely: to look at every number before takes as long again
+    except ValueError:  # rare; checking every number in advance would double the time
         return json.dumps(_finite(content), allow_nan=False)
 
 

@@ -1,6 +1,7 @@
-"""Report: one run or several as a page to read, figures to print and tables to paste.
+"""Report of one or several runs: a page to read, figures to print, and tables to paste.
 
-In: analyses as the pipeline gives them, and what is known of their inputs. Out: report.html, figures, table.tex, CSV,
-all in one folder (`write.write_report`). Free to change: a figure is a maker in `figures` and a line in its MAKERS, a
-row of Table 1 a line in `tables`, the page `templates/report.html.j2`; no number is calculated here.
+In: analyses from the pipeline, and facts about their inputs. Out: report.html, figures, table.tex and CSV in one folder
+(`write.write_report`). Free to change: each figure is a maker in `figures` and a line in its MAKERS; the page is
+`templates/report.html.j2`. Table 1 lists the quantities of `pipeline.registry.quantities`. No results are calculated
+here.
 """

@@ -13,15 +13,15 @@ from springmass.report.words import typeset
 __all__ = ["LAW_CODES", "STANDING", "Harm", "Notice", "by_harm", "harm_of", "lab_report_line", "notices_of"]
 
 LAW_CODES = frozenset({"law_rejected", "laws_not_separable", "mixed_drag", "no_law_fits"})
-"""Stated by the sentence on damping and by the table of the laws."""
+"""Codes of findings that the sentence on damping and the table of laws already state."""
 STANDING = ("nominal_clock", "stated_error_is_not_noise", "jittered_time", "offset_unknown", "velocity_missing")
-"""Notes that a format brings with every file: they would hide what is special about this recording."""
+"""Notes that apply to every file of a format; they would hide what is special about this recording."""
 
 _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
 
 
 class Harm(enum.IntEnum):
-    """What a finding means for the results, the most harmful first."""
+    """Effect of a finding on the results, the most harmful first."""
 
     UNUSABLE = 0
     """A result must not be used."""
@@ -30,11 +30,11 @@ class Harm(enum.IntEnum):
     PART = 2
     """Only part of the recording, or no damping law, could be used."""
     UNCERTAINTY = 3
-    """The values hold and their uncertainties were increased."""
+    """The values are valid, and their uncertainties were increased."""
     IMPROVABLE = 4
-    """The values hold; a better recording or scene would make them more certain."""
+    """The values are valid; a better recording or scene would reduce their uncertainties."""
     NOTE = 5
-    """Nothing needs doing."""
+    """No action is needed."""
 
 
 _SCALE = frozenset(
@@ -96,11 +96,11 @@ _CONSEQUENCES = {
 
 
 _COMPLETE = frozenset({"amplitude_dependent_frequency"})
-"""Codes whose message says what it means for the values."""
+"""Codes of findings whose message already states the consequence for the values."""
 
 
 def harm_of(code: str, severity: str) -> Harm:
-    """Return what a finding means for the results.
+    """Return the effect of a finding on the results.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def harm_of(code: str, severity: str) -> Harm:
 
 
 def by_harm(findings: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return findings, as in the result's JSON, the most harmful first."""
+    """Sort findings, given as in the result's JSON, with the most harmful first."""
     return sorted(findings, key=lambda finding: harm_of(finding["code"], finding["severity"]))
 
 
@@ -143,7 +143,7 @@ class Notice:
     Parameters
     ----------
     code, severity, word, message : str
-        The message typeset, as a sentence.
+        Code, severity, its word, and the typeset message as a sentence.
     advice : str
         What to do; empty for a note.
     details : str
@@ -151,7 +151,7 @@ class Notice:
     report : str
         What to write in a lab report; empty for a note.
     figure : str
-        Name of the figure that shows it; empty where none does.
+        Name of the figure that shows the finding; empty if none does.
     """
 
     code: str
@@ -165,20 +165,20 @@ class Notice:
 
 
 def notices_of(findings: Iterable[Mapping[str, Any]], figures: Sequence[str]) -> dict[str, Any]:
-    """Return each finding in the one place where the page shows it.
+    """Group the findings by the place where the page shows them.
 
     Parameters
     ----------
     findings : iterable of mapping
-        As in the result's JSON.
+        Findings as in the result's JSON.
     figures : sequence of str
-        Names of those that the page holds.
+        Names of the figures on the page.
 
     Returns
     -------
     dict
-        "warnings": what affects the results, the most harmful first; "notes": the others; "standing": what every file
-        of the format brings; "law": codes of what the sentence on damping states.
+        "warnings": findings that affect the results, the most harmful first; "notes": all others; "standing": notes
+        that apply to every file of the format; "law": codes of findings that the sentence on damping states.
     """
     groups: dict[str, Any] = {"warnings": [], "notes": [], "standing": [], "law": []}
     for finding in by_harm(findings):
@@ -204,5 +204,5 @@ def notices_of(findings: Iterable[Mapping[str, Any]], figures: Sequence[str]) ->
 
 
 def _sentence(text: str) -> str:
-    """Begin with a capital and end with a full stop."""
+    """Start a text with a capital and end it with a full stop."""
     return f"{text[:1].upper()}{text[1:]}{'' if text[-1:] in '.!?' else '.'}"

@@ -1,4 +1,4 @@
-"""Uncertainty budgets for readers: which input contributes what share, in words and as CSV."""
+"""Uncertainty budgets for readers: the share of each input, in words and as CSV."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from springmass.report.tables import cell, table_estimates
 
 __all__ = ["BudgetRow", "budget_csv", "budget_text", "budgets_of", "correlations_of"]
 
-SAME = ("frequency", "angular_frequency")  # one number with the period
+SAME = ("frequency", "angular_frequency")  # determined by the period alone
 CORRELATED = frozenset({"period", "spring_constant", "amplitude", "damping_rate", "gamma", "beta", "mu", "c", "n"})
-"""Results whose correlations the page tells: as many as a phone is wide."""
-LEAST_SHARE = 1e-3  # of the variance; what is less does not reach a printed digit of u
+"""Results whose correlations the page shows; their number fits the width of a phone."""
+LEAST_SHARE = 1e-3  # of the variance; smaller shares do not change a printed digit of u
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +27,12 @@ class BudgetRow:
     Parameters
     ----------
     name, quantity : str
-        As in ``Derived.budgets``, and in words.
+        Name as in ``Derived.budgets``, and the quantity in words.
     budget : Budget
     contributions : tuple of Contribution
-        Those of more than a thousandth of the variance.
+        Contributions of at least a thousandth of the variance.
     rest : float
-        Share of all others together.
+        Total share of all other contributions.
     """
 
     name: str
@@ -43,9 +43,9 @@ class BudgetRow:
 
 
 def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
-    """Return the budget table of a run, in the order of Table 1; empty where nothing oscillates.
+    """Return the budget table of a run in the order of Table 1; empty if nothing oscillates.
 
-    Frequencies are left out: they share the period's budget.
+    Frequencies are omitted, because they share the period's budget.
 
     Parameters
     ----------
@@ -68,9 +68,9 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
 
 
 def correlations_of(analysis: Analysis) -> tuple[tuple[str, ...], list[list[float]]]:
-    """Return the correlations between the results that others are calculated from; empty where nothing oscillates.
+    """Return the correlations between the basic results, from which others are calculated; empty if nothing oscillates.
 
-    ``results.json`` holds those between all results.
+    ``results.json`` contains the correlations between all results.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ def correlations_of(analysis: Analysis) -> tuple[tuple[str, ...], list[list[floa
     Returns
     -------
     names : tuple of str
-        Of the results, in the order of Table 1.
+        Names of the results, in the order of Table 1.
     matrix : list of list of float
-        Between -1 and 1.
+        Correlation coefficients, between -1 and 1.
     """
     if not isinstance(analysis.motion, Oscillation):
         return (), []
@@ -92,9 +92,9 @@ def correlations_of(analysis: Analysis) -> tuple[tuple[str, ...], list[list[floa
 
 
 def budget_text(analysis: Analysis) -> str:
-    """Return the budget in brief: a line a quantity with its two greatest inputs, in ASCII.
+    """Return a brief budget in ASCII: one line per quantity with its two largest contributions.
 
-    Quantities with one input alone are left out: their line would say nothing.
+    Quantities with only one input of at least 1 % are omitted, because their line would give no information.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def budget_text(analysis: Analysis) -> str:
 
 
 def budget_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return every budget as CSV, one line an input; numbers keep all their digits.
+    """Return every budget as CSV, with one line per input and all digits of the numbers.
 
     Parameters
     ----------

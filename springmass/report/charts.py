@@ -18,7 +18,7 @@ from springmass.report.tables import law_status, page_unit
 __all__ = ["REASONS", "chart_data"]
 
 MOST_SAMPLES = 40_000
-"""Of a chart; of longer recordings the least and the greatest of every bin are kept."""
+"""Approximate maximum number of samples in a chart; longer recordings keep the minimum and maximum of each bin."""
 DIGITS = 5
 """Significant digits of a plotted number: a screen has fewer than ten thousand pixels."""
 REASONS: tuple[tuple[int, str], ...] = (
@@ -29,11 +29,11 @@ REASONS: tuple[tuple[int, str], ...] = (
     (int(Quality.OUTSIDE), "outside the analysed part"),
     (int(UNUSABLE), "not usable"),
 )
-"""Bits of a sample's flags, and what they mean to a reader."""
+"""Bits of a sample's flags, and their meaning in words."""
 
 
 def chart_data(analysis: Analysis) -> dict[str, Any]:
-    """Return the numbers of a run's charts; None stands where there is no number.
+    """Return the numbers of a run's charts, with None for missing numbers.
 
     Parameters
     ----------
@@ -42,8 +42,9 @@ def chart_data(analysis: Analysis) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``unit`` and ``quantity`` of the recording; ``t`` s, ``y`` and ``fit`` in that unit, ``sigma`` its noise, all
-        of them lists; ``flagged`` a list of [row, reason]; ``amplitude`` and ``frequency`` where something oscillates.
+        ``unit`` and ``quantity`` of the recording; ``t`` in s, as a list or as start, step and count; ``y`` as a list
+        in that unit; ``flagged``, a list of [row, reason]. For an oscillation also ``fit`` as a list, ``sigma``, the
+        noise, and ``amplitude`` and ``frequency``.
     """
     track, motion = analysis.track, analysis.motion
     shown = SHOWN[track.unit]
@@ -79,7 +80,7 @@ def _reason(flags: int, y: float) -> str:
 
 
 def _amplitude(motion: Oscillation, factor: float) -> dict[str, Any]:
-    """Amplitudes of the windows with their u, and every law at the same times, the selected one first."""
+    """Return the amplitudes of the windows with their u, and every law at the same times, the selected law first."""
     damping, windows = motion.damping, motion.demodulated
     order = np.argsort(windows.t, kind="stable")
     t = windows.t[order]
@@ -115,7 +116,7 @@ def _frequency(motion: Oscillation, factor: float) -> dict[str, Any] | None:
 
 
 def _times(t: F8) -> dict[str, float] | list[float | None]:
-    """Return evenly spaced times as their start, step and count, others as they are."""
+    """Return evenly spaced times as start, step and count, and other times as a list."""
     if t.size > 2:
         step = (t[-1] - t[0]) / (t.size - 1)
         if step > 0.0 and np.max(np.abs(t - t[0] - step * np.arange(t.size))) < 0.01 * step:

@@ -1,4 +1,4 @@
-"""Table 1 to paste: as text, and as cells separated by tabs."""
+"""Table 1 for pasting: as text, and as cells separated by tabs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def table_text(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
 
 
 def table_cells(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return Table 1 as cells separated by tabs: of every run value and standard uncertainty, in SI units.
+    """Return Table 1 as cells separated by tabs: value and standard uncertainty of every run, in SI units.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The page of a report: one file that holds its pictures and needs nothing from anywhere else."""
+"""The page of a report: one file that contains its pictures and needs no other files."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _QUALITY = {
     "outside": "outside the part that was analysed",
     "malformed_rows": "malformed rows",
 }
-# What is wrong with each number of the lab report's method; pipeline.results.classic derives it.
+# Errors of each number of the lab report's method; pipeline.results.classic derives them.
 _BIASES = {
     "period": "two sampled maxima decide where a thousand samples could",
     "frequency": "as the period",
@@ -56,8 +56,8 @@ _BIASES = {
 }
 
 
-BESIDE = 3  # columns of runs that a sheet of A4 holds
-MOST_NOTES = 50  # of a recording that the page lists
+BESIDE = 3  # columns of runs that fit on A4
+MOST_NOTES = 50  # maximum number of a recording's notes that the page lists
 _SECTIONS = (
     ("position", "Position and residuals", ("position",)),
     ("amplitude", "Amplitude and damping laws", ("amplitude", "logarithmic")),
@@ -68,9 +68,9 @@ _SECTIONS = (
     ("phase", "Phase plot", ("phase",)),
     ("classic", "The lab report's method", ("classic",)),
 )
-"""Sections of a run: name, title and figures, in their order."""
+"""Sections of a run in their order: name, title and figures."""
 CHARTS = frozenset({"position", "amplitude", "frequency"})
-"""Figures that are charts on a screen."""
+"""Figures that are interactive charts on a screen."""
 
 
 def render_html(
@@ -89,22 +89,23 @@ def render_html(
     ----------
     runs : sequence of Analysed
     pictures : sequence of mapping of str to bytes
-        SVG files by figure name, one mapping a run.
+        SVG files by figure name, one mapping per run.
     compared : Compared, optional
     overview : bytes
-        :func:`springmass.report.figures.comparison_figure` as SVG, where runs were compared.
+        :func:`springmass.report.figures.comparison_figure` as SVG, if runs were compared.
     overlay : bytes
-        :func:`springmass.report.figures.overlay_figure` as SVG, of several runs of one unit.
+        :func:`springmass.report.figures.overlay_figure` as SVG, for several runs with the same unit.
     stems : sequence of str
-        How the names of each run's figure files begin; left out, with nothing.
+        Prefix of each run's figure files; default: no prefix.
     provenance : mapping
-        Shown as it is, nested mappings flattened.
+        Shown unchanged, apart from flattening nested mappings.
 
     Notes
     -----
-    First Table 1, the summary and the main figure, then the warnings, then all details, folded; each fact once. Every
-    text is escaped by the template engine; only the pictures and the script, made here, go in as they are. The numbers
-    of the charts go in as JSON, in which no text can end the element that holds it.
+    The page shows Table 1, the summary and the main figure, then the warnings, then all details in folded sections;
+    each fact appears once. The template engine escapes every text; only the pictures and the script, which are made
+    here, are inserted unescaped. The numbers of the charts are inserted as JSON, in which no text can end the
+    surrounding element.
     """
     from markupsafe import Markup
 
@@ -134,7 +135,7 @@ def render_html(
 
 
 def _data(runs: Sequence[Analysed]) -> dict[str, Any]:
-    """Return what the script shows: the numbers of every run's charts, and Table 1 to copy."""
+    """Return the data for the script: the numbers of every run's charts, and Table 1 for copying."""
     from springmass.report.copies import table_cells, table_text
     from springmass.report.latex import table_tex
 
@@ -154,7 +155,7 @@ def _data(runs: Sequence[Analysed]) -> dict[str, Any]:
 
 @functools.cache
 def template(name: str) -> Template:
-    """Return a page's template; to compile that of a report takes as long as to draw a figure."""
+    """Return a page's template, cached because compiling the report's template takes as long as drawing a figure."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -180,12 +181,12 @@ def template(name: str) -> Template:
 
 
 def _shown(value: object) -> object:
-    """Make control characters visible in whatever text the template puts in, its own markup aside."""
+    """Make control characters visible in any text that the template inserts, except its own markup."""
     return visible(value) if type(value) is str else value
 
 
 def _tables(runs: Sequence[Analysed]) -> Iterator[dict[str, Any]]:
-    """Yield Table 1 in blocks of as many runs as stand beside each other on paper."""
+    """Yield Table 1 in blocks of as many runs as fit side by side on paper."""
     for first in range(0, len(runs), BESIDE):
         some = runs[first : first + BESIDE]
         rows = [
@@ -197,7 +198,7 @@ def _tables(runs: Sequence[Analysed]) -> Iterator[dict[str, Any]]:
 
 
 def _split(estimate: Estimate | None) -> tuple[str, str]:
-    """Return an estimate before its decimal point, and the rest."""
+    """Split a written estimate into the part before its decimal point and the rest."""
     written = pretty(estimate)
     found = re.match(r"\(?−?\d+", written)
     end = found.end() if found else 0
@@ -205,7 +206,7 @@ def _split(estimate: Estimate | None) -> tuple[str, str]:
 
 
 def _aligned(estimate: Estimate | None, width: int) -> Markup:
-    """Set an estimate so that decimal points stand above each other."""
+    """Format an estimate so that decimal points are aligned."""
     from markupsafe import Markup
 
     before, after = _split(estimate)
@@ -215,7 +216,7 @@ def _aligned(estimate: Estimate | None, width: int) -> Markup:
 def _part(
     index: int, run: Analysed, pictures: Mapping[str, bytes], numbers: Iterator[int], stem: str, *, alone: bool
 ) -> dict[str, Any]:
-    """Everything that the template says of one run."""
+    """Return everything that the template needs about one run."""
     analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
     motion, title = analysis.motion, str(run.recorded.get("title") or given.get("title") or "")
     ordered = [*(name for name in _QUALITY if name in quality), *(name for name in quality if name not in _QUALITY)]
@@ -263,7 +264,7 @@ def _part(
 
 
 def _correlations(analysis: Analysis) -> list[tuple[str, list[str]]]:
-    """Return a row a result: its symbol, and its correlations to itself and those before it."""
+    """Return one row per result: its symbol, and its correlations with earlier results and itself."""
     names, matrix = correlations_of(analysis)
     symbols = {row.name: row.page_symbol for row in table_rows([analysis])}
     return [
@@ -273,7 +274,7 @@ def _correlations(analysis: Analysis) -> list[tuple[str, list[str]]]:
 
 
 def _sections(part: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield (id, title) of the sections of a run that have anything to show."""
+    """Yield (id, title) of the non-empty sections of a run."""
     filled = {"amplitude": part["laws"], "motion": part["laws"], "classic": part["classic"]}
     for name, title, _ in _SECTIONS:
         if part["drawn"][name] or filled.get(name) is not None:
@@ -310,7 +311,7 @@ def _classic_rows(run: Analysed) -> list[dict[str, Any]] | None:
 
 
 def _compared(compared: Compared, overview: bytes) -> dict[str, Any]:
-    """Everything that the template says of the comparison."""
+    """Return everything that the template needs about the comparison."""
     found = compared.comparison
     return {
         "found": found,
@@ -323,7 +324,7 @@ def _compared(compared: Compared, overview: bytes) -> dict[str, Any]:
 
 
 def _address(svg: bytes) -> str:
-    """Return a picture as an address that holds it, so that the page is one file."""
+    """Return a picture as a data URL, so that the page is one file."""
     return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
@@ -340,7 +341,7 @@ def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]
 
 
 def _symbol(symbol: str) -> Markup:
-    """Set the index that follows a space below the line."""
+    """Format a symbol, with the index that follows a space as a subscript."""
     from markupsafe import Markup, escape
 
     letter, mark, index = symbol.partition(" ")
@@ -352,7 +353,7 @@ def _symbol(symbol: str) -> Markup:
 
 
 def _breakable(law: str) -> Markup:
-    """Let the name of a law break behind a plus."""
+    """Allow a line break after each plus in the name of a law."""
     from markupsafe import Markup, escape
 
     return Markup("+<wbr>").join(escape(term) for term in law.split("+"))

@@ -40,7 +40,7 @@ _SIUNITX = {
     "Pa": r"\pascal",
 }
 INPUT_WIDTH = 0.42
-"""Of a budget's lines for the input's name, which breaks there: what is left holds its value on A4."""
+"""Fraction of a budget's line width for the input's name, which wraps there; its value fits into the rest on A4."""
 _WRITTEN = re.compile(r"\(?(?P<value>-?[\d.]+) \+- (?P<u>[\d.]+)\)?(?:e(?P<power>[+-]\d+))?")
 _TEX_SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -51,7 +51,7 @@ _TEX_SPECIAL = {
 
 
 def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return Table 1 as a LaTeX table of siunitx quantities; it needs booktabs and siunitx, version 3.
+    """Return Table 1 as a LaTeX table of siunitx quantities; it needs booktabs and siunitx version 3.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
 
 
 def budget_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return the uncertainty budgets as one LaTeX table a run; they need booktabs, longtable and siunitx, version 3.
+    """Return one LaTeX table of the uncertainty budget per run; it needs booktabs, longtable and siunitx version 3.
 
     Parameters
     ----------
@@ -124,25 +124,25 @@ def _budget_table(name: str, analysis: Analysis) -> str:
 
 
 def _tex_power(text: str) -> str:
-    """Set a power of ten as one."""
+    """Typeset an exponent such as e-05 as a power of ten."""
     return re.sub(r"e([+-])0*(\d+)", lambda found: rf" \times 10^{{{found[1].replace('+', '')}{found[2]}}}", text)
 
 
 def lab_report_tex(
     run: Analysed, figures: Mapping[str, str], captions: Mapping[str, str], sentences: Sequence[str]
 ) -> str:
-    """Return a lab report to fill in: Table 1, figures, captions and uncertainty are there, the rest are questions.
+    """Return a lab report to complete: it contains Table 1, figures, captions, uncertainty, and questions for the rest.
 
-    It is compiled in the folder of the report, where its figures are: ``pdflatex lab-report.tex``.
+    Compile it in the folder of the report, which contains its figures: ``pdflatex lab-report.tex``.
 
     Parameters
     ----------
     run : Analysed
     figures : mapping of str to str
-        Path of each figure's file, without its ending, by its name.
+        Path of each figure's file without extension, by the figure's name.
     captions : mapping of str to str
     sentences : sequence of str
-        What was measured and how the motion is damped.
+        Sentences about the measured values and the damping.
     """
     warnings = [line for finding in by_harm(run.result.get("findings", ())) if (line := lab_report_line(finding))]
     budget = {row.name: row for row in budgets_of(run.analysis)}
@@ -253,7 +253,7 @@ _SUPERSCRIPTS = {raised: plain for plain, raised in zip("-0123456789n", "⁻⁰�
 
 
 def _tex_words(text: str) -> str:
-    """Return a sentence of the page for LaTeX: its symbols and powers set as mathematics."""
+    """Convert a sentence of the page to LaTeX, with symbols and powers as mathematics."""
     text = _tex_text(text).replace("\u00a0", "~").replace("\u202f", r"\,").replace("“", "``").replace("”", "''")
     text = re.sub(
         f"[{''.join(_SUPERSCRIPTS)}]+", lambda run: f"$^{{{''.join(_SUPERSCRIPTS[each] for each in run[0])}}}$", text
@@ -264,7 +264,7 @@ def _tex_words(text: str) -> str:
 
 
 def _framed(caption: str, heads: Sequence[str], body: Sequence[str], label: Sequence[str] = ()) -> str:
-    """Set the lines of a table under its heads, all columns to the left."""
+    """Frame the lines of a table with its heads, all columns left-aligned."""
     return "\n".join(
         [
             r"% needs \usepackage{booktabs} and \usepackage{siunitx}, version 3",
@@ -286,7 +286,7 @@ def _framed(caption: str, heads: Sequence[str], body: Sequence[str], label: Sequ
 
 
 def _tex_quantity(estimate: Estimate | None) -> str:
-    """Write value(u)unit for siunitx, from the one place that decides on digits."""
+    """Write value(u)unit for siunitx, with the digits that ``format_value`` chooses."""
     if estimate is None:
         return "--"
     if isinstance(estimate, UpperLimit):
@@ -303,7 +303,7 @@ def _tex_quantity(estimate: Estimate | None) -> str:
 
 
 def _tex_number(number: str, unit: str) -> str:
-    """Write a number, with its uncertainty perhaps, and its unit for siunitx."""
+    """Write a number, possibly with its uncertainty, and its unit for siunitx."""
     if not unit:
         return rf"\num{{{number}}}"
     macro = _SIUNITX.get(unit, rf"\text{{{_tex_text(unit)}}}")

@@ -1,4 +1,4 @@
-"""The table of damping laws on a page: how well each fits, what became of it, what was fitted."""
+"""The table of damping laws on a page: goodness of fit, status and coefficients of each law."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["laws_across", "laws_of"]
 
 
 def laws_of(motion: Oscillation) -> dict[str, Any]:
-    """Return the rows of every law tried on one run, and what kept others from being tried."""
+    """Return the rows of all laws fitted to one run, and the reasons why other laws were not fitted."""
     damping = motion.damping
     fitted = {law: motion.derived.parameters_of(fit) for law, fit in damping.fits.items()}
     laws = _laws(damping, fitted, lambda law: law_status(damping, law))
@@ -25,7 +25,7 @@ def laws_of(motion: Oscillation) -> dict[str, Any]:
 
 
 def laws_across(joint: JointDamping) -> dict[str, Any]:
-    """Return the same for one law with shared coefficients on several runs, with what came of it in words."""
+    """Return the rows of all laws fitted to several runs with shared coefficients, and the conclusion in words."""
     fitted = {law: fit.coefficients.estimates() for law, fit in joint.fits.items()}
     return {
         "message": typeset(joint.message),
@@ -37,7 +37,7 @@ def laws_across(joint: JointDamping) -> dict[str, Any]:
 def _laws(
     found: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]], status: Callable[[str], str]
 ) -> dict[str, Any]:
-    """Lay out every law tried: how well it fits, what became of it, and what was fitted."""
+    """Return one row per fitted law: goodness of fit, status and coefficients."""
     chi2 = found.best.reduced_chi2 * found.best.dof
     rows = [
         {
@@ -55,7 +55,7 @@ def _laws(
 
 
 def _difference(value: float) -> str:
-    if not math.isfinite(value):  # chi-square of a law with as many parameters as windows
+    if not math.isfinite(value):  # chi-square of a law with as many parameters as there are windows
         return pretty_number(None)
     return pretty_number(value) if abs(value) >= 1000.0 else f"{value:.1f}".replace("-", "−")
 

@@ -23,13 +23,13 @@ COLUMNS = (
     "acceleration_m_per_s2",
     "u_acceleration_m_per_s2",
 )
-"""Of ``motion.csv`` of a length; distance and used are the sample's own, the rest is smoothed."""
+"""Columns of ``motion.csv`` for a length; distance and used belong to the sample itself, the others are smoothed."""
 
 MOST_ROWS = 1_000_000
 
 
 def columns_of(unit: str) -> tuple[str, ...]:
-    """Return the columns of ``motion.csv`` of a record in this unit.
+    """Return the columns of ``motion.csv`` for a record in a unit.
 
     Examples
     --------
@@ -46,13 +46,13 @@ def columns_of(unit: str) -> tuple[str, ...]:
 
 
 def _spelt(unit: str) -> str:
-    """Spell a unit as it stands behind a name; of a plain number nothing."""
+    """Return a unit as the suffix of a column name; empty for a plain number."""
     spelt = unit.removeprefix("1").replace("/", "_per_").replace("^", "").strip("_")
     return f"_{spelt}" if spelt else ""
 
 
 def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
-    """Return the smoothed motion, or in words why a record gives none.
+    """Return the smoothed motion, or the reason in words why there is none.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
 
 
 def row_step(analysis: Analysis) -> int:
-    """Return of how many samples one has its line in ``motion.csv``: every one, up to a million.
+    """Return n if every n-th sample has a line in ``motion.csv``; n is 1 for up to a million samples.
 
     Parameters
     ----------
@@ -77,19 +77,19 @@ def row_step(analysis: Analysis) -> int:
 
 
 def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
-    """Return a line a sample, in the record's order, with the columns of :func:`columns_of` its unit.
+    """Return CSV with one line per sample in the record's order, with the columns from :func:`columns_of`.
 
     Parameters
     ----------
     analysis : Analysis
     smoothed : Smoothed
-        Of the same analysis.
+        Smoothed motion of the same analysis.
 
     Notes
     -----
-    Times keep all their digits, the rest ten: more than any of them is certain to. What is no number, a missing
-    distance or a motion at a sample without a time or outside the analysed part, is an empty cell. Longer records than
-    a million samples have a line for every second one, or third: see :func:`row_step`.
+    Times keep all their digits; other values keep ten, which exceeds their accuracy. NaN becomes an empty cell: a
+    missing distance, or the motion at a sample without a time or outside the analysed part. Records of more than a
+    million samples have a line for every second or third sample; see :func:`row_step`.
     """
     used = (analysis.flags & UNUSABLE) == 0
     motion = (
@@ -102,7 +102,7 @@ def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
     )
     table = np.column_stack([analysis.track.t, analysis.track.y, used, *motion])[:: row_step(analysis)]
     line = ",".join(["%.17g", "%.10g", "%d", *["%.10g"] * 6]) + "\n"
-    # One format for many lines takes a third of numpy's time for them one by one.
+    # One format string for many lines takes a third of the time of numpy, which formats them one by one.
     blocks = (table[at : at + 1000] for at in range(0, len(table), 1000))
     text = "".join((line * len(block)) % tuple(block.ravel().tolist()) for block in blocks)
     return ",".join(columns_of(analysis.track.unit)) + "\n" + text.replace("nan", "")

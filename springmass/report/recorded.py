@@ -1,4 +1,4 @@
-"""What stands at the head of a page: when and at which bench a run was recorded, and what was noted meanwhile."""
+"""The head of a page: date and bench of the recording, and notes that were made during it."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ _CALIBRATED = {
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Something that was noted while a run was recorded.
+    """A mark or an event of a recording.
 
     Parameters
     ----------
     t_s : float
-        Since the first sample, s.
+        Time since the first sample, s.
     text : str
-        In words.
+        The mark, or the facts of the event, in words.
     kind : str
-        "mark", or an event's: "trigger", "lost", ...
+        "mark", or the kind of event: "trigger", "lost", ...
     """
 
     t_s: float
@@ -55,7 +55,7 @@ def notes_of(recorded: Mapping[str, Any]) -> tuple[Note, ...]:
     Parameters
     ----------
     recorded : mapping
-        What a run file says of its origin.
+        Provenance of the recording, as in a run file.
     """
     marks = [Note(mark["t_s"], visible(str(mark["text"])), "mark") for mark in recorded.get("marks", ())]
     events = [
@@ -74,7 +74,7 @@ def _facts(facts: Mapping[str, Any]) -> str:
 
 
 def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Return what turned echoes into distances: quantity and value in words; empty for an old recording."""
+    """Return the calibration from echoes to distances as (quantity, value) in words; empty for an old recording."""
     found = recorded.get("sensor", {}).get("calibration") or {}
     rows = []
     for key, (words, unit) in _CALIBRATED.items():
@@ -85,12 +85,12 @@ def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
 
 
 def date_words(recorded: Mapping[str, Any], title: str = "") -> str:
-    """Return when a run was recorded: in UTC where the recording says so, else the date in its title.
+    """Return in words when a run was recorded, from its start time, or else from the date in its title.
 
     Parameters
     ----------
     recorded : mapping
-        What a run file says of its origin.
+        Provenance of the recording, as in a run file.
     title : str
         The recording's title line.
 
@@ -136,7 +136,7 @@ def without_date(title: str) -> str:
 
 
 def bench_words(scene: Scene) -> str:
-    """Return the bench in a line: what hung there, in which air."""
+    """Describe the bench in one line: bob, spring, disc, air and sensor."""
     stated = [f"{words} {pretty(x)}" for words, name in _ON_THE_BENCH if (x := getattr(scene, name)) is not None]
     if scene.sensor_position is not None:
         stated.append(f"sensor {scene.sensor_position}")

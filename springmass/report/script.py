@@ -1,4 +1,4 @@
-"""The script of a report: one inline classic script, made of the sources that the page of a recording has too."""
+"""The script of a report: one inline classic script from sources that the page of a recording also uses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from springmass.layout import static_file
 __all__ = ["SOURCES", "report_script", "report_style", "script_sha256"]
 
 SOURCES = ("uPlot.iife.min.js", "charts.js", "explore.js", "report.js")
-"""In this order; a file that is opened from the disk may not import modules."""
+"""The sources, in this order; a page that is opened from a disk cannot import modules."""
 
 
 @functools.cache
@@ -21,7 +21,7 @@ def report_script() -> str:
     Raises
     ------
     ValueError
-        If a source would end the element that holds it.
+        If a source would end the element that contains it.
     """
     script = "\n".join(static_file(name).read_text("utf-8") for name in SOURCES)
     if "</script" in script.lower() or "<!--" in script:
@@ -36,5 +36,5 @@ def report_style() -> str:
 
 @functools.cache
 def script_sha256() -> str:
-    """Return the digest by which a policy allows the script: ``'sha256-...'`` of Content-Security-Policy."""
+    """Return the base64 digest of the script for ``'sha256-...'`` in a Content-Security-Policy."""
     return base64.b64encode(hashlib.sha256(report_script().encode()).digest()).decode()

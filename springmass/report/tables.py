@@ -41,24 +41,24 @@ NOTHING = "-"
 
 
 class TableKey(NamedTuple):
-    """What a line of Table 1 states.
+    """The identity of a line of Table 1.
 
     Parameters
     ----------
     name : str
-        As in ``Analysis.estimates``, or of a coefficient.
+        Name as in ``Analysis.estimates``, or name of a coefficient.
     law : str or None
-        The law by which it is stated, "" for an average over laws; None where the table does not say.
+        The law that the value assumes, "" for an average over laws; None if the table names no law.
     certain : bool
-        Whether all results are stated by this law, because the user states it or the recording supports no other.
-        Otherwise the line holds if the law does.
+        Whether all results assume this law, because the user states it or the recording supports no other. Otherwise
+        the line is valid only if the law is.
     """
 
     name: str
     law: str | None = None
     certain: bool = False
     row: str = ""
-    """The law whose numbers have a separate row: of coefficients, and of the law that is clearly ahead."""
+    """The law whose values have a separate row: for coefficients, and for the law that is clearly ahead."""
 
     @property
     def words(self) -> str:
@@ -77,16 +77,16 @@ class TableRow:
     Parameters
     ----------
     name : str
-        As in ``Analysis.estimates``, or of a coefficient; ``LAW.NAME`` in a line that adds what holds if the law that
-        is clearly ahead does.
+        Name as in ``Analysis.estimates``, or name of a coefficient; ``LAW.NAME`` in an additional line with the value
+        under the law that is clearly ahead.
     quantity : str
-        In words, with the law by which it is stated where the law decides on it.
+        The quantity in words, with the law if the value depends on it.
     symbol, page_symbol, tex_symbol : str
-        In ASCII, in Unicode (an index stands after a space) and as the inside of ``$...$``.
+        The symbol in ASCII, in Unicode (an index follows a space) and in LaTeX, without the ``$``.
     estimates : tuple of Estimate or None
-        One a run; None where the run does not give it.
+        One estimate per run; None if the run does not give it.
     note : str
-        Why no run gives it, and what to do; empty for a row with values.
+        Why no run gives the quantity, and what to do; empty for a row with values.
     """
 
     name: str
@@ -99,12 +99,12 @@ class TableRow:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """The estimates as printed, two digits of u."""
+        """The estimates as printed, with two digits of u."""
         return tuple(NOTHING if x is None else str(x) for x in self.estimates)
 
 
 def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
-    """Return what Table 1 says of a run: its estimates, and the coefficients of a law, each with its law."""
+    """Return the contents of Table 1 for a run: estimates and coefficients, each with its law."""
     found = _shown_estimates(analysis)
     if any(finding.code in _WITHOUT_OFFSET for finding in analysis.findings):
         found.pop(TableKey("offset"), None)
@@ -112,7 +112,7 @@ def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
 
 
 _WITHOUT_OFFSET = frozenset({"offset_unknown", "offset_unknown_after_gap"})
-"""Findings that say that the rest position is not that of the bob."""
+"""Codes of findings that the rest position is not that of the bob."""
 
 
 def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
@@ -124,13 +124,13 @@ def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     if derived.leading is None:
         return found
     leading = _stated(derived.leading, certain=False, row=derived.leading.law)
-    # A coefficient of the same law has one value, wherever it stands.
+    # A coefficient of the same law has the same value in every row.
     return found | {key: x for key, x in leading.items() if key.law is not None and key not in found}
 
 
 def _stated(derived: Derived, *, certain: bool, row: str = "") -> dict[TableKey, Estimate]:
     law = derived.laws[0].fit.law
-    # A coefficient of a law of the user's own is not ours, even where it has the same name.
+    # A coefficient of a user-defined law is not one of these quantities, even if it has the same name.
     coefficients = derived.coefficients if law.name in LAWS else {}
     found = {}
     for name in _IN_TABLE:
@@ -148,13 +148,13 @@ _IN_TABLE = tuple(name for name, quantity in QUANTITIES.items() if quantity.in_t
 def table_rows(
     runs: Sequence[Analysis | Mapping[TableKey, Estimate]], *, missing: bool = False
 ) -> tuple[TableRow, ...]:
-    """Return Table 1: every quantity that at least one run gives, one column a run.
+    """Return Table 1: every quantity that at least one run gives, with one column per run.
 
     Parameters
     ----------
     runs : sequence of Analysis, or of what :func:`table_estimates` kept of one
     missing : bool
-        Whether to add a row that says what the spring constant needs, if no run gives it.
+        Whether to add a row that states what the spring constant requires, if no run gives it.
     """
     columns = [table_estimates(run) if isinstance(run, Analysis) else run for run in runs]
     rows = []
@@ -185,7 +185,7 @@ NEEDS_MASS = "needs the mass: --mass-kg KG"
 
 
 def _needs_mass(run: Analysis | Mapping[TableKey, Estimate], column: Mapping[TableKey, Estimate]) -> bool:
-    """Tell whether a distance oscillates and only the mass is missing."""
+    """Return whether a distance oscillates and only the mass is missing."""
     if isinstance(run, Analysis) and run.scene.bob_mass_kg is not None:
         return False
     amplitude = column.get(TableKey("amplitude"))
@@ -193,7 +193,7 @@ def _needs_mass(run: Analysis | Mapping[TableKey, Estimate], column: Mapping[Tab
 
 
 def every_number(analysis: Analysis) -> dict[str, Estimate]:
-    """Return every estimate of a run and every law's parameters, these named ``LAW.PARAMETER``."""
+    """Return every estimate of a run, and every law's parameters under names ``LAW.PARAMETER``."""
     everything = dict(analysis.estimates)
     if isinstance(analysis.motion, Oscillation):
         derived = analysis.motion.derived
@@ -222,10 +222,10 @@ def results_csv(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Est
 
 
 def cell(text: str) -> str:
-    """Return a text from outside for a cell of a CSV file.
+    """Return a text of foreign origin as a safe cell of a CSV file.
 
-    A spreadsheet takes what begins with ``=``, ``+``, ``-`` or ``@`` for a formula and runs it; an apostrophe in front
-    makes it text. Numbers stay numbers.
+    A spreadsheet evaluates a cell that begins with ``=``, ``+``, ``-`` or ``@`` as a formula; a leading apostrophe
+    makes it text. Numbers remain numbers.
 
     Examples
     --------
@@ -241,7 +241,7 @@ def cell(text: str) -> str:
 
 
 _FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
-"""What a spreadsheet takes for the beginning of a formula."""
+"""Characters with which a formula begins in a spreadsheet."""
 
 
 def pretty(estimate: Estimate | None) -> str:
@@ -261,7 +261,7 @@ def pretty(estimate: Estimate | None) -> str:
 
 
 def pretty_number(value: float | None, digits: int = 2) -> str:
-    """Return a number without an uncertainty to a few digits, typeset; a dash for None or what is no number.
+    """Typeset a number without an uncertainty to a few digits; return a dash for None or NaN.
 
     Examples
     --------
@@ -273,7 +273,8 @@ def pretty_number(value: float | None, digits: int = 2) -> str:
     return _typeset(f"{value:#.{digits}g}".rstrip("."))
 
 
-# Unit to (below this size, factor, unit with its prefix), the smallest first. Periods stay in seconds down to 0.1 s.
+# For each unit: (upper limit of the value, factor, unit with its prefix), the smallest limit first. Periods stay in
+# seconds down to 0.1 s.
 _PREFIXES = {
     "m": ((1e-3, 1e6, "µm"), (1.0, 1e3, "mm")),
     "kg": ((1e-3, 1e6, "mg"), (1.0, 1e3, "g")),
@@ -283,7 +284,7 @@ _PREFIXES = {
 
 
 def prefixed(estimate: Estimate) -> Estimate:
-    """Return an estimate in the unit with the prefix that leaves 1 to 1000 in front of it; most units have none.
+    """Return an estimate with an SI prefix that gives a value of about 1 to 1000; most units have no prefixes.
 
     Examples
     --------
@@ -312,7 +313,7 @@ def page_unit(unit: str) -> str:
 
 
 def law_status(damping: Damping, name: str) -> str:
-    """Return what became of a law, in a word or two.
+    """Return the status of a law in a few words.
 
     Parameters
     ----------
@@ -335,5 +336,5 @@ def _typeset(number: str) -> str:
 
 
 def raised(power: int) -> str:
-    """Return an exponent in raised digits."""
+    """Return an exponent in superscript digits."""
     return str(power).translate(_SUPERSCRIPT)

@@ -1,4 +1,4 @@
-"""The result of a run in words: what was measured, how the motion is damped, and the captions of figures."""
+"""The result of a run in words: measured values, damping, and captions of figures."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _unbroken(text: str) -> str:
 
 
 def equation(name: str, estimate: Estimate) -> str:
-    """Write a parameter with its value, or with the limit that it lies below.
+    """Write a parameter with its value or its upper limit.
 
     Examples
     --------
@@ -56,7 +56,7 @@ _SUBSTITUTES = (
 
 
 def typeset(message: str) -> str:
-    """Return a message as the page's tables write numbers and units.
+    """Return a message with numbers and units typeset as in the page's tables.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def typeset(message: str) -> str:
 
 
 def verdict(analysis: Analysis) -> tuple[str, ...]:
-    """Return the result of a run in at most three sentences: the numbers, the damping, and where u comes from."""
+    """Return the result of a run in at most three sentences: values, damping, and the main source of uncertainty."""
     motion = analysis.motion
     if isinstance(motion, Overdamped) or (isinstance(motion, Still) and "first_mode_period" in analysis.estimates):
         why = typeset(motion.why)
@@ -88,7 +88,7 @@ def verdict(analysis: Analysis) -> tuple[str, ...]:
 
 
 def _largest_cause(analysis: Analysis) -> str:
-    """Return what the uncertainty of the result comes from: of the spring constant, else of the period."""
+    """Return the main source of uncertainty of the spring constant, or else of the period, as a sentence."""
     rows = {row.name: row for row in budgets_of(analysis)}
     row = rows.get("spring_constant") or rows.get("period")
     if row is None or not row.contributions:
@@ -101,11 +101,11 @@ def _largest_cause(analysis: Analysis) -> str:
     return f"The largest part of u({symbol})², {100.0 * greatest.share:.0f}\u00a0%, comes from the {label}."
 
 
-NAMED_LAWS = 2  # of those that cannot be ruled out
+NAMED_LAWS = 2  # maximum number of named laws that cannot be ruled out
 
 
 def damping_sentence(analysis: Analysis, *, coefficients: bool = False) -> str:
-    """Return in one sentence which damping law fits and what became of the others; empty where nothing oscillates.
+    """Return one sentence on the damping law that fits and the status of the others; empty if nothing oscillates.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def _listed(words: Sequence[str]) -> str:
 
 
 def _damping_rates(motion: Oscillation) -> str:
-    """Return the damping rate at the start, and what it is if the law that is clearly ahead holds."""
+    """Return the damping rate at the start and, if one law is clearly ahead, its value under that law."""
     derived = motion.derived
     rate = kept(derived.estimates["damping_rate"])
     if derived.law:
@@ -175,7 +175,7 @@ def caption(name: str, analysis: Analysis) -> str:
     Parameters
     ----------
     name : str
-        As in :data:`springmass.report.figures.MAKERS`.
+        Name of the figure, as in :data:`springmass.report.figures.NAMES`.
     analysis : Analysis
     """
     if isinstance(analysis.motion, Overdamped):
@@ -193,7 +193,7 @@ def _sigma(analysis: Analysis) -> str:
 
 
 def _subject(analysis: Analysis) -> str:
-    """What was recorded, at the head of a sentence."""
+    """Return the recorded quantity, capitalised for the start of a sentence."""
     unit = analysis.track.unit
     return "Distance from the sensor" if unit == "m" else noun(unit).capitalize()
 

@@ -1,4 +1,4 @@
-"""Write a report: the page, its figures and its tables, a folder that changes as a whole."""
+"""Write a report: the page, its figures and its tables, in a folder that is replaced as a whole."""
 
 from __future__ import annotations
 
@@ -40,37 +40,37 @@ def write_report(
     Parameters
     ----------
     directory : Path
-        Usually ``NAME.results``; replaced as a whole where it holds an earlier report and nothing else.
+        Usually ``NAME.results``; replaced as a whole if it contains only an earlier report.
     runs : sequence of Analysed
-        One at least.
+        At least one run.
     compared : Compared, optional
         The runs' spring constants and common damping laws; drawn and tabulated.
     summary : mapping, optional
-        What ``results.json`` holds in place of the runs' results. Its ``provenance``, else the first run's, goes into
-        the page: version, parameters, time, whatever says how to make this report again.
+        Content of ``results.json`` instead of the runs' results. The page shows its ``provenance``, or else that of the
+        first run: version, parameters, time and everything needed to reproduce the report.
     pdf : bool
-        Whether figures are written as PDF too, which takes as long as everything else.
+        Whether to write figures as PDF too, which doubles the time.
     template : {"latex"}, optional
-        Whether to write ``lab-report.tex`` too, a document to fill in; its figures are written as PDF.
+        Whether to write ``lab-report.tex`` too, a document to complete; all figures are then also written as PDF.
 
     Returns
     -------
     Path
-        The page, ``report.html``: where it stands, the rest stands.
+        Path of the page, ``report.html``; if it exists, the report is complete.
 
     Raises
     ------
     ValueError
         If there is no run.
     storage.errors.WriteFailed
-        If a file or the folder cannot be written; the earlier report stands then.
+        If a file or the folder cannot be written; the earlier report is then kept.
 
     Notes
     -----
-    Besides the page: ``results.json`` (``summary``, else one object for one run and a list for several; what is no
-    number is null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, ``motion.csv`` of each run that
-    oscillates, and ``figures/`` with every figure as SVG, and as PDF where asked for. Names of figures and motions
-    begin with their run's where there are several.
+    The other files are ``results.json`` (``summary``, or else one object for one run and a list for several; NaN and
+    infinity are null), ``results.csv``, ``table.tex``, ``budget.csv``, ``budget.tex``, ``motion.csv`` of each run that
+    oscillates, and ``figures/`` with every figure as SVG and, if requested, as PDF. If there are several runs, the
+    names of figures and motions begin with the name of the run.
     """
     if not runs:
         raise ValueError("a report needs one run at least, got none")
@@ -91,7 +91,7 @@ _TABLES = ("results.json", "results.csv", "table.tex", "budget.csv", "budget.tex
 
 
 def _names(stems: Sequence[str]) -> set[str]:
-    """Return the name of every file that a report of these runs may hold."""
+    """Return the names of all files that a report of these runs may contain."""
     pictures = [f"{stem}{name}" for stem in stems for name in NAMES]
     figures = {f"figures/{name}.{kind}" for name in (*pictures, "comparison", "overlay") for kind in KINDS}
     return {PAGE, LAB_REPORT, *_TABLES, *figures, *(f"{stem}motion.csv" for stem in stems)}
@@ -122,7 +122,7 @@ def _write(
     results = [run.result for run in runs]
     content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
     text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    # Lone surrogates, which a file's name may hold, are written as JSON escapes.
+    # Lone surrogates, which a file's name may contain, are written as JSON escapes.
     tables: tuple[bytes | str, ...] = (
         text.encode("utf-8", "backslashreplace"),
         results_csv(names, analyses),
@@ -155,7 +155,7 @@ def _write(
 
 
 def _write_lab_report(folder: Path, run: Analysed, drawn: Sequence[str]) -> None:
-    """Write the document to fill in, with the figures that a lab report shows."""
+    """Write the document to complete, with the figures for a lab report."""
     shown = [name for name in ("position", "amplitude", "frequency") if name in drawn]
     captions = {name: caption(name, run.analysis) for name in shown}
     figures = {name: f"figures/{name}" for name in shown}
@@ -163,7 +163,7 @@ def _write_lab_report(folder: Path, run: Analysed, drawn: Sequence[str]) -> None
 
 
 def _stems(names: Sequence[str]) -> list[str]:
-    """Return how each run's figures begin: with nothing if it is the only one, else with a safe name."""
+    """Return the prefix of each run's figures: empty for a single run, else a safe name."""
     if len(names) == 1:
         return [""]
     stems: list[str] = []

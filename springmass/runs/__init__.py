@@ -1,6 +1,6 @@
-"""A run's way through the program, without a line of printing.
+"""Load, analyse, compare and simulate runs without printing anything.
 
-In: paths of recordings, run files and wire logs, scenes, options. Out: what was loaded, analysed, compared or
-simulated, and its JSON, which is one schema for all commands. Free to change: what becomes of an input on its way to
-a Track; the JSON may gain keys, and docs/reference/json.md with it, but none may change its meaning.
+In: paths of recordings, run files and wire logs, scenes, options. Out: loaded, analysed, compared or simulated runs,
+and their JSON, which has one schema for all commands. Free to change: the processing of an input into a Track. The
+JSON may gain keys, together with docs/reference/json.md, but no key may change its meaning.
 """

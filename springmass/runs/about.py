@@ -1,6 +1,7 @@
-"""What is noted of a recording afterwards: scene, remarks and marks in ``NAME.about.toml`` beside it.
+"""Notes made on a recording afterwards: scene, remarks and marks in ``NAME.about.toml`` next to it.
 
-Recordings and run files are never changed; this file is. Every command that reads the recording uses it, and says so.
+Recordings and run files are never changed; the notes may be. Every command that reads the recording uses the notes and
+reports that it does.
 """
 
 from __future__ import annotations
@@ -24,16 +25,16 @@ __all__ = ["About", "about_of", "about_path", "remember_scene", "write_about"]
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What is noted beside a recording.
+    """The notes next to a recording.
 
     Parameters
     ----------
     path : Path
-        Of the notes, whether they are there or not.
+        Path of the notes file, whether it exists or not.
     scene : Scene or None
     notes : tuple of str
     marks : tuple of (float, str)
-        Seconds of the record, and texts.
+        Times in the record in s, with their texts.
     """
 
     path: Path
@@ -42,12 +43,12 @@ class About:
     marks: tuple[tuple[float, str], ...] = ()
 
     def with_more(self, scene: Scene | None, notes: Sequence[str], marks: Sequence[tuple[float, str]]) -> About:
-        """Return it with another scene, where one is given, and with more notes and marks."""
+        """Return the notes with the given scene, if any, and with additional notes and marks."""
         together = tuple(sorted({*self.marks, *marks}))
         return replace(self, scene=scene or self.scene, notes=(*self.notes, *notes), marks=together)
 
     def described(self) -> str:
-        """Return what it holds, in words; empty where it holds nothing."""
+        """Return a summary of the notes in words; empty if there are none."""
         parts = ["its scene"] if self.scene is not None else []
         parts += [f"{len(self.notes)} notes"] if self.notes else []
         parts += [f"{len(self.marks)} marks"] if self.marks else []
@@ -55,17 +56,17 @@ class About:
 
 
 def about_path(recording: Path) -> Path:
-    """Return where what is noted of a recording stands, or would."""
+    """Return the path of the notes on a recording, whether the file exists or not."""
     return recording.with_name(f"{recording.stem}.about.toml")
 
 
 def about_of(recording: Path) -> About:
-    """Read what is noted beside a recording; nothing where there is no such file.
+    """Read the notes next to a recording; they are empty if there is no such file.
 
     Raises
     ------
     ProgramError
-        With exit code 2 if the file is there and says something that it cannot.
+        With exit code 2 if the file exists and its contents are invalid.
     """
     path = about_path(recording)
     if not os.path.exists(path):  # Path.exists would raise for a name that is too long
@@ -86,24 +87,25 @@ def about_of(recording: Path) -> About:
 
 
 def remember_scene(recording: Path, own: Mapping[str, Any] | None, used: Scene) -> Path | None:
-    """Note beside a recording the scene that was used with it, so that the next command uses it too.
+    """Note the scene used with a recording next to it, so that the next command uses the scene too.
 
     Parameters
     ----------
     recording : Path
     own : mapping or None
-        The scene that is used with it anyway, as its file or the notes beside it say.
+        The scene that the recording or the notes next to it state already.
     used : Scene
+        The scene that was used.
 
     Returns
     -------
     Path or None
-        The notes; None where they say so already.
+        Path of the notes; None if that scene is stated already.
 
     Raises
     ------
     storage.errors.WriteFailed
-        If nothing can be written there.
+        If the notes cannot be written.
     """
     if used.to_mapping() == Scene.from_mapping(own or {}, where=str(recording)).to_mapping():
         return None
@@ -111,7 +113,7 @@ def remember_scene(recording: Path, own: Mapping[str, Any] | None, used: Scene) 
 
 
 def write_about(about: About) -> Path:
-    """Write the notes whole, in place of those that stood there; return their path."""
+    """Write the notes atomically, replacing any earlier file, and return their path."""
     tables: dict[str, Any] = {"notes": list(about.notes)} if about.notes else {}
     if about.scene is not None and (scene := about.scene.to_mapping()):
         tables["scene"] = scene

@@ -1,4 +1,4 @@
-"""From a loaded input to its analysis and result: the steps that several commands share."""
+"""Turn a loaded input into its analysis and result: the steps that several commands share."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ NOTHING: Amendments = {}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Analysed:
-    """One input with everything that was made of it, ready for a report.
+    """One input with everything derived from it, ready for a report.
 
     Parameters
     ----------
     name : str
     analysis : Analysis
     result : mapping
-        As printed under ``--json``. A report shows its ``input`` as it is.
+        The result as printed with ``--json``. A report shows its ``input`` unchanged.
     classic : Classic, optional
         The lab report's own method on the same input, for comparison.
     recorded : mapping
@@ -70,7 +70,7 @@ class Analysed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnalysedRun:
-    """One recording, loaded and analysed: the numbers that every command, page, report and script shows.
+    """One loaded and analysed recording, with the numbers that every command, page, report and script shows.
 
     Parameters
     ----------
@@ -88,16 +88,16 @@ class AnalysedRun:
     classic: Classic | None = None
 
     def described(self, parameters: Mapping[str, Any], *, name: str = "", time_utc: str | None = None) -> Analysed:
-        """Return it with its JSON, ready for a report.
+        """Return the analysed run with its JSON, ready for a report.
 
         Parameters
         ----------
         parameters : mapping
-            Options as resolved, stored with the result.
+            Resolved options, stored with the result.
         name : str
-            Empty: the file's.
+            Name of the run; if empty, the file's name.
         time_utc : str, optional
-            ISO 8601; None: now.
+            Time of the analysis, ISO 8601; None: now.
         """
         result = result_of(
             self.loaded,
@@ -131,24 +131,24 @@ def load_and_analyse(
     scene : Scene or None
         None: the scene noted next to the file, else the one inside a run file.
     bench : mapping
-        Values that replace those of the scene, as :func:`springmass.runs.scenes.amended` takes them.
+        Values that replace those of the scene, in the form that :func:`springmass.runs.scenes.amended` takes.
     accuracy : {"fast", "standard", "best"}
-        Tier.
+        Accuracy tier.
     law : str or None
-        Damping law that is stated, as :func:`with_law` takes it.
+        Stated damping law, in the form that :func:`with_law` takes.
     params : pipeline.analyse.Params, optional
-        Options of every stage, in place of those of the tier.
+        Options of every stage, used instead of those of the tier.
     with_classic : bool
         Whether to apply the lab report's own method as well.
 
     Raises
     ------
     acquisition.errors.NeedsAnswer
-        If the file leaves something open that was not given.
+        If the file leaves something open that the options do not give.
     acquisition.errors.FormatError, storage.errors.StorageError, springmass.errors.ProgramError
-        If it cannot be read, or a value of the bench is impossible.
+        If the file cannot be read, or a value of the bench is impossible.
     pipeline.errors.AnalysisError, pipeline.errors.SceneError
-        If it cannot be analysed.
+        If the recording cannot be analysed.
     """
     loaded = load(path, options)
     return analyse_loaded(
@@ -166,7 +166,7 @@ def analyse_loaded(
     params: Params | None = None,
     with_classic: bool = False,
 ) -> AnalysedRun:
-    """Analyse an input that was loaded before; see :func:`load_and_analyse`."""
+    """Analyse an input that is already loaded; see :func:`load_and_analyse`."""
     scene = scene_of(loaded, scene)
     if bench:
         scene = amended(scene, bench, where="the command line")
@@ -176,7 +176,7 @@ def analyse_loaded(
 
 
 def with_law(params: Params, law: str | Law | None) -> Params:
-    """Return options by which results are stated by one damping law.
+    """Return options with which the results follow one damping law.
 
     Parameters
     ----------
@@ -192,14 +192,14 @@ def with_law(params: Params, law: str | Law | None) -> Params:
 
 
 def law_line(analysis: Analysis, recording: Path, scene_file: str | Path | None) -> str:
-    """Return a line that names the damping law which a scene states; empty where none does, or an option did.
+    """Return a line naming the damping law that the scene states; empty if it states none, or an option set the law.
 
     Parameters
     ----------
     analysis : Analysis
     recording : Path
     scene_file : path or None
-        That was given for it; None: its scene is noted next to the recording or stands inside it.
+        Scene file given for the recording; None: the scene is noted next to the recording or stored inside it.
     """
     law = analysis.scene.damping_law
     if law is None or not analysis.params.damping.from_scene or analysis.params.damping.stated != law:
@@ -211,7 +211,7 @@ def law_line(analysis: Analysis, recording: Path, scene_file: str | Path | None)
 
 
 def analyse_track(track: Track, scene: Scene, params: Params, traps: Sequence[Trap] = ()) -> Analysis:
-    """Analyse samples; the findings include what their reader has seen.
+    """Analyse samples; the findings include the traps that their reader noticed.
 
     Parameters
     ----------
@@ -219,19 +219,19 @@ def analyse_track(track: Track, scene: Scene, params: Params, traps: Sequence[Tr
     scene : Scene
     params : pipeline.analyse.Params
     traps : sequence of Trap
-        Of the reader.
+        Traps that the reader noticed.
     """
     found = analyse(track, scene, params)
     return replace(found, findings=with_traps(found.findings, traps))
 
 
 def scene_of(loaded: Loaded, given: Scene | None) -> Scene:
-    """Return the scene that was given for an input, else the one that it carries."""
+    """Return the scene given for an input, or else the scene that the input carries."""
     return given or Scene.from_mapping(loaded.scene or {}, where=f"{loaded.path} (its scene)")
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:
-    """Return a name for each input: its file's without the suffix, later ones of one name numbered.
+    """Return a name for each input: its file name without the suffix, with repeated names numbered.
 
     Examples
     --------
@@ -242,7 +242,7 @@ def distinct_names(paths: Sequence[str]) -> list[str]:
 
 
 def numbered(stems: Iterable[str]) -> list[str]:
-    """Return names in their order, later ones of one name numbered."""
+    """Return the names in order, with repeated names numbered."""
     counts: dict[str, int] = {}
     names: dict[str, None] = {}
     for stem in stems:
@@ -255,7 +255,7 @@ def numbered(stems: Iterable[str]) -> list[str]:
 
 
 def in_a_name(name: str, suffix: str) -> str:
-    """Return a name with a suffix added, cut where both together are longer than the 255 bytes that a name may have.
+    """Return a name with a suffix added, with the name cut if both exceed the 255 bytes that a file name may have.
 
     Examples
     --------
@@ -267,7 +267,7 @@ def in_a_name(name: str, suffix: str) -> str:
     whole = os.fsencode(name)
     if len(whole) + len(suffix) <= LONGEST_NAME:
         return name + suffix
-    digest = hashlib.sha256(whole).hexdigest()[:8]  # names that are alike up to there stay apart
+    digest = hashlib.sha256(whole).hexdigest()[:8]  # keeps names distinct that are identical up to the cut
     return f"{whole[: LONGEST_NAME - len(suffix) - 9].decode(errors='ignore')}-{digest}{suffix}"
 
 
@@ -275,12 +275,12 @@ LONGEST_NAME = 255
 
 
 def make_folder(path: str | Path) -> Path:
-    """Return a folder for results, made where it is not there yet.
+    """Return a folder for results, created if it does not exist.
 
     Raises
     ------
     ProgramError
-        With exit code 2 if it cannot be.
+        With exit code 2 if the folder cannot be created.
     """
     folder = Path(path)
     try:
@@ -293,10 +293,10 @@ def make_folder(path: str | Path) -> Path:
 
 
 def made_now() -> dict[str, str]:
-    """Return what a run file says of its making: program, version and time."""
+    """Return the origin that a run file states: program, version and time of creation."""
     return {"software": "springmass", "version": __version__, "created_utc": now_utc()}
 
 
 def now_utc() -> str:
-    """Return the time as ISO 8601 in UTC, to the second."""
+    """Return the current time in ISO 8601, UTC, to the second."""
     return datetime.now(UTC).isoformat(timespec="seconds")

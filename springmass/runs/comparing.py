@@ -1,4 +1,4 @@
-"""Several runs of one spring, compared: the steps that the commands share, and their JSON."""
+"""Compare several runs of one spring: the steps that the commands share, and the JSON of the result."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ __all__ = ["Compared", "compare_analysed", "comparison_json", "demand_one_spring
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """What several runs of one spring say together.
+    """The joint result of several runs of one spring.
 
     Parameters
     ----------
     comparison : Comparison
-        Of their spring constants.
+        Comparison of their spring constants.
     joint : tuple of JointDamping
-        One for each bob that several runs have in common.
+        Joint damping fit for each bob that several runs have in common.
     findings : tuple of Finding
-        Gravest first.
+        The most severe first.
     """
 
     comparison: Comparison
@@ -41,7 +41,7 @@ class Compared:
 
 
 def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
-    """Refuse scenes from which no spring constants can be compared.
+    """Refuse scenes whose spring constants cannot be compared.
 
     Parameters
     ----------
@@ -75,9 +75,9 @@ def compare_analysed(runs: Sequence[Analysed], *, mass_correlation: float = 0.0)
     Parameters
     ----------
     runs : sequence of Analysed
-        Two at least.
+        At least two.
     mass_correlation : float
-        Of the errors of two bobs' masses, 0 to 1.
+        Correlation coefficient between the errors of two bobs' masses, 0 to 1.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def compare_analysed(runs: Sequence[Analysed], *, mass_correlation: float = 0.0)
 
 
 def comparison_json(compared: Compared, runs: Sequence[Analysed], provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a comparison as JSON-able mapping; numbers that are not finite are None.
+    """Return a comparison as a JSON-serialisable mapping; numbers that are not finite become None.
 
     Parameters
     ----------
@@ -155,7 +155,10 @@ def _moving(run: Analysed) -> Oscillation:
 
 
 def _of_one_bob(motions: list[tuple[str, Oscillation]], scenes: list[Scene]) -> list[list[tuple[str, Oscillation]]]:
-    """Groups of two runs and more with the same bob, disc and unit: the coefficients go as one over the mass."""
+    """Group runs with the same bob, disc and unit, two or more to a group.
+
+    The bob must be the same because the damping coefficients are inversely proportional to the mass.
+    """
     groups: dict[tuple[Estimate | None, Estimate | None, str], list[tuple[str, Oscillation]]] = {}
     for one, scene in zip(motions, scenes, strict=True):
         groups.setdefault((scene.bob_mass_kg, scene.disc_diameter_m, one[1].rest.mean.unit), []).append(one)

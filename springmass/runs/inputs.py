@@ -1,4 +1,4 @@
-"""Which files an input names: itself, or what lies in a folder."""
+"""Find the files that an input names: the file itself, or the recordings in a folder."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from springmass.runs.loading import kind_of
 
 __all__ = ["InputFile", "files_of"]
 
-NAMED = 5  # files that a message names
+NAMED = 5  # maximum number of files that a message names
 _LATER_LOG = re.compile(r"\.\d{3,}\.wire$")
 
 
@@ -27,9 +27,9 @@ class InputFile:
     ----------
     path : str
     velocity : str or None
-        The velocity file that lies beside it in its folder.
+        The velocity file next to it in its folder.
     of : int
-        Number of the input that named it.
+        Index of the input that named the file.
     """
 
     path: str
@@ -40,27 +40,28 @@ class InputFile:
 def files_of(
     inputs: Sequence[str], *, deep: bool = False, known: Collection[str] = (), but: Collection[str] = ()
 ) -> tuple[list[InputFile], list[str]]:
-    """Return the files that inputs name, and what to say of folders: what in them is no recording.
+    """Return the files that the inputs name, and messages about the files in folders that are not recordings.
 
     Parameters
     ----------
     inputs : sequence of str
-        Files, and folders, of which every recording is taken, by name.
+        Files and folders. Every recording in a folder is taken, sorted by name.
     deep : bool
-        Whether folders in folders are looked into too.
+        Whether subfolders are searched too.
     known : collection of str
-        Paths of files that are recordings, as somebody saw before: they are not opened to find that out.
+        Paths of files already identified as recordings; they are not opened again for this check.
     but : collection of str
-        Absolute paths of files and folders that are none of the inputs, wherever they lie.
+        Absolute paths of files and subfolders to leave out when a folder is searched.
 
     Raises
     ------
     ProgramError
-        With exit code 3 if a folder holds no recording or cannot be read.
+        With exit code 3 if a folder contains no recording or cannot be read.
 
     Notes
     -----
-    In a folder ``X_velocity.txt`` belongs to ``X_position.txt``, and logs to the run file or the log of their name.
+    In a folder, ``X_velocity.txt`` belongs to ``X_position.txt``, and a log belongs to the run file or the first log of
+    the same name.
     """
     found: list[InputFile] = []
     messages: list[str] = []
@@ -90,7 +91,7 @@ def _named(others: Sequence[str]) -> str:
 
 
 def _folders(top: Path, but: Collection[str]) -> Iterator[Path]:
-    """Yield a folder and all in it, by name, without hidden ones and without the results of analyses."""
+    """Yield a folder and all its subfolders, sorted by name, without hidden folders and results of analyses."""
     for here, inner, _ in os.walk(top):
         inner[:] = sorted(
             name
@@ -133,7 +134,7 @@ def _velocity_of(path: Path) -> str | None:
 
 
 def _parts(files: Sequence[Path]) -> Iterator[str]:
-    """Logs that a run file was made of, and those that a long log goes on in."""
+    """Yield the names of logs from which a run file was made, and of logs that continue a long log."""
     names = {path.name for path in files}
     for path in files:
         later = _LATER_LOG.search(path.name)
@@ -143,7 +144,10 @@ def _parts(files: Sequence[Path]) -> Iterator[str]:
 
 
 def _is_recording(path: Path) -> bool:
-    """Tell what some family recognises, or a run file or log; one that cannot be opened says so when it is read."""
+    """Return whether a file is a run file, a log, or recognised by a family.
+
+    A file that cannot be opened counts as a recording; the error is reported when it is read.
+    """
     if kind_of(path) != "recording":
         return True
     try:

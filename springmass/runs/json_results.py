@@ -1,6 +1,6 @@
 """The JSON of a result: one schema for the command line, the report's results.json and scripts.
 
-An estimate, a finding, an effect or a trap stands in it by its fields, as :func:`plain` has them.
+Estimates, findings, effects and traps appear in it with their fields, as :func:`plain` returns them.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _REJECTED_WARNINGS = frozenset({"sensor_lost"})
 
 
 def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
-    """Return the codes that ``--strict`` rejects: errors, and a run that is not the one that was to be recorded."""
+    """Return the codes that ``--strict`` rejects: errors, and warnings that the run is not the intended one."""
     grave = [f["code"] for f in findings if f["severity"] == "error" or f["code"] in _REJECTED_WARNINGS]
     return list(dict.fromkeys(grave))
 
@@ -52,20 +52,20 @@ def result_of(
     parameters: Mapping[str, Any],
     classic: Classic | None = None,
 ) -> dict[str, Any]:
-    """Return the result as JSON-able mapping; numbers that are not finite are None.
+    """Return the result as a JSON-serialisable mapping; numbers that are not finite become None.
 
     Parameters
     ----------
     loaded : Loaded
     analysis : Analysis
     time_utc : str
-        ISO 8601, of the analysis.
+        Time of the analysis, ISO 8601.
     accuracy : str
-        Tier, or "classic".
+        Accuracy tier, or "classic".
     parameters : mapping
-        Options as resolved.
+        Resolved options.
     classic : Classic, optional
-        If given, its estimates stand in place of the analysis's.
+        If given, its estimates replace those of the analysis.
     """
     estimates = classic.estimates if classic is not None else analysis.estimates
     content = {
@@ -85,7 +85,7 @@ def result_of(
 
 
 def provenance_of(accuracy: str, parameters: Mapping[str, Any], time_utc: str) -> dict[str, Any]:
-    """Return the ``provenance`` object: how to make this result again."""
+    """Return the ``provenance`` object: how to reproduce this result."""
     return {"version": __version__, "accuracy": accuracy, "parameters": dict(parameters), "time_utc": time_utc}
 
 
@@ -105,7 +105,7 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
 
 
 def _recorded(loaded: Loaded) -> dict[str, Any]:
-    """Return what was noted while a run was recorded, and afterwards: marks, trigger and other events, calibration."""
+    """Return the notes made during a recording and later: marks, remarks, trigger and other events, calibration."""
     provenance = loaded.provenance
     return {
         "start_time": provenance.get("start_time"),
@@ -117,7 +117,7 @@ def _recorded(loaded: Loaded) -> dict[str, Any]:
 
 
 def with_traps(findings: Sequence[Finding], traps: Sequence[Trap]) -> tuple[Finding, ...]:
-    """Return the findings of an analysis and those of the reader, the gravest first."""
+    """Return the findings of an analysis and of the reader, the most severe first."""
     known = {finding.code for finding in findings}
     return by_severity([*findings, *(_of_reader(trap) for trap in traps if trap.code not in known)])
 
@@ -130,10 +130,10 @@ def _of_reader(trap: Trap) -> Finding:
 
 
 def _sentence(clause: str) -> str:
-    """Return a clause, as a reader of files words it, in the form of every other finding."""
+    """Return a clause worded by a file reader as a full sentence, like the messages of all other findings."""
     end = "" if clause.endswith((".", '"')) else "."
     first = clause.split(" ", 1)[0]
-    # A name, of a file for example, keeps its letters.
+    # A name, such as a file name, keeps its case.
     return (clause[0].upper() + clause[1:] if first.isalpha() else clause) + end
 
 
@@ -201,7 +201,7 @@ def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
 
 
 def _by_leading_law(derived: Derived) -> dict[str, Any]:
-    """Return the numbers that depend on the law, as they are if the law that is clearly ahead holds."""
+    """Return the numbers that depend on the law, calculated with the clearly leading law."""
     return {
         "law": derived.law,
         "estimates": {name: x for name, x in derived.estimates.items() if name in derived.of_law},
@@ -215,7 +215,7 @@ def _coefficients(derived: Derived) -> dict[str, Any]:
 
 
 def parameters_json(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, Any]]:
-    """Return parameters of a law, with whether each is determined and, where it is not, below what it lies."""
+    """Return parameters of a law, with a flag for whether each is determined and, if not, its upper limit."""
     return {
         name: {
             **plain(x),
@@ -227,20 +227,21 @@ def parameters_json(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, An
 
 
 def picked(thing: object, names: Sequence[str]) -> dict[str, Any]:
-    """Return some attributes by name."""
+    """Return a mapping of the named attributes of an object."""
     return {name: getattr(thing, name) for name in names}
 
 
 def plain(value: object) -> Any:
-    """Return a value as strict JSON can hold it: a dataclass is its fields, a number that is none becomes null.
+    """Return a value in a form that strict JSON can represent.
 
-    Fields that do not count where two are compared, such as what an estimate was calculated from, are left out.
+    A dataclass becomes a mapping of its fields, and a number that is not finite becomes null. Fields that are ignored
+    in comparisons, such as the inputs of an estimate, are left out.
     """
     if isinstance(value, Mapping):
         return {str(key): plain(inner) for key, inner in value.items()}
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value) if field.compare}
-    if hasattr(value, "tolist"):  # numpy's scalars and arrays
+    if hasattr(value, "tolist"):  # NumPy scalars and arrays
         return plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):
         return [plain(inner) for inner in value]

@@ -1,4 +1,4 @@
-"""From a path to a track: old recordings and run files alike, with what was seen on the way."""
+"""Load a track from a path, for old recordings and run files alike, with any problems noticed while reading."""
 
 from __future__ import annotations
 
@@ -38,39 +38,39 @@ from storage.wire_log.records import MAGIC as WIRE_MAGIC
 __all__ = ["Loaded", "between", "cut", "kind_of", "load", "sample_data"]
 
 UNVERIFIED = "unverified"
-NAMED = 5  # differences that a message names
+NAMED = 5  # maximum number of differences that a message names
 _OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", "time_unit"})
 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """One input, read.
+    """One input that has been read.
 
-    The original files inside a run file, and its digest, are read when they are asked for.
+    The original files inside a run file, and its digest, are read only when they are needed.
 
     Parameters
     ----------
     path : Path
     format : str
-        The family that read it, "run" for a run file, "wire" for a wire log.
+        The family that read the input; "run" for a run file, "wire" for a wire log.
     info : SourceInfo
     channel : str
     title : str
     samples : Block
     track : Track
-        The samples for the pipeline, cut to the seconds asked for.
+        The samples for the pipeline, cut to the chosen time interval.
     traps : tuple of Trap
     malformed_rows : int
     take_originals : callable
-        Gives the original files.
+        Returns the original files.
     take_sha256 : callable
-        Gives the SHA-256 of the file's bytes.
+        Returns the SHA-256 digest of the file's bytes.
     scene : mapping or None
-        The scene a run file carries.
+        The scene from the notes next to the file, or else the scene inside a run file.
     provenance : mapping
-        What a run file says of its origin.
+        The origin that the recording states, with marks and notes.
     recorded_format : str
-        The family that read the old recording inside a run file; empty where it holds none.
+        The family that read the recording; for a run file, the family of the recording inside it, or empty if none.
     """
 
     path: Path
@@ -90,23 +90,25 @@ class Loaded:
 
     @cached_property
     def originals(self) -> tuple[Original, ...]:
-        """The original files, bit for bit.
+        """Exact copies of the original files.
 
         Raises
         ------
         storage.errors.StorageError
-            If one inside a run file has a checksum mismatch, or the run file has changed since.
+            If an original inside a run file has a checksum mismatch.
+        springmass.errors.ProgramError
+            If the run file has changed since it was loaded.
         """
         return self.take_originals()
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the file's bytes; of a wire log empty where nothing of it was kept.
+        """SHA-256 digest of the file's bytes; empty for a wire log of which nothing was kept.
 
         Raises
         ------
-        storage.errors.StorageError
-            If a run file is another by now.
+        springmass.errors.ProgramError
+            If the run file has changed since it was loaded.
         """
         return self.take_sha256()
 
@@ -119,7 +121,7 @@ class Loaded:
 def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
     """Read a recording, a run file or a wire log.
 
-    All digests of a run file are checked before a sample is used.
+    All digests of a run file are checked before any sample is used.
 
     Parameters
     ----------
@@ -130,11 +132,12 @@ def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
     Raises
     ------
     acquisition.errors.NeedsAnswer
-        If the file leaves something open that was not given. Its ``question`` lists what is missing and every answer.
+        If the file leaves something open that the options do not give. The error's ``question`` lists the missing items
+        and all their possible answers.
     acquisition.errors.FormatError, storage.errors.StorageError
-        If it cannot be read; one line.
+        If the file cannot be read; the message is one line.
     ProgramError
-        If no sample lies within the seconds asked for.
+        If no sample lies within the chosen time interval, or an option is given that the file states itself.
     """
     if str(path) == STDIN:
         return _load_stdin(options)
@@ -179,7 +182,7 @@ def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
 
 
 def _load_stdin(options: ReadOptions) -> Loaded:
-    """Read what stands on standard input; the formats need a file to go back and forth in."""
+    """Load from standard input by way of a temporary file, because the formats need a seekable file."""
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         spooled = Path(folder) / "stdin"
         if sys.stdin is None:
@@ -187,7 +190,7 @@ def _load_stdin(options: ReadOptions) -> Loaded:
         with open(spooled, "wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
         loaded = load(spooled, options)
-        originals, sha256 = loaded.originals, loaded.sha256  # while the file is there
+        originals, sha256 = loaded.originals, loaded.sha256  # read while the file exists
     return replace(loaded, path=Path(STDIN), take_originals=lambda: originals, take_sha256=lambda: sha256)
 
 
@@ -200,19 +203,19 @@ def sample_data() -> Path:
 
 
 def kind_of(path: Path) -> Literal["run", "wire", "recording"]:
-    """Tell run files and wire logs from recordings, by their first bytes."""
+    """Return whether a file is a run file, a wire log or a recording, by its first bytes."""
     try:
         with open_regular(path) as file:
             head = file.read(len(MAGIC))
     except (OSError, ValueError):
-        return "recording"  # the format registry says what is wrong with it
+        return "recording"  # the format registry reports the problem
     if head == MAGIC:
         return "run"
     return "wire" if head.startswith(WIRE_MAGIC) else "recording"
 
 
 def _refuse(path: Path, what: str, options: ReadOptions, allowed: Sequence[str]) -> None:
-    """Demand that nothing was stated about a file that holds it all."""
+    """Refuse options that describe a file which already states everything itself."""
     given = [name for name in options.given() if name in _OF_FILES and name not in allowed]
     if given:
         raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out", USAGE)
@@ -238,7 +241,7 @@ def _from_recording(path: Path, recording: Recording) -> Loaded:
 
 
 def _origin(recording: Recording) -> dict[str, Any]:
-    """Return what an old recording says of where and when it comes from."""
+    """Return the origin that an old recording states: start time and run."""
     origin = {"start_time": recording.start_time, "recorded_run": recording.run}
     return {name: value for name, value in origin.items() if value}
 
@@ -276,7 +279,7 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
 
 
 def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[Trap, ...]:
-    """Say which parts of a run file have a checksum mismatch."""
+    """Return a trap that names the parts of a run file with a checksum mismatch."""
     if not differing:
         return ()
     named = "; ".join(error.problem for error in differing[:NAMED])
@@ -286,7 +289,7 @@ def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[Trap, ...]
 
 
 def _stamp(path: Path) -> tuple[int, int, int] | None:
-    """Return what tells one file from another that took its name; None where none is there."""
+    """Return a stamp that distinguishes a file from a later one of the same name; None if there is no file."""
     try:
         found = os.stat(path)
     except OSError:
@@ -300,26 +303,26 @@ def _demand_same(path: Path, stamp: tuple[int, int, int] | None) -> None:
 
 
 def _originals_of(path: Path, stamp: tuple[int, int, int] | None, unverified: bool) -> tuple[Original, ...]:
-    """Read the original files inside a run file that was loaded."""
+    """Read the original files inside an already loaded run file."""
     _demand_same(path, stamp)
     with open_run(path, unverified=unverified) as run:
         return run.originals()
 
 
 def _sha256_of(path: Path, stamp: tuple[int, int, int] | None) -> str:
-    """Digest a run file that was loaded."""
+    """Return the SHA-256 digest of an already loaded run file."""
     _demand_same(path, stamp)
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _load_wire(path: Path, channel: str | None) -> Loaded:
-    """Recover a log into a run file that is thrown away, and take that; the log stays as it is."""
+    """Recover a log into a temporary run file and load that; the log is not changed."""
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         report = recover(path, Path(folder) / "run.h5", growing=True)
         names = {str(each.sensor.channel): each for each in report.runs}
         if channel is None and len(report.parts_of) == len(names) - 1:
-            # The other sensors are parts of this one, from before or after something else came in its place.
+            # The other sensors are parts of this one, from before or after another device took its place.
             channel = str(report.main.sensor.channel)
         wanted = [each for number, each in names.items() if channel in (None, number, each.sensor.port)]
         if len(wanted) != 1:
@@ -328,7 +331,7 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
             need = MissingItem(Missing.CHANNEL, tuple(names), next(iter(names)))
             raise NeedsAnswer(Question(str(path), (need,), reason=f"{refused}the log holds the sensors {sensors}"))
         loaded = _load_run(wanted[0].path)
-        originals = loaded.originals  # while the run file is there
+        originals = loaded.originals  # read while the run file exists
     return replace(
         loaded,
         path=path,
@@ -340,20 +343,20 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
 
 
 def cut(track: Track, from_s: float | None, to_s: float | None, *, where: object) -> Track:
-    """Return the samples of some seconds.
+    """Return the samples within a time interval.
 
     Parameters
     ----------
     track : Track
     from_s, to_s : float or None
-        Both included; None: from the first, to the last.
+        Limits of the interval, s, both included; None: from the first sample, or to the last.
     where : object
         Named in errors, usually the file.
 
     Raises
     ------
     ProgramError
-        If no sample lies there.
+        If no sample lies in the interval.
     """
     low = -np.inf if from_s is None else from_s
     high = np.inf if to_s is None else to_s
@@ -366,7 +369,7 @@ def cut(track: Track, from_s: float | None, to_s: float | None, *, where: object
 
 
 def between(track: Track, low_s: float, high_s: float) -> Track:
-    """Return the samples between two times, both included; all where neither time is finite."""
+    """Return the samples between two times, both included; all samples if neither time is finite."""
     if math.isinf(low_s) and math.isinf(high_s):
         return track
     keep = (track.t >= low_s) & (track.t <= high_s)

@@ -1,4 +1,4 @@
-"""The options of reading a recording, declared once for the command line, courses, the page and Python."""
+"""The options for reading a recording, declared once for the command line, courses, the page and Python."""
 
 from __future__ import annotations
 
@@ -68,17 +68,17 @@ class ReadOptions:
     ] = None
 
     def given(self) -> dict[str, Any]:
-        """Return the options that were given, by name."""
+        """Return the values of all given options by name."""
         return {each.name: value for each in fields(self) if (value := getattr(self, each.name)) not in (None, False)}
 
     @classmethod
     def of(cls, answers: Mapping[str, Any]) -> Self:
-        """Return the options of keyword arguments.
+        """Return the options given as keyword arguments.
 
         Raises
         ------
         TypeError
-            If one of the names is no option; the message lists the options.
+            If one of the names is not an option; the message lists the options.
         """
         known = [each.name for each in fields(cls)]
         if unknown := [name for name in answers if name not in known]:
@@ -87,26 +87,26 @@ class ReadOptions:
 
 
 READ = ReadOptions()
-"""Nothing stated: what the file itself says."""
+"""No option given: only the file's own statements are used."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunsOptions(ReadOptions):
-    """The options of reading many runs: no single velocity file belongs to them all."""
+    """The options for reading many runs, which have no velocity file in common."""
 
     velocity: Annotated[str | Path | None, _NO_OPTION] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedOptions(RunsOptions):
-    """The options of reading runs that are compared."""
+    """The options for reading runs to compare."""
 
     clock_ppm: Annotated[float | None, _NO_OPTION] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class InputOptions(ReadOptions):
-    """The options of reading a whole recording, with a velocity file perhaps."""
+    """The options for reading a whole recording, optionally with a velocity file."""
 
     from_s: Annotated[float | None, _NO_OPTION] = None
     to_s: Annotated[float | None, _NO_OPTION] = None
@@ -115,6 +115,6 @@ class InputOptions(ReadOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelOptions(InputOptions):
-    """The options of reading one channel of a whole recording."""
+    """The options for reading one channel of a whole recording."""
 
     velocity: Annotated[str | Path | None, _NO_OPTION] = None

@@ -1,4 +1,4 @@
-"""Processes of this machine that share work: how many there may be, and pools of them."""
+"""Processes that share work on this machine: how many are allowed, and pools of them."""
 
 from __future__ import annotations
 
@@ -14,18 +14,21 @@ __all__ = ["cores", "pool"]
 
 
 def cores() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def pool(processes: int) -> ProcessPoolExecutor:
-    """Return a pool of fresh processes that speak as this one does, leave Ctrl-C to it and end with it."""
-    # Fresh processes: a fork of one that has threads of linear algebra may hang.
+    """Return a pool of new processes that share this one's output settings, leave Ctrl-C to it and end with it."""
+    # New processes are spawned, because a fork of a process with linear-algebra threads may hang.
     return ProcessPoolExecutor(processes, get_context("spawn"), _begin, manner())
 
 
 def _begin(quiet: bool, verbose: bool) -> None:
-    """Leave Ctrl-C to the first process, and end with it: a pool's process would wait for ever for one killed."""
+    """Leave Ctrl-C to the parent process, and end with it.
+
+    A pool's process would otherwise wait forever if its parent is killed.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     adopt(quiet, verbose)
     parent = parent_process()

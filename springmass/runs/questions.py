@@ -1,4 +1,4 @@
-"""How a reader's question is answered: by options of the command that was typed, or by keyword arguments in Python."""
+"""Word the answer to a reader's question: as options of the typed command, or as keyword arguments in Python."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ __all__ = ["as_arguments", "as_options", "for_command", "for_course", "for_pytho
 
 
 def option_of(name: str) -> str:
-    """Return the option of a keyword argument: ``--rate-hz`` of ``rate_hz``."""
+    """Return the option for a keyword argument: ``--rate-hz`` for ``rate_hz``."""
     return f"--{name.replace('_', '-')}"
 
 
 def quoted(word: str) -> str:
-    """Return a word as a shell takes it; double quotes where they are enough, for these work on Windows too.
+    """Return a word quoted for a shell, with double quotes where they suffice, since these work on Windows too.
 
     Examples
     --------
@@ -30,7 +30,7 @@ def quoted(word: str) -> str:
 
 
 def as_options(answers: Mapping[str, object]) -> str:
-    """Return keyword arguments of :func:`springmass.load` as options of a command.
+    """Return keyword arguments of :func:`springmass.load` as command-line options.
 
     Examples
     --------
@@ -43,13 +43,13 @@ def as_options(answers: Mapping[str, object]) -> str:
             words.append(option_of(name))
         elif _is_given(value):
             text = f"{value:.15g}" if isinstance(value, float) else str(value)
-            # An option's value may begin with a minus only where it hangs on the option.
+            # A value may begin with a minus sign only if it is joined to its option by an equals sign.
             words.append(f"{option_of(name)}{'=' if text.startswith('-') else ' '}{quoted(text)}")
     return " ".join(words)
 
 
 def as_arguments(answers: Mapping[str, object]) -> str:
-    """Return keyword arguments of :func:`springmass.load` as they are written in Python.
+    """Return keyword arguments of :func:`springmass.load` as Python source text.
 
     Examples
     --------
@@ -66,10 +66,11 @@ def for_command(question: Question, words: Sequence[str], given: Mapping[str, ob
     ----------
     question : Question
     words : sequence of str
-        The command with the file and all that does not say how to read it: ``["springmass", "convert", "a.csv",
-        "a.h5"]``.
+        The command with its file and every word that does not describe how to read the file:
+        ``["springmass", "convert", "a.csv", "a.h5"]``.
     given : mapping
-        What the user gave already, as :func:`springmass.load` takes it. What the question asks again is left out.
+        Keyword arguments of :func:`springmass.load` that the user has already given. Those that the question asks for
+        again are left out.
 
     Examples
     --------
@@ -80,28 +81,28 @@ def for_command(question: Question, words: Sequence[str], given: Mapping[str, ob
     """
     kept = as_options(_without(given, question))
     if "--" in words:
-        # Options follow, so a file's name that begins with a minus is written as one that does not.
+        # Options follow, so ``./`` is put before a file name that begins with a minus sign.
         at = list(words).index("--")
         words = [*words[:at], *(f"./{word}" if word.startswith("-") else word for word in words[at + 1 :])]
     return " ".join(each for each in (*map(quoted, words), kept, _examples_as_options(question)) if each)
 
 
 def for_course(question: Question) -> str:
-    """Return how the question of one recording of a course is answered: in the table of runs, or for all of them."""
+    """Return how to answer a question about one recording of a course: in the table of runs, or for all recordings."""
     columns = ", ".join(question.missing)
     return f"fill in {columns} in the table of runs, or give batch {_examples_as_options(question)} for all recordings"
 
 
 def for_python(question: Question, function: str, given: Mapping[str, object]) -> str:
-    """Return the call in Python that answers a question.
+    """Return the Python call that answers a question.
 
     Parameters
     ----------
     question : Question
     function : str
-        Name of the function that was called, which takes the path and the answers: ``springmass.load``.
+        Name of the function that was called with the path and the answers, for example ``springmass.load``.
     given : mapping
-        As :func:`for_command`.
+        As in :func:`for_command`.
 
     Examples
     --------
@@ -119,7 +120,7 @@ def for_python(question: Question, function: str, given: Mapping[str, object]) -
 
 
 def _examples_as_options(question: Question) -> str:
-    # An example of a rate would be copied as if it were the file's.
+    # The placeholder R is used because an example rate would be copied as if it were the file's own.
     return " ".join(
         f"{option_of(name)} R" if name == Missing.RATE_HZ else as_options({name: value})
         for name, value in question.examples.items()

@@ -1,4 +1,4 @@
-"""Scene files: one for all runs, or one for each."""
+"""Read scene files: one for all runs, or one for each run."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from springmass.errors import USAGE, ProgramError, complain
 __all__ = ["Amendments", "amended", "ask_about", "read_scene", "read_scenes", "read_tables", "stated_keys"]
 
 Amendments = Mapping[tuple[str, str], Mapping[str, float]]
-"""Table and key of a scene to the value and its standard uncertainty."""
-LONGEST_SCENE = 1 << 14  # bytes; of longer ones some take seconds to parse
+"""Mapping of a scene's (table, key) to the value and its standard uncertainty."""
+LONGEST_SCENE = 1 << 14  # maximum size of a scene file in bytes; some longer files take seconds to parse
 
 
 def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
-    """Read one scene a run: one file for all of them, or one for each in their order; None without a file.
+    """Return one scene per run, read from one file for all runs or one file for each in order; None without a file.
 
     Raises
     ------
     ProgramError
-        With exit code 2 for any other number of files, or as :func:`read_scene`.
+        With exit code 2 for any other number of files, or as in :func:`read_scene`.
     """
     if len(paths) not in (0, 1, count):
         raise ProgramError(
@@ -44,7 +44,8 @@ def read_scene(path: str | Path) -> Scene:
     Raises
     ------
     ProgramError
-        With exit code 2 if it is absent, no TOML, or says something impossible; the line names file, key and value.
+        With exit code 2 if the file is missing, is not TOML, or states something impossible. The message names the
+        file, key and value.
     """
     return _scene_of(read_tables(path), str(path))
 
@@ -55,7 +56,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     ProgramError
-        With exit code 2 if it is absent, longer than any scene, or no TOML.
+        With exit code 2 if the file is missing, is longer than any scene, or is not TOML.
     """
     try:
         with open_regular(path) as file:
@@ -71,7 +72,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         return tomllib.loads(content.decode("utf-16" if utf16 else "utf-8-sig"))
     except OSError as error:
         raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name", USAGE) from error
-    # A number of thousands of digits is a plain ValueError, brackets nested by the thousand end Python's own reader.
+    # An integer of thousands of digits raises a plain ValueError; thousands of nested brackets, a RecursionError.
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         demand = f"not a TOML file ({reason}); see the scene file in the reference"
@@ -92,9 +93,9 @@ def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
     ----------
     scene : Scene
     values : mapping
-        By table and key: ``{"value": ..., "u": ...}``.
+        ``{"value": ..., "u": ...}`` for each (table, key).
     where : str
-        Named in errors.
+        Source of the values, named in errors.
 
     Raises
     ------
@@ -111,11 +112,14 @@ def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
 
 
 def stated_keys(scene: Scene) -> str:
-    """Return what a scene states, in words: tables and keys."""
+    """Return the tables and keys that a scene states, as text."""
     return ", ".join(f"[{table}] {key}" for table, keys in scene.to_mapping().items() for key in keys) or "nothing"
 
 
 def ask_about(scene: Scene, where: str | Path) -> None:
-    """Ask on stderr about every value that no bench has, where no finding does: a recording, a simulation."""
+    """Ask on stderr about every implausible value of a scene.
+
+    This is for recordings and simulations, where no finding reports such values.
+    """
     for clause in scene.unusual():
         complain(f"{where}: {clause}; check value and unit")

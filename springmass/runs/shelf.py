@@ -1,4 +1,4 @@
-"""A shelf of recordings, a folder or a zip: what each file on it is, and what it leaves to be said."""
+"""A shelf of recordings, which is a folder or a zip archive: what each file is, and what it leaves open."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ __all__ = ["Entry", "is_shelf", "shelf"]
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One file.
+    """One file on a shelf.
 
     Parameters
     ----------
     file : str
-        Its name on the shelf.
+        Name of the file on the shelf.
     family : str
-        Empty where no family knows it.
+        Family of the recording; empty if it cannot be read.
     channels : tuple of str
-        The one that is taken, or all that may be.
+        The channel that is read, or all candidates.
     rate_hz, span_s : float or None
     missing : tuple of str
-        Options that it asks for.
+        Options that the file needs.
     error : str
-        Why it cannot be read; empty where it can.
+        Why the file cannot be read; empty if it can.
     recognised : bool
         Whether a family of recordings recognises its content.
     """
@@ -53,7 +53,7 @@ class Entry:
 
 
 def is_shelf(path: Path) -> bool:
-    """Tell a folder or a zip archive."""
+    """Return whether a path is a folder or a zip archive."""
     if path.is_dir():
         return True
     try:
@@ -63,7 +63,7 @@ def is_shelf(path: Path) -> bool:
 
 
 def shelf(path: Path) -> Iterator[Entry]:
-    """Yield what every file of a folder, its folders among it, or of a zip archive is; hidden files are left out.
+    """Yield an entry for each file of a zip archive, or of a folder and its subfolders except hidden files.
 
     Raises
     ------

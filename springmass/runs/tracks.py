@@ -1,4 +1,4 @@
-"""From samples and what is known of their sensor to the pipeline's track."""
+"""Make the pipeline's track from samples and the information about their sensor."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from pipeline.track import Track
 
 __all__ = ["to_track"]
 
-MOTION_SENSOR = "motion-sensor"  # fixes the speed of sound
-LINE_PROTOCOL = "line-protocol"  # sends echo times
-COMPARED = {"rate_error_ppm", "u_rate_error_ppm", "span_s", "held_readings", "longest_stall_s"}  # of a clock
+MOTION_SENSOR = "motion-sensor"  # family that assumes a fixed speed of sound
+LINE_PROTOCOL = "line-protocol"  # family that sends echo times
+COMPARED = {"rate_error_ppm", "u_rate_error_ppm", "span_s", "held_readings", "longest_stall_s"}  # of two clocks
 
 
 def to_track(
     samples: Block, info: SourceInfo, *, recorded_format: str = "", provenance: Mapping[str, Any] | None = None
 ) -> Track:
-    """Hand samples over to the pipeline.
+    """Return samples as a track for the pipeline.
 
     Parameters
     ----------
     samples : Block
     info : SourceInfo
     recorded_format : str
-        Family of the recording that they come from, if any: it says which speed of sound stands in the distances.
+        Family of the recording that the samples come from, if any. It determines the speed of sound with which the
+        distances were calculated.
     provenance : mapping, optional
-        What a run file says of its origin: the sensor that it was recorded with, and what its clock may be off.
+        Origin stated in a run file: the sensor that recorded it, and the largest rate error of its clock.
 
     Notes
     -----
-    The noise stated by a source is passed on; the error column of a file is not noise and travels apart.
+    The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
     return Track(
         t=samples.t,
@@ -58,17 +59,17 @@ def to_track(
 
 
 def _trigger_s(provenance: Mapping[str, Any]) -> float | None:
-    """When the bob left its rest, by the first trigger that the recording noted, s."""
+    """Return when the bob left its rest position, in s, from the first trigger event of the recording."""
     moments = [event["t_s"] for event in provenance.get("events", ()) if event.get("kind") == "trigger"]
     return float(moments[0]) if moments else None
 
 
 def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """How the device's clock ran against the host's, where stamps of both are there, and what it may be off."""
+    """Return the device clock's rate relative to the host's, if both timestamps exist, and its largest rate error."""
     if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
         return {}
     noted = provenance.get("decoding", {}).get("clock", {})
-    # By the pings, whose times no sample has; a file of an earlier version leaves the comparison to its reader.
+    # The stored comparison uses the pings, whose times are in no sample; files of earlier versions may lack it.
     comparison = noted if noted.keys() >= COMPARED else _compared_anew(samples)
     clock = {
         "clock_limit": 1e-6 * noted.get("limit_ppm", RESONATOR_PPM),
@@ -82,7 +83,7 @@ def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str,
 
 
 def _compared_anew(samples: Block) -> dict[str, Any]:
-    """Compare the clocks by a run's samples."""
+    """Compare the clocks using the timestamps of a run's samples."""
     assert samples.host_ns is not None
     fit = fit_clock(samples.t, samples.host_ns)
     known = math.isfinite(fit.rate_error_ppm)
@@ -96,14 +97,14 @@ def _compared_anew(samples: Block) -> dict[str, Any]:
 
 
 def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
-    """What made distances: the speed of sound where echo times were recorded, and the calibration's uncertainties."""
+    """Return how distances were calculated: the speed of sound, if it is known, and the calibration's uncertainties."""
     if recorded_format == MOTION_SENSOR:
         return {"speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
     if not sensor:
         return {}
     calibration = Calibration.from_mapping(sensor.get("calibration", {}))
     known = {"u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
-    # Families that state a distance have applied an unknown speed of sound.
+    # Families that send distances instead of echo times have applied an unknown speed of sound.
     if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
         known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
     return known

@@ -1,4 +1,4 @@
-"""What failed during the recording without ending it: counted, written into the run once, and reported at its end."""
+"""Failures that do not end a recording: counted, written into the run once, and reported at its end."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from storage.errors import one_line
 __all__ = ["Failures", "raised_at"]
 
 KINDS = 20
-"""So many different failures are counted by kind; of those beyond only the number is kept."""
+"""Maximum number of kinds of failure counted separately; all further kinds are counted together."""
 OTHERS = "others"
 
 
 class Failures:
-    """Counts failures by what failed, the error and the line that raised it; any thread may note one.
+    """Counts failures by component, error and the line that raised it; any thread may report a failure.
 
     Attributes
     ----------
     tell : callable or None
-        Takes ``(kind, facts)`` of the first failure of each kind: an event for the run.
+        Called with ``(kind, facts)`` for the first failure of each kind, which becomes an event of the run.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class Failures:
         self._counts: dict[str, int] = {}
 
     def note(self, what: str, error: BaseException) -> None:
-        """Count a failure of the display, a decoder, the reader or the like."""
+        """Count a failure of a component, such as the display, a decoder or the reader."""
         where = raised_at(error)
         name = f"{what}: {type(error).__name__} at {where}"
         with self._lock:
@@ -46,17 +46,17 @@ class Failures:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """How often each kind came."""
+        """Number of failures of each kind."""
         with self._lock:
             return dict(self._counts)
 
     def describe(self) -> Iterator[str]:
-        """Yield a line for people on each kind."""
+        """Yield a readable line for each kind of failure."""
         for name, count in self.counts.items():
             yield f"during the recording, which went on, {count} time{'s' * (count > 1)}: {name}"
 
 
 def raised_at(error: BaseException) -> str:
-    """Return file and line that raised an error, with no folder of this machine."""
+    """Return the file name, without its folder, and the line that raised an error."""
     frames = traceback.extract_tb(error.__traceback__)
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else "nowhere"

@@ -1,4 +1,4 @@
-"""What a sensor says that it is, in words: what it is set to, and whether it wants an update."""
+"""Describe in words the identity that a sensor reports: its settings, and whether it needs an update."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["meeting", "outdated", "settings_of"]
 
 
 def meeting(sensor: Sensor, identity: Identity) -> Iterator[str]:
-    """Yield lines on a sensor that said what it is."""
+    """Yield lines about a sensor that reported its identity."""
     port, rate_hz = sensor.transport.name, identity.settings.get("rate_hz")
     yield f"{port}: {identity}{settings_of(identity)}"
     if outdated(identity):
@@ -28,12 +28,12 @@ def meeting(sensor: Sensor, identity: Identity) -> Iterator[str]:
 
 
 def outdated(identity: Identity) -> bool:
-    """Tell whether it is this project's firmware, of an earlier version than the one that travels here."""
+    """Return whether a sensor runs an older version of the firmware that comes with this program."""
     return identity.model == MODEL and _numbers(identity.version) < _numbers(VERSION)
 
 
 def settings_of(identity: Identity) -> str:
-    """Return what it is set to, for people; empty where it does not say."""
+    """Return a sensor's settings in words; empty if it does not report them."""
     if not (settings := identity.settings):
         return ""
     spread = f", pings spread over {settings['spread_us']} us" if settings["spread_us"] else ""

@@ -1,7 +1,7 @@
-"""What somebody does at the bench before a run, asked for on the page: zero, ruler, trigger, record.
+"""Carry out requests from the page before a run: zero, ruler, trigger, record.
 
-It works on the session's own thread, between whose waits it looks what was asked; the reading of the sensors is another
-thread, which none of this can delay. What was done is told to the page after it was done.
+The operator works on the session's thread and checks for requests between its waits. It cannot delay the reading of the
+sensors, which has a separate thread. The page is informed of each action after it is done.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ __all__ = ["Closed", "Operator", "Page"]
 
 LOOK_S = 0.05
 PREVIEW_NS = 600_000_000_000
-"""So long a log of what is only looked at; then another takes its place, and the first is gone."""
+"""Maximum duration of a preview log; then a new log replaces it, and the old one is deleted."""
 STILL_S = 3.0
 U_RULER_M = 0.5e-3
 SAME_M = 0.002
-"""Ruler distances that are nearer to one another are the same, measured again."""
+"""Ruler distances closer together than this count as the same distance measured again."""
 LONGEST_KEEP_S = 60.0
 
 
 class Page(Protocol):
-    """The page, as far as the operator speaks with it."""
+    """The part of the page that the operator uses."""
 
     requests: queue.SimpleQueue[dict[str, Any]]
 
     def tell(self, phase: str, **facts: Any) -> None:
-        """Say where the recording stands."""
+        """Report the state of the recording."""
 
 
 class Closed(Exception):
@@ -48,17 +48,17 @@ class Closed(Exception):
 
 @dataclass(slots=True)
 class Operator:
-    """Does what is asked on the page until a run begins.
+    """Carries out requests from the page until a run begins.
 
     Parameters
     ----------
     session : Session
-        Listening.
+        A listening session.
     page : Page
     log : Path
-        Of the run to come.
+        Path of the log of the coming run.
     rest : StillPoint or None
-        Measured before.
+        Rest position measured earlier.
     """
 
     session: Session
@@ -74,7 +74,7 @@ class Operator:
     _postponed: Mapping[str, Any] | None = None
 
     def begin(self) -> None:
-        """Let the page see the bench before there is a run: by a log that is only looked at."""
+        """Show the bench on the page before there is a run, by means of a preview log."""
         if self._folder is None:
             self._folder = Path(tempfile.mkdtemp(prefix="springmass-"))
         before, self._number = self._preview, self._number + 1
@@ -82,7 +82,7 @@ class Operator:
         self._drop(before)
 
     def end(self) -> None:
-        """Drop what was only looked at; the run has begun, or will not."""
+        """Delete the preview, since the run has begun or will not begin."""
         self._drop(self._preview)
         self._preview = None
         if self._folder is not None:
@@ -90,7 +90,7 @@ class Operator:
             self._folder = None
 
     def prepare(self) -> Trigger | None:
-        """Return when "record" was asked for, with the trigger where it is to wait for one.
+        """Wait until recording is requested; return the trigger to wait for, or None to start immediately.
 
         Raises
         ------
@@ -122,7 +122,7 @@ class Operator:
                 self._measure(request)
 
     def armed(self, trigger: Trigger) -> Callable[[], bool]:
-        """Say that the trigger is armed; return what tells whether it shall wait no longer."""
+        """Report that the trigger is armed, and return a function that tells whether to stop waiting for it."""
         self._tell("armed", threshold_m=trigger.threshold_m, keep_s=trigger.keep_s)
 
         def changed() -> bool:
@@ -132,7 +132,7 @@ class Operator:
                 if kind == "close":
                     raise Closed
                 if kind in ("arm", "record"):
-                    self._postponed = request  # carried out by `prepare`, after the armed recording has ended
+                    self._postponed = request  # carried out by `prepare` after the wait for the trigger has ended
                 if kind in ("disarm", "arm", "record"):
                     return True
             return False
@@ -140,7 +140,7 @@ class Operator:
         return changed
 
     def recording(self, log: Path) -> None:
-        """Say that the run has begun."""
+        """Report that the run has begun, and delete the preview."""
         self._tell("recording", log=str(log))
         self.end()
 
@@ -150,7 +150,7 @@ class Operator:
             point = self.session.still(STILL_S)
             if request["type"] == "ruler":
                 point = self._against(point, float(request["known_m"]))
-                self.begin()  # what is looked at begins anew, as it is now stated
+                self.begin()  # the preview starts anew with the new calibration
             self.rest = point
         except CalibrationError as error:
             self._tell("ready", failed=str(error))
@@ -158,7 +158,7 @@ class Operator:
             self._tell("ready")
 
     def _against(self, point: StillPoint, known_m: float) -> StillPoint:
-        """Calibrate by all distances known so far; each is carried back to what the sensor was before the first."""
+        """Calibrate with all ruler distances so far, each converted back to the calibration before the first one."""
         now = self.session.sensors[0].calibration
         base = self._base or now
         measured = base.restated(point, now)
@@ -186,5 +186,5 @@ class Operator:
     @staticmethod
     def _drop(recorder: Recorder | None) -> None:
         if recorder is not None:
-            with contextlib.suppress(WriteFailed):  # nobody is to keep it
+            with contextlib.suppress(WriteFailed):  # the preview is not kept anyway
                 recorder.close()

@@ -1,4 +1,4 @@
-"""What a session is asked for: when its run begins and ends, and who takes part in it."""
+"""The options of a session: when its run begins and ends, and which functions are called during it."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ __all__ = ["RunLimits", "RunListeners"]
 
 @dataclass(frozen=True, slots=True)
 class RunLimits:
-    """When a run begins and ends.
+    """The start and end of a run.
 
     Parameters
     ----------
     seconds : float or None
-        How long; None: until the user ends it.
+        Duration of the run, s; None: until the user ends it.
     trigger : Trigger or None
-        None: it starts immediately.
+        Trigger that starts the run; None: the run starts immediately.
     rest : StillPoint or None
-        The rest position from which the trigger measures; None: the distance when it began to wait.
+        Rest position from which the trigger measures; None: the first distance after the wait begins.
     """
 
     seconds: float | None = None
@@ -35,16 +35,16 @@ class RunLimits:
 
 @dataclass(frozen=True, slots=True)
 class RunListeners:
-    """Who takes part in a run while it is recorded.
+    """Callbacks and mark queue used during the recording of a run.
 
     Parameters
     ----------
     progress : callable
-        Called about once a second, on a separate thread.
+        Called with the progress about once a second, on a separate thread.
     marks : queue of str or None
         Marks to put into the run.
     begun : callable
-        Called with the log's path once reads go there.
+        Called with the log's path once reads are recorded there.
     changed : callable
         Returns whether to stop waiting for the trigger; called while the session waits.
     """

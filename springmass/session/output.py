@@ -1,4 +1,4 @@
-"""The names that a recording will take, looked at before it begins."""
+"""Choose and check the file names of a recording before it begins."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["default_name", "demand_new"]
 
 
 def default_name(what: str, now: datetime) -> Path:
-    """Return a name that says when and what, numbered where it is taken.
+    """Return a name with time and subject, and with a number if the name is taken.
 
     Examples
     --------
@@ -29,12 +29,12 @@ def default_name(what: str, now: datetime) -> Path:
 
 
 def demand_new(path: Path, sensors: int) -> None:
-    """Refuse to record over anything, or to a name that cannot be: of the log, and of each sensor's run file.
+    """Refuse existing or impossible names for the log and for each sensor's run file.
 
     Raises
     ------
     ProgramError
-        With exit code 2 if the run file or its log exists, a link to nothing among them, or a name is too long.
+        With exit code 2 if a run file or the log exists, even as a dangling link, or if a name is too long.
     """
     longest = _longest_name(path.parent)
     for there in dict.fromkeys((path, path.with_suffix(".wire"), *run_paths(path, range(sensors)))):
@@ -53,5 +53,5 @@ def demand_new(path: Path, sensors: int) -> None:
 def _longest_name(folder: Path) -> int:
     try:
         return os.pathconf(folder, "PC_NAME_MAX")
-    except (OSError, AttributeError, ValueError):  # Windows, or a folder that is not there, which is said elsewhere
+    except (OSError, AttributeError, ValueError):  # Windows, or a missing folder, which is reported elsewhere
         return 255

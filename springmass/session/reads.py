@@ -1,8 +1,8 @@
-"""Reads on their way from the port: to the recorder as they are, then through the decoders.
+"""Pass reads from the port to the recorder unchanged, and then through the decoders.
 
-Both happen on the reading thread, and in this order: a defect of a decoder must not cost the bytes. What a decoder
-raises is counted and goes no further. A second thread for the decoding would be woken by each read, which costs more
-than the decoding of a reading does.
+Both happen on the reading thread, in this order, so that a defect of a decoder cannot lose bytes. Exceptions of a
+decoder are counted and go no further. A second thread for decoding would be woken by every read, which costs more than
+decoding a reading.
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ from storage.wire_log.records import HIGHEST_CHANNEL
 __all__ = ["Tee"]
 
 HEARD_BYTES = 4096
-"""So many bytes tell what sensor it is."""
+"""Number of first bytes kept per sensor, enough to identify its kind."""
 HELD_SAMPLES = 1 << 15
-"""So many samples of a sensor wait to be asked for: five minutes at 100 Hz, in which a display hangs, take 8 MB."""
+"""Maximum samples per sensor waiting for the display: five minutes at 100 Hz if a display hangs, in 8 MB."""
 
 
 class Tee:
-    """Hands every read to the recorder, once there is one, and to its sensor's chain.
+    """Passes every read to the recorder, if there is one, and to its sensor's chain.
 
     Parameters
     ----------
     chains : list of SensorChain
-        By channel. While it records, a sensor that comes back as another is given one more.
+        Chains by channel. During a recording, another sensor that comes back on a port gets an additional chain.
     failures : Failures, optional
-        Takes what decoders raise.
+        Counts the exceptions of decoders.
 
     Attributes
     ----------
     gone : dict of int to str
-        By channel, why a port is lost; a port that came back is not among them.
+        Reasons for lost ports, by channel; a port that came back is removed.
     readings : list of int
-        By channel, how many came.
+        Number of readings by channel.
     unshown : int
-        Samples that nobody asked for in time: recorded, and the run file holds them, but not shown.
+        Number of samples not fetched in time. They are recorded and in the run file, but not shown.
     """
 
     def __init__(self, chains: list[SensorChain], failures: Failures | None = None) -> None:
@@ -61,7 +61,7 @@ class Tee:
         self._kept: deque[Read] | None = None
         self._heard = [bytearray() for _ in chains]
         self._sensors: Sequence[Sensor] = ()
-        # Where each port's bytes go: to its own channel, or to a further one since another sensor came back on it.
+        # Channel for each port's bytes: its own, or an additional one if another sensor came back on the port.
         self._channels = list(range(len(chains)))
         self._last: list[Reading | None] = [None for _ in chains]
         self.gone: dict[int, str] = {}
@@ -69,9 +69,9 @@ class Tee:
         self.unshown = 0
 
     def line(self, channel: int, sensors: Sequence[Sensor]) -> Line:
-        """Return how the reader speaks to a sensor; a polled one is asked as its chain's decoder says.
+        """Return how the reader talks to a sensor; a polled sensor is polled as its chain's decoder requires.
 
-        What it has to prove when it comes back is asked of the sensors as they are then.
+        The proof required of a sensor that comes back is made from the state of the sensors at that time.
         """
         self._sensors = sensors
         family = sensors[channel].family
@@ -83,13 +83,13 @@ class Tee:
         return cast(Polled, self._chains[self._channels[channel]].decoder)
 
     def _proof(self, channel: int) -> Proof | None:
-        """Return what has to be proven on a port that came back, by what spoke there last."""
+        """Return the proof required on a port that came back, based on the last sensor on that port."""
         sensor, now = self._sensors[channel], self._channels[channel]
         identity = self._chains[now].status.identity or (sensor.identity if now == channel else None)
         return replace(sensor, identity=identity).proof(self._last[now])
 
     def reads(self, reads: Sequence[Read]) -> None:
-        """Take what one wake-up read; called on the reading thread."""
+        """Take the reads of one wake-up; called on the reading thread."""
         with self._lock:
             if len(self._chains) > len(self._channels):
                 reads = [(self._channels[port], host_ns, data) for port, host_ns, data in reads]
@@ -111,7 +111,7 @@ class Tee:
                 self._last[channel] = chain.last[-1]
             if len(chain) > HELD_SAMPLES:
                 self.unshown += len(chain.block())
-        except Exception as error:  # the bytes are recorded; what is shown of them is not worth a run
+        except Exception as error:  # the bytes are recorded, and a display error must not end the run
             self._failures.note("decoder", error)
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
@@ -122,7 +122,7 @@ class Tee:
             elif kind == "reopened":
                 self.gone.pop(channel, None)
                 if self._kept is not None:
-                    # A run that is about to begin holds nothing from before: whether it was this sensor nobody noted.
+                    # The coming run must not contain earlier reads, for they may be from another sensor.
                     self._kept = deque(read for read in self._kept if read[0] != self._channels[channel])
                 if self._sensors and "sensor" not in facts:
                     facts = {**facts, "sensor": self._sensors[channel].judged(None, None)}
@@ -140,7 +140,7 @@ class Tee:
                 self._failures.note("decoder", error)
 
     def _go_on(self, recorder: Recorder, port: int, host_ns: int, facts: Mapping[str, Any]) -> None:
-        """Record what comes from a port as another sensor from here on, in the next channel that is free."""
+        """Record a port's further data as another sensor, in the next free channel."""
         before, channel = self._channels[port], len(self._chains)
         recorder.event(before, host_ns, "replaced", {**facts, "channel": channel})
         recorder.event(channel, host_ns, "continues", {**facts, "of": before})
@@ -152,40 +152,40 @@ class Tee:
 
     @property
     def first(self) -> int:
-        """Channel of the sensor that is on the first port now."""
+        """Channel of the sensor now on the first port."""
         return self._channels[0]
 
     def blocks(self) -> list[tuple[int, Block]]:
-        """Return the samples that came since the last call, by channel, of the sensors that have any."""
+        """Return the samples received since the last call, by channel, for sensors that have any."""
         with self._lock:
             return [(channel, chain.block()) for channel, chain in enumerate(self._chains) if len(chain)]
 
     def heard(self, channel: int) -> bytes:
-        """Return the first bytes that a sensor sent."""
+        """Return the first bytes sent by a sensor."""
         with self._lock:
             return bytes(self._heard[channel])
 
     def keep(self) -> None:
-        """Retain the data read from now on: a run may include data from before its trigger."""
+        """Keep all reads from now on, because a run may include data from before its trigger."""
         with self._lock:
             self._kept = deque()
 
     def let_go(self) -> None:
-        """Keep reads no longer."""
+        """Stop keeping reads, and discard those kept."""
         with self._lock:
             self._kept = None
 
     def forget(self, before_ns: int) -> None:
-        """Keep no reads that are older."""
+        """Discard kept reads that are older than a given time."""
         with self._lock:
             while self._kept and self._kept[0][1] < before_ns:
                 self._kept.popleft()
 
     def start(self, recorder: Recorder, chains: list[SensorChain], since_ns: int, *, preview: bool = False) -> None:
-        """Record from here on, and the kept reads since a moment, no read twice and none left out.
+        """Record all further reads and the kept reads since a given time, each exactly once.
 
-        What a polled sensor is asked, and what is decoded, begins anew with these chains, as the recorded bytes do. In
-        a preview whatever comes back on a port is what will be recorded.
+        Polling and decoding start anew with the given chains, like the recorded bytes. In a preview, another sensor
+        that comes back on a port gets no additional channel.
         """
         with self._lock:
             kept = [read for read in self._kept or () if read[1] >= since_ns]
@@ -197,6 +197,6 @@ class Tee:
                 self._decode(channel, host_ns, data)
 
     def stop(self) -> None:
-        """Record no more."""
+        """Stop recording."""
         with self._lock:
             self._recorder = None

@@ -1,4 +1,4 @@
-"""One sensor of a recording: what it is, how its bytes become samples, and what the log says of it."""
+"""One sensor of a recording: its identity, the decoding of its bytes into samples, and its entry in the log."""
 
 from __future__ import annotations
 
@@ -22,50 +22,50 @@ __all__ = ["ANSWERED", "Back", "Proof", "Sensor"]
 
 
 class Back(enum.StrEnum):
-    """Which sensor speaks on a port that came back.
+    """Which sensor is on a port that came back.
 
-    The values stand in wire logs and never change.
+    The values are stored in wire logs and must never change.
     """
 
     IDENTIFIED = "identified"
-    """The same, by its name or its adapter's serial number."""
+    """The same sensor, according to its name or its adapter's serial number."""
     CONTINUED = "continued"
-    """The same, for its counter goes on."""
+    """The same sensor, because its counter continues."""
     RESTARTED = "restarted"
-    """Taken for the same: its counter began anew, as another's would."""
+    """Assumed to be the same sensor: its counter restarted, but another sensor's counter would look alike."""
     ASSUMED = "assumed"
-    """Taken for the same: nothing tells it from another of its kind."""
+    """Assumed to be the same sensor: nothing distinguishes it from another of its kind."""
     ANOTHER = "another"
-    """Another, or one whose counter leapt."""
+    """Another sensor, or one whose counter jumped."""
 
 
 PROOF_READINGS = 3
 ANSWERED = 12
-"""Within so many readings a sensor that is asked says what it is."""
+"""Number of readings within which a sensor answers a request for its identity."""
 LATE_S, LATE_PERIODS = 0.25, 3.0
-"""So late a stamp may be: what no jitter exceeds, and three periods of a slow sensor."""
+"""Maximum delay of a timestamp: more than any jitter in s, and three periods of a slow sensor."""
 PROOF_BYTES = 4096
-"""So many bytes without proof are another device's."""
+"""Number of bytes without proof after which the device counts as another one."""
 
 
 class Proof:
-    """Whether the device on a port that came back is, or may be, the sensor that was lost.
+    """Decides whether the device on a port that came back is, or may be, the sensor that was lost.
 
-    A device with another known name belongs to another bench: it is refused, as is another wire form. If no name is
-    known, the device's counter decides: see :class:`Counters`.
+    A device that reports another name belongs to another bench and is refused, as is another wire form. If no name is
+    known, the device's counter decides; see :meth:`Sensor.judged`.
 
     Parameters
     ----------
     decoder : Decoder
-        A fresh one.
+        A new decoder.
     readings : int
-        So many readings prove the wire form, where they are at least half of the bytes since the first of them.
+        Number of readings that prove the wire form, if at most half of the bytes since the first reading are garbage.
     identity : Identity or None
-        What the sensor said that it is, where it did: then model and name have to be said again.
+        Identity that the sensor reported before, if any; the device must then report the same model and name.
     may_say : int
-        Within so many readings a sensor that never said what it is may say it.
+        Number of readings within which a sensor without a known identity may report one.
     judged : callable
-        Returns which sensor it is by its last reading, where no name says it.
+        Returns which sensor it is, from its last reading, if no name decides.
     """
 
     def __init__(
@@ -86,17 +86,17 @@ class Proof:
 
     @property
     def facts(self) -> Mapping[str, str]:
-        """Which sensor it is, once that is proven."""
+        """Which sensor it is, once this has been proven."""
         if self._named:
             return {"sensor": Back.IDENTIFIED}
         judged, identity = self._judged(self._last), DeviceStatus.of(self._decoder).identity
-        # The serial number of its adapter outweighs what it says; without a name all of a family say the same.
+        # The adapter's serial number outweighs the reported identity, which all unnamed sensors of a family share.
         if judged is not Back.IDENTIFIED and self._identity is None and identity is not None and identity.name:
             return {"sensor": Back.ANOTHER, "why": "it says its name, and the one before had none"}
         return {"sensor": judged}
 
     def feed(self, host_ns: int, data: bytes) -> bool | None:
-        """Take the bytes of one read; return whether it is the sensor, None while that is open."""
+        """Take the bytes of one read; return whether it is the sensor, or None while this is undecided."""
         before = self._decoder.faults.get("garbage_bytes", 0)
         found = self._decoder.feed(host_ns, data)
         came = len(found)
@@ -113,7 +113,7 @@ class Proof:
             self._named = bool(identity.name)
             if (identity.model, identity.name) != (self._identity.model, self._identity.name):
                 return False
-            # A name is one bench's; all that nobody named say the same.
+            # A name belongs to one bench, whereas all unnamed sensors report the same identity.
             return True if self._named or self._last is not None else None
         if self._identity is None and self._readings >= self._wanted and 2 * garbage <= self._since_first:
             return True
@@ -128,17 +128,17 @@ class Sensor:
     ----------
     family : Family
     transport : Transport
-        Open.
+        An open transport.
     rate_hz : float or None
-        Readings per second it is set to; None: the family's.
+        Readings per second set in the sensor; None: the family's rate.
     options : mapping
-        Of the decoder.
+        Options of the decoder.
     calibration : Calibration
     baud : int
     clock_ppm : float or None
-        What its clock may be off at most, ppm; None: the family's.
+        Maximum rate error of its clock, ppm; None: the family's value.
     identity : Identity or None
-        What it said that it is, where it did.
+        Identity that the sensor reported, if any.
     """
 
     family: Family
@@ -151,7 +151,7 @@ class Sensor:
     identity: Identity | None = None
 
     def chain(self) -> SensorChain:
-        """Return a fresh chain."""
+        """Return a new chain."""
         return SensorChain(
             self.family,
             options=self.options,
@@ -161,29 +161,29 @@ class Sensor:
         )
 
     def proof(self, last: Reading | None = None) -> Proof | None:
-        """Return what tells this sensor from another on a port that came back; None where bytes cannot tell.
+        """Return a proof of this sensor for a port that came back; None if bytes cannot distinguish it from others.
 
         Parameters
         ----------
         last : Reading or None
-            The one that came last before the port was lost.
+            The last reading before the port was lost.
         """
         if not self.family.self_framing:
             return None
-        # One that is asked is asked once: its decoder sees the reply only afterwards, and says then what to ask next.
+        # A polled sensor is polled once only: its decoder chooses the next poll after it has seen the reply.
         wanted = PROOF_READINGS if self.family.poll is None else 1
-        # Without a reading before there is nothing that another's could be taken for.
+        # Without an earlier reading, there is no sensor with which another could be confused.
         may_say = ANSWERED if self.family.identify and last is not None else 0
         return Proof(self.family.decoder(**self.options), wanted, self.identity, may_say, partial(self.judged, last))
 
     def judged(self, last: Reading | None, now: Reading | None) -> Back:
-        """Return which sensor came back, by its port and by its counter before and after.
+        """Return which sensor came back, judged by its port and by its counter before and after.
 
         Notes
         -----
-        A counter that goes on has advanced by as much as the host's clock, but for the time that a stamp may be late
-        and the difference of the clocks' rates; through a network old readings may come first. One that began anew
-        shows no more than the time since the last reading.
+        A counter that continues has advanced as much as the host's clock, within the possible delay of a timestamp and
+        the difference in clock rates. Over a network, old readings may arrive first. A counter that restarted shows at
+        most the time since the last reading.
         """
         if self.transport.identified:
             return Back.IDENTIFIED
@@ -206,7 +206,7 @@ class Sensor:
         return Back.RESTARTED if after * unit_s <= elapsed_s + error_s else Back.ANOTHER
 
     def entry(self, channel: int) -> SensorEntry:
-        """Return what the log's header says of it."""
+        """Return the sensor's entry for the header of the log."""
         return SensorEntry(
             channel,
             self.family.name,
@@ -219,7 +219,7 @@ class Sensor:
         )
 
     def not_heard(self, heard: bytes) -> str:
-        """Return one line on what came in place of readings."""
+        """Return a line that describes what was received instead of readings."""
         what = describe_bytes(heard) if heard else "not a byte came; is the sensor powered, its line on the right pin?"
         return (
             f"{self.transport.name}: a {self.family.name} sensor at {self.baud} baud was expected, {what}; "

@@ -1,8 +1,8 @@
-"""A recording session: ports opened, sensors heard, and bytes kept until somebody ends it.
+"""Run a recording session: listen to the sensors on open ports, and record their bytes until the end.
 
-The reading thread brings bytes; they go to the recorder as they are, and then through the decoders. The session's own
-thread waits for the end and puts marks into the run. What is shown is calculated on a separate thread, which takes
-samples once a second (``display``): nothing that it does or raises delays or ends the other two.
+The reading thread passes bytes unchanged to the recorder, and then through the decoders. The session's own thread waits
+for the end and puts marks into the run. The displayed values are calculated on a separate thread (``display``), which
+takes samples once a second. It cannot delay or end the other two threads, not even by an exception.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ from storage.wire_log.scanning import LogContents
 
 __all__ = ["EndReason", "Ended", "Progress", "Sensor", "Session", "Trigger"]
 
-SAY_NS = 1_500_000_000  # silence so long before a run is said
-HEAR_S = 3.0  # silence longer than this before a run is no sensor
-HEARD = 3  # readings that make a sensor
+SAY_NS = 1_500_000_000  # silence before a run that is reported, ns
+HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
+HEARD = 3  # number of readings after which a sensor counts as heard
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
-HELD_BLOCKS = 1000  # of samples that nobody looked at before the run began
-BYTES_PER_READ = 64  # log bytes a reading takes, for the look at the disk
+HELD_BLOCKS = 1000  # maximum number of blocks kept for the display before the run begins
+BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Ended:
     by : EndReason
     status : RecorderStatus
     log : LogContents
-        What was recorded, also where the log's name does not lead to it any more.
+        Contents of the log, available even if its path no longer leads to it.
     """
 
     by: EndReason
@@ -68,12 +68,12 @@ class Ended:
 
 @dataclass(frozen=True, slots=True)
 class GivenUp:
-    """What a recording gave up when the user did not wait for the disk.
+    """The state of a recording that the user ended without waiting for the disk.
 
     Parameters
     ----------
     counted : bool
-        Whether the log holds the counts.
+        Whether the log contains the counts.
     status : RecorderStatus
     """
 
@@ -88,22 +88,22 @@ class Session:
     ----------
     sensors : sequence of Sensor
     clock : Clock
-        The system's.
+        Clock of the system.
     kind : {"live", "simulated"}
     scene : mapping, optional
-        Tables, stored with the run.
+        Tables of the scene, stored with the run.
     title : str
     stops : Stops, optional
-        The user's word that the recording shall end.
+        Requests to end the recording.
 
     Attributes
     ----------
     failures : Failures
-        What failed during the recording without ending it.
+        Failures during the recording that did not end it.
     given_up : GivenUp or None
-        What the recording gave up, where the user did not wait for the disk.
+        State of the recording if the user did not wait for the disk.
     shown : LiveState or None
-        What the samples so far amount to, as far as they were shown.
+        State derived from the samples shown so far.
     """
 
     def __init__(
@@ -132,17 +132,18 @@ class Session:
         self.given_up: GivenUp | None = None
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
-        """Start reading, and return when every sensor has been heard.
+        """Start reading, and wait until every sensor has been heard.
 
         Parameters
         ----------
         say : callable
-            Takes a line after a second and a half in which a sensor was not heard.
+            Called with a line if a sensor has not been heard after 1.5 s.
 
         Raises
         ------
         ProgramError
-            With exit code 4 after three seconds: silence, or bytes of another kind (it says what they look like).
+            With exit code 4 if a sensor has not been heard after 3 s, or after five periods of a slow sensor. If other
+            bytes were received, the message describes them.
         """
         lines = [self._tee.line(channel, self.sensors) for channel in range(len(self.sensors))]
         for line in lines:
@@ -150,7 +151,7 @@ class Session:
                 line.transport.write(line.greeting)
         self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
-        # A slow sensor takes several of its periods to be distinguished from silence.
+        # A slow sensor can be distinguished from silence only after several of its periods.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
         due_ns: int | None = self._clock.now_ns() + SAY_NS
@@ -167,14 +168,14 @@ class Session:
             self._wait_until(self._clock.now_ns() + 50_000_000)
 
     def _waits_for_word(self) -> bool:
-        """Whether a sensor was not heard yet, or may still answer what it is."""
+        """Return whether a sensor has not been heard yet, or may still report its identity."""
         return any(
             count < HEARD or (count < ANSWERED and sensor.family.identify and chain.status.identity is None)
             for count, sensor, chain in zip(self._tee.readings, self.sensors, self._chains, strict=True)
         )
 
     def meet(self) -> list[str]:
-        """Keep what the sensors said that they are, take the rate that one is set to, and return lines on it."""
+        """Store the identities and rates that sensors reported, and return lines about them."""
         messages: list[str] = []
         for channel, sensor in enumerate(self.sensors):
             identity = self._chains[channel].status.identity
@@ -186,8 +187,8 @@ class Session:
         return messages
 
     def still(self, seconds: float = 3.0) -> StillPoint:
-        """Return rest position and noise of the first sensor's next seconds, the bob hanging still."""
-        self.poll(0.0)  # what came before is another rest, or none
+        """Return rest position and noise from the first sensor's next seconds, during which the bob must hang still."""
+        self.poll(0.0)  # discard earlier samples, which belong to another rest position or to a motion
         distances: list[np.ndarray[Any, Any]] = []
         end = self._clock.now_ns() + int(seconds * 1e9)
         while self._clock.now_ns() < end:
@@ -195,28 +196,28 @@ class Session:
         return from_still(np.concatenate(distances) if distances else np.empty(0))
 
     def calibrate(self, points: Sequence[StillPoint], known_m: Sequence[float], u_known_m: float) -> StillPoint:
-        """Carry still distances of the first sensor to known ones; return the last of them as it is now stated.
+        """Calibrate the first sensor with known distances; return the last still point in the new calibration.
 
-        One known distance sets the offset, two or more the scale as well.
+        One known distance sets the offset; two or more also set the scale.
         """
         before = self.sensors[0].calibration
         self.calibrated(against_ruler(tuple(points), tuple(known_m), u_known_m, before))
         return self.sensors[0].calibration.restated(points[-1], before)
 
     def calibrated(self, calibration: Calibration) -> None:
-        """State the first sensor's distances by another calibration from here on."""
+        """Use a new calibration for the first sensor's distances from now on."""
         self.sensors[0] = replace(self.sensors[0], calibration=calibration)
         self._chains[0].calibration = calibration
-        self.poll(0.0)  # what was decoded with the calibration before
+        self.poll(0.0)  # discard samples decoded with the earlier calibration
 
     def now_ns(self) -> int:
-        """Return the clock's time, ns."""
+        """Return the time of the clock in ns."""
         return self._clock.now_ns()
 
     def preview(self, log: Path) -> Recorder | None:
-        """Write what comes from here on to a log that is only looked at; None, and a failure, where none can be begun.
+        """Write further reads to a preview log; if it cannot be created, record a failure and return None.
 
-        The next preview, or the recording, takes its place.
+        The next preview, or the recording, replaces this log.
         """
         chains = [sensor.chain() for sensor in self.sensors]
         try:
@@ -229,25 +230,27 @@ class Session:
         return recorder
 
     def record(self, log: Path, limits: RunLimits, listeners: RunListeners) -> Ended:
-        """Record until the seconds are over, the user ends it or the disk takes nothing more.
+        """Record until the time is over, the user ends the recording, or the disk fails.
 
         Parameters
         ----------
         log : Path
-            The wire log to make.
+            Path of the new wire log.
         limits : RunLimits
         listeners : RunListeners
 
         Raises
         ------
         Disarmed
-            If ``listeners.changed`` said so.
+            If ``listeners.changed`` returned true during the wait for the trigger.
+        ProgramError
+            With exit code 2 if a trigger is combined with the option ``temperature_every``.
         storage.errors.WriteFailed
-            If the log cannot be begun.
+            If the log cannot be created.
         storage.wire_log.window.NotALog
-            If it cannot be read at the end.
+            If the log cannot be read at the end.
         KeyboardInterrupt
-            If the user would not wait for the disk to take what is queued; the log stays, without its end.
+            If the user did not wait until all queued data were written; the log is kept, without its end.
         """
         trigger, rest = limits.trigger, limits.rest
         if trigger is not None and any(sensor.options.get("temperature_every") for sensor in self.sensors):
@@ -258,7 +261,7 @@ class Session:
             )
         moment_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, listeners)
         since_ns = moment_ns if trigger is None else moment_ns - int(trigger.keep_s * 1e9)
-        # Chains start anew, so that indices and times count from the run's first byte as recovery will count them.
+        # New chains make indices and times count from the run's first byte, as in recovery.
         self._chains = [sensor.chain() for sensor in self.sensors]
         recorder = Recorder(log, self._header(), self._clock)
         with self.stops.counted():
@@ -272,7 +275,7 @@ class Session:
                     recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
                 if trigger is not None:
                     facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
-                    # The sample's own moment: an analysis leaves out what was still before it.
+                    # The time of the sample itself, because an analysis leaves out the rest before it.
                     recorder.event(0, moment_ns, "trigger", facts)
                 by = self._loop(recorder, display, start_ns, limits.seconds, listeners.marks)
             finally:
@@ -282,9 +285,9 @@ class Session:
                 self.failures.tell = None
             counts = self.failures.counts
             recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
-        # From here on the user may end the wait for the disk.
+        # From this point on, the user may interrupt the wait for the disk.
         try:
-            with contextlib.suppress(WriteFailed):  # it stands in the status
+            with contextlib.suppress(WriteFailed):  # the status states the error
                 recorder.close()
         except KeyboardInterrupt:
             self.given_up = GivenUp(recorder.give_up(), recorder.status)
@@ -293,7 +296,7 @@ class Session:
         return Ended(EndReason.DISK if status.error else by, status, recorder.contents())
 
     def poll(self, wait_s: float) -> list[tuple[int, Block]]:
-        """Wait so long, then return the blocks that came since the last call."""
+        """Wait for the given time, then return the blocks received since the last call."""
         self._wait_until(self._clock.now_ns() + int(wait_s * 1e9))
         return self._tee.blocks()
 
@@ -315,9 +318,9 @@ class Session:
         seconds: float | None,
         marks: queue.SimpleQueue[str] | None,
     ) -> EndReason:
-        """Wait for the end of the recording, and return its reason."""
+        """Wait for the end of the recording, and return the reason for it."""
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
-        # Without marks a turn a second will do: the samples are shown once a second, and an error of the disk stands.
+        # Without marks, one turn per second suffices: samples are shown once a second, and a disk error persists.
         wait_ns, tick_ns = int((1.0 if marks is None else LOOK_FOR_MARKS_S) * 1e9), start_ns + SECOND_NS
         self._ring(display, self._tee.blocks, start_ns, recorder, tick=False)
         while end_ns is None or self._clock.now_ns() < end_ns:
@@ -335,15 +338,15 @@ class Session:
             if turn_ns == end_ns:
                 break
             if turn_ns == tick_ns:
-                self.meet()  # one that answered late has to prove itself all the same, should its port come back
+                self.meet()  # a sensor that answers late must also prove its identity if its port comes back
                 self._ring(display, self._tee.blocks, start_ns, recorder)
                 tick_ns += SECOND_NS
-        self._tee.stop()  # what comes while the last line is shown is no part of the run
+        self._tee.stop()  # data received while the last line is shown are not part of the run
         self._ring(display, self._tee.blocks, start_ns, recorder)
         return EndReason.SECONDS
 
     def _wait_for(self, trigger: Trigger, rest: StillPoint | None, listeners: RunListeners) -> int:
-        """Wait until the bob moves; return the host's time of the first sample that shows it."""
+        """Wait until the bob moves, and return the host time of the first sample that shows the motion."""
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
         self._tee.keep()
@@ -359,7 +362,7 @@ class Session:
                 if listeners.changed():
                     self._tee.let_go()
                     raise Disarmed
-                # A second more than asked for: samples may lie a moment before they are looked at.
+                # One second more than needed, because samples may wait for a moment before they are examined.
                 self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)
                 if self._clock.now_ns() >= tick_ns:
                     self._ring(display, lambda: [seen.popleft() for _ in range(len(seen))], start_ns, None)
@@ -368,7 +371,7 @@ class Session:
             display.close()
 
     def _wait_until(self, deadline_ns: int) -> None:
-        """Wait, or let the user end it; note what the reading tripped over, if over anything."""
+        """Wait until a deadline or an interruption by the user, and record a failure of the reader, if any."""
         with self.stops.raised():
             self._clock.sleep_until_ns(deadline_ns)
         failure = None if self._reader is None else self._reader.failure

@@ -1,4 +1,4 @@
-"""The simulated bench: a bob that moves by the equation of motion of its scene, under the simulated rangefinder."""
+"""Simulate a bench: a bob that obeys the equation of motion of its scene, above a simulated rangefinder."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from pipeline.dynamics.strang import STRANG
 
 __all__ = ["REST_M", "Release", "bench_position"]
 
-REST_M = 0.25  # where the bob hangs above the sensor
-STEPS_A_RADIAN = 24  # interpolated between: 1e-8 of the amplitude
-STRETCH = 2000  # steps solved at a time, as the recording asks for them
+REST_M = 0.25  # height of the bob's rest position above the sensor, m
+STEPS_A_RADIAN = 24  # steps per radian; interpolation between them has an error of 1e-8 of the amplitude
+STRETCH = 2000  # number of steps solved at a time, when the recording needs them
 
 
 class Release:
-    """The moment in which the simulated bob is let go: once its rest has been measured.
+    """The moment at which the simulated bob is released, after its rest position has been measured.
 
     Attributes
     ----------
     at_s : float
-        In the bench's time, s; infinity before it is known.
+        Time of release on the bench's time scale, s; infinity until it is known.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -35,40 +35,41 @@ class Release:
         self._begun_ns = 0
 
     def begin(self) -> None:
-        """Take this moment for the bench's time 0."""
+        """Set the zero of the bench's time scale to the current moment."""
         self._begun_ns = self._clock.now_ns()
 
     def after(self, seconds: float) -> None:
-        """Let the bob go so long from now."""
+        """Release the bob after the given number of seconds."""
         self.at_s = (self._clock.now_ns() - self._begun_ns) * 1e-9 + seconds
 
 
 def bench_position(
     scene: Scene, seconds: float = 10.0, *, where: str = "scene", release: Release | None = None
 ) -> Callable[[float], float]:
-    """Return the bob's distance from the sensor, m, as a function of time, s.
+    """Return a function that gives the bob's distance from the sensor in m at a time in s.
 
     Parameters
     ----------
     scene : Scene
-        Bob mass, spring constant and starting displacement are needed. Where it names a disc or the air and no damping,
-        the drag is derived from them, as ``springmass simulate`` does; what else is left out is zero.
+        Bob mass, spring constant and starting displacement are required. If it names a disc or the air but no damping,
+        the drag is derived from them, as in ``springmass simulate``. All other omitted values are zero.
     seconds : float
-        How long it is recorded, s: a derived drag is that of the amplitudes within it.
+        Duration of the recording, s; a derived drag applies to the amplitudes during this time.
     where : str
-        Named in errors.
+        Name of the scene in errors.
     release : Release, optional
-        Until then the bob hangs at rest; left out, it is held at its start and let go at t = 0.
+        Moment of release, until which the bob hangs at rest. If omitted, the bob is released from its starting
+        displacement at t = 0.
 
     Raises
     ------
     SceneError
-        If the scene lacks what a motion needs.
+        If the scene lacks a value that a motion needs.
 
     Notes
     -----
-    The equation of motion of :class:`pipeline.dynamics.Equation` by Strang splitting, solved as far as it is asked
-    for.
+    The equation of motion of :class:`pipeline.dynamics.Equation` is solved by Strang splitting, only up to the latest
+    time needed.
 
     Examples
     --------

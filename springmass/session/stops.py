@@ -1,4 +1,4 @@
-"""Requests that a recording shall end: Ctrl-C, SIGTERM, a closed terminal, the page."""
+"""Requests to end a recording: Ctrl-C, SIGTERM, a closed terminal, the page."""
 
 from __future__ import annotations
 
@@ -13,37 +13,37 @@ __all__ = ["EndReason", "Stops"]
 
 
 class EndReason(enum.StrEnum):
-    """What ended a recording.
+    """The reason for the end of a recording.
 
-    The values stand in wire logs (event ``ended``) and never change.
+    The values are stored in wire logs (event ``ended``) and must never change.
     """
 
     SECONDS = "seconds"
-    """The time that was asked for is over."""
+    """The given duration is over."""
     CTRL_C = "Ctrl-C"
     SIGTERM = "SIGTERM"
     HANGUP = "a closed terminal"
     PAGE = "the page"
-    """The button or key of its page."""
+    """The button or key of the recording's page was pressed."""
     DISK = "the disk"
-    """The disk took nothing more."""
+    """Nothing more could be written to the disk."""
 
 
 SIGNALS = {"SIGINT": EndReason.CTRL_C, "SIGTERM": EndReason.SIGTERM, "SIGHUP": EndReason.HANGUP}
 
 
 class Stops:
-    """Takes the signals that end a recording; used in a ``with``.
+    """Handles the signals that end a recording; used as a context manager.
 
-    Before and after the recording a signal raises KeyboardInterrupt wherever the program is. While it records, within
-    :meth:`counted`, it only does so in a wait, within :meth:`raised`: no step is left half done.
+    Before and after the recording, a signal raises KeyboardInterrupt at any point of the program. During the recording,
+    within :meth:`counted`, it does so only in a wait, within :meth:`raised`, so that no step is left unfinished.
 
-    What was ignored before stays ignored: under ``nohup`` a recording outlives its terminal.
+    Signals that were ignored before stay ignored: under ``nohup``, a recording outlives its terminal.
 
     Attributes
     ----------
     by : EndReason or None
-        What asked first for the end; None where nothing did.
+        First reason for which the end was requested; None if there was no request.
     """
 
     def __init__(self) -> None:
@@ -52,7 +52,7 @@ class Stops:
         self._before: dict[signal.Signals, object] = {}
 
     def __enter__(self) -> Stops:
-        if threading.current_thread() is threading.main_thread():  # signals are the main thread's
+        if threading.current_thread() is threading.main_thread():  # only the main thread can handle signals
             for number in (getattr(signal, name) for name in SIGNALS if hasattr(signal, name)):
                 if signal.getsignal(number) is not signal.SIG_IGN:
                     self._before[number] = signal.signal(number, self._heard)
@@ -65,7 +65,7 @@ class Stops:
 
     @contextlib.contextmanager
     def counted(self) -> Iterator[None]:
-        """Hold signals back for the waits within."""
+        """Defer signals until the waits inside this context."""
         self._raises = False
         try:
             yield
@@ -74,7 +74,7 @@ class Stops:
 
     @contextlib.contextmanager
     def raised(self) -> Iterator[None]:
-        """Raise KeyboardInterrupt for a signal that came or comes."""
+        """Raise KeyboardInterrupt for a deferred signal, or for one that arrives in this context."""
         before, self._raises = self._raises, True
         try:
             if self.by and not before:
@@ -88,7 +88,7 @@ class Stops:
         self.by = self.by or by
         main = threading.main_thread().ident
         if hasattr(signal, "pthread_kill") and main is not None:
-            signal.pthread_kill(main, signal.SIGINT)  # wakes a wait, which a flag would not
+            signal.pthread_kill(main, signal.SIGINT)  # interrupts a wait, unlike a flag
         else:
             _thread.interrupt_main()
 

@@ -1,4 +1,4 @@
-"""When a recording starts by itself: the bob leaves its place."""
+"""Start a recording automatically when the bob leaves its rest position."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ __all__ = ["Disarmed", "Trigger", "Watch"]
 
 
 class Disarmed(Exception):
-    """Somebody would not wait for the trigger any longer."""
+    """The user stopped waiting for the trigger."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trigger:
-    """When to start recording.
+    """The condition for starting a recording.
 
     Parameters
     ----------
     threshold_m : float
         The first sensor's distance must leave its rest position by more than this, m.
     keep_s : float
-        Seconds from before that moment that belong to the run.
+        Time before that moment that is included in the run, s.
     """
 
     threshold_m: float
@@ -33,13 +33,13 @@ class Trigger:
 
 
 class Watch:
-    """Looks for the moment in the first sensor's samples.
+    """Detects the moment of the trigger in the first sensor's samples.
 
     Parameters
     ----------
     trigger : Trigger
     rest_m : float
-        What distances are measured from, m; NaN: the first one that comes.
+        Rest position, m; NaN: the first measured distance.
     """
 
     def __init__(self, trigger: Trigger, rest_m: float = math.nan) -> None:
@@ -47,7 +47,7 @@ class Watch:
         self._rest_m = rest_m
 
     def moment_ns(self, block: Block) -> int | None:
-        """Return the host's stamp of the first sample that is off its place, None where there is none."""
+        """Return the host's timestamp of the first sample beyond the threshold; None if there is no such sample."""
         known = np.isfinite(block.distance)
         if block.host_ns is None or not known.any():
             return None

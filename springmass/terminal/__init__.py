@@ -1,6 +1,6 @@
-"""What is typed at a terminal and what it is shown: arguments, tables, colour, progress, and what a pipe gets instead.
+"""Input and output at a terminal: arguments, tables, colour, progress, and the plain output for a pipe.
 
-In: numbers and findings. Out: options, text. Where standard output is no terminal it is plain ASCII in SI units, line
-by line as the reference has it; rich is imported on a terminal only. Free to change: how a terminal looks; what a pipe
-gets stays.
+In: numbers and findings. Out: options and text. If standard output is not a terminal, the text is plain ASCII in SI
+units, exactly as described in the reference; rich is imported only for a terminal. Free to change: the appearance on a
+terminal. The output to a pipe must not change.
 """

@@ -1,4 +1,4 @@
-"""Questions about the bench at the terminal: masses and the disc, each with its unit and uncertainty."""
+"""Ask about the bench at the terminal: masses and disc diameter, each with unit and uncertainty."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _ANSWER = re.compile(
 
 
 def ask_for_bench(scene: Scene, name: str) -> dict[tuple[str, str], dict[str, float]]:
-    """Ask on stderr for what a scene does not state, and return the answers by table and key of the scene.
+    """Ask on stderr for values missing from a scene, and return the answers by table and key of the scene.
 
     Parameters
     ----------
     scene : Scene
-        What is known already.
+        Values that are already known.
     name : str
-        Of the recording.
+        Name of the recording.
 
     Raises
     ------
@@ -72,12 +72,14 @@ def ask_for_bench(scene: Scene, name: str) -> dict[tuple[str, str], dict[str, fl
 
 
 def quantity_of(text: str, units: dict[str, float]) -> tuple[float, float]:
-    """Return value and standard uncertainty of what was typed, in SI; the first of ``units`` where none was typed.
+    """Return value and standard uncertainty of a typed quantity, in SI units.
+
+    If no unit was typed, the first of ``units`` applies.
 
     Raises
     ------
     ValueError
-        If it is not a positive number with one of the units.
+        If the text is not a positive number with one of the units.
 
     Examples
     --------

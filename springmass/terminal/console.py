@@ -1,8 +1,8 @@
-"""Lines for people on stderr, and progress rewritten in place, written by a separate thread.
+"""Write messages and progress rewritten in place to stderr, from a separate thread.
 
 A write to stderr may block or fail: a pipe is full, its reader has gone, a terminal hangs or was closed, a disk is
-full. So other threads put their lines into a queue and go on, and only this thread waits for a reader. Failed writes
-are counted, and the end waits at most a second for the thread.
+full. Other threads therefore put their lines into a queue and continue, and only this thread waits for a reader. Failed
+writes are counted, and the end waits at most a second for the thread.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
 __all__ = ["Console"]
 
 PATIENCE_S = 1.0
-"""So long the end waits for a reader of what is not written yet."""
+"""Maximum time that the end waits for pending lines to be written, s."""
 
 
 class Console:
-    """Writes to stderr without making anybody wait; used in a ``with``.
+    """Writes to stderr without blocking its callers; used as a context manager.
 
     Parameters
     ----------
     failed : callable
-        Takes what a write raised, or a TimeoutError where one does not end. Any thread may call it.
+        Called from any thread with the exception of a write, or with a TimeoutError if a write does not end.
     stream : text stream, optional
-        Left out, ``sys.stderr``.
+        Stream to write to; if omitted, ``sys.stderr``.
     """
 
     def __init__(self, failed: Callable[[BaseException], None], stream: TextIO | None = None) -> None:
@@ -42,7 +42,7 @@ class Console:
         self._stream = _duplicate(self._given)
         self._live: Live | None = None
         self._lines: Sequence[str] = ()
-        self._drawing = False  # whether a step that draws the latest lines is in the queue
+        self._drawing = False  # whether the queue contains a step that draws the latest lines
         self._steps: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="springmass-console", daemon=True)
         try:
@@ -58,7 +58,7 @@ class Console:
 
     @property
     def terminal(self) -> bool:
-        """Whether it is a terminal."""
+        """Whether the stream is a terminal."""
         try:
             return self._stream is not None and self._stream.isatty()
         except (OSError, ValueError):
@@ -66,37 +66,37 @@ class Console:
 
     @property
     def columns(self) -> int:
-        """How wide the terminal is now."""
+        """Current width of the terminal, columns."""
         try:
             return max(os.get_terminal_size(self._stream.fileno()).columns, 1) if self._stream is not None else 80
         except (OSError, ValueError, AttributeError):
             return 80
 
     def line(self, text: str) -> None:
-        """Write a line, also if a file's name breaks over several; control characters in it become visible."""
+        """Write text as one line, with line breaks joined and control characters made visible."""
         line = visible(" ".join(text.splitlines()))
         self._steps.put(lambda: self._write(line))
 
     def draw(self, lines: Sequence[str]) -> None:
-        """Draw lines on the terminal over those drawn before; where it is slow, only the latest."""
+        """Draw lines on the terminal over the earlier ones; a slow terminal gets only the latest lines."""
         self._lines = [visible(line) for line in lines]
         if not self._drawing:
             self._drawing = True
             self._steps.put(self._draw)
 
     def settle(self) -> None:
-        """Leave the lines that were drawn where they are, and give the cursor back."""
+        """Leave the drawn lines in place, and restore the cursor."""
         self._steps.put(self._settle)
 
     def wait(self, seconds: float) -> None:
-        """Return when all is written; after the time given it is a failure that it is not."""
+        """Wait until all lines are written; report a failure if this takes longer than the given time."""
         written = threading.Event()
         self._steps.put(written.set)
         if not written.wait(seconds):
             self._failed(TimeoutError("nobody reads stderr"))
 
     def close(self) -> None:
-        """Return when all is written, or after a second; what is not written by then is left out."""
+        """Wait until all lines are written, at most a second; lines not written by then are lost."""
         if self._thread.ident is None:
             return
         self._steps.put(self._settle)
@@ -114,7 +114,7 @@ class Console:
     def _attempt(self, step: Callable[[], None]) -> None:
         try:
             step()
-        except BaseException as error:  # whatever it is, it is no reason to say nothing more
+        except BaseException as error:  # no error may prevent later lines
             self._failed(error)
 
     def _write(self, line: str) -> None:
@@ -139,7 +139,7 @@ class Console:
         from rich.live import Live
 
         rich = console.Console(file=self._stream, force_terminal=True)
-        # The other streams are not redirected: nothing else may come to wait for this terminal.
+        # The other streams are not redirected, so that nothing else has to wait for this terminal.
         live = Live(console=rich, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
         live.start()
         return live
@@ -151,10 +151,10 @@ class Console:
 
 
 def _duplicate(stream: TextIO | None) -> TextIO | None:
-    """Return a stream of one's own to the same place: Python waits at its end for a thread that writes to stderr."""
+    """Return a duplicate of a stream, because Python would wait at exit for a thread that writes to stderr itself."""
     if stream is None:
         return None
     try:
         return open(os.dup(stream.fileno()), "w", encoding=stream.encoding, errors="backslashreplace", buffering=1)
-    except (OSError, ValueError, AttributeError):  # of a test or a notebook, which has no descriptor
+    except (OSError, ValueError, AttributeError):  # a stream without a descriptor, as in a test or a notebook
         return stream

@@ -1,4 +1,4 @@
-"""Keys that put marks into a recording: the space bar alone, or a word with Enter."""
+"""Put marks into a recording by keys: the space bar alone, or text with Enter."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 try:
     import termios
     import tty
-except ImportError:  # Windows: a line with Enter is a mark there
+except ImportError:  # on Windows, only a line with Enter is a mark
     termios = None  # type: ignore[assignment]
 
 __all__ = ["Marks", "marks_by_keys"]
@@ -24,17 +24,17 @@ Marks = queue.SimpleQueue[str]
 
 @contextlib.contextmanager
 def marks_by_keys(*, watched: bool) -> Iterator[Marks | None]:
-    """Give the marks that are typed while a recording runs; None where nobody can type.
+    """Yield the queue of marks typed during a recording; None if nothing can be typed.
 
     Parameters
     ----------
     watched : bool
-        Whether a terminal shows what is typed. Else lines are marks, as the terminal itself hands them over.
+        Whether stderr is a terminal, on which keys are read singly. Otherwise, each line with Enter is a mark.
 
     Notes
     -----
-    Ctrl-C and Ctrl-Z stay the terminal's. A program in the background leaves the terminal alone: to touch it would
-    stop the program.
+    The terminal still handles Ctrl-C and Ctrl-Z. A program in the background does not access the terminal, because this
+    would stop the program.
     """
     descriptor = _foreground()
     if descriptor is None:
@@ -53,7 +53,7 @@ def marks_by_keys(*, watched: bool) -> Iterator[Marks | None]:
         thread.start()
         yield marks
     finally:
-        with contextlib.suppress(termios.error):  # a terminal that was closed has no modes any more
+        with contextlib.suppress(termios.error):  # a closed terminal has no modes
             termios.tcsetattr(descriptor, termios.TCSANOW, before)
         os.close(end)
         if thread.ident is not None:
@@ -62,14 +62,14 @@ def marks_by_keys(*, watched: bool) -> Iterator[Marks | None]:
 
 
 def _foreground() -> int | None:
-    """Return the descriptor of standard input where it is a terminal that this program may read."""
+    """Return the descriptor of standard input if it is a terminal that this program may read, else None."""
     try:
         if sys.stdin is None or not sys.stdin.isatty():
             return None
         descriptor = sys.stdin.fileno()
         if termios is not None and os.tcgetpgrp(descriptor) != os.getpgrp():
             return None
-    except (OSError, ValueError):  # closed, or the terminal of another session
+    except (OSError, ValueError):  # standard input is closed, or is the terminal of another session
         return None
     return descriptor
 
@@ -81,7 +81,7 @@ def _lines(marks: Marks) -> None:
 
 
 def _keys(descriptor: int, wake: int, marks: Marks) -> None:
-    """Read keys until the other end of ``wake`` closes: text up to Enter is a mark, a space before any text too."""
+    """Read keys until the other end of ``wake`` closes; text up to Enter is a mark, as is a space before any text."""
     typed = b""
     with contextlib.suppress(OSError):  # a terminal that was closed: no more marks come
         while wake not in select.select([descriptor, wake], [], [])[0]:

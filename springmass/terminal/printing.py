@@ -1,4 +1,4 @@
-"""Words for the terminal: findings, a comparison, the classic method's numbers, wrapped to its width."""
+"""Format findings, comparisons and the classic method's numbers as text wrapped to the terminal's width."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ __all__ = [
 ]
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
-NAMED = 5  # runs that a line names
-FIRST = 3  # warnings that are shown without --full
-NARROW = 80  # columns that warnings are wrapped to at most
+NAMED = 5  # maximum number of runs that a line names
+FIRST = 3  # number of warnings shown without --full
+NARROW = 80  # maximum width of wrapped warnings, columns
 WARNING_LINES = 3
 
 
 def findings_text(
     findings: Sequence[Mapping[str, Any]], written: Callable[[str], str] = str, *, full: bool = False
 ) -> str:
-    """Return findings as wrapped lines, the most harmful first, each with its severity, its code and what to do.
+    """Return findings as wrapped lines, the most harmful first, each with severity, code, message and advice.
 
     Parameters
     ----------
     findings : sequence of mapping
-        As in the result's JSON: code, severity, message, advice.
+        Findings as in the result's JSON: code, severity, message, advice.
     written : callable
-        How a message is written on this terminal.
+        Converts a message to the characters of this terminal.
     full : bool
-        Whether to show every warning and every note; else all errors and the first three warnings.
+        Whether to show every warning and note; otherwise all errors and the first three warnings are shown.
     """
     from springmass.report.advice import STANDING, by_harm
 
@@ -66,7 +66,7 @@ def findings_text(
 
 
 def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> str:
-    """Return severity, code, message and advice in at most three lines; an error's lines are never cut."""
+    """Return severity, code, message and advice in at most three lines, but an error in full."""
     severity, advice = finding["severity"], finding.get("advice", "")
     message = written(finding["message"])
     if advice and severity != "info":
@@ -79,14 +79,14 @@ def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> 
 
 
 def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], written: Callable[[str], str] = str) -> str:
-    """Return the warnings of several runs, one paragraph per code, and the number of notes.
+    """Return the errors and warnings of several runs, one paragraph per code, and the number of notes.
 
     Parameters
     ----------
     runs : mapping
-        By name of the run, its findings as in the result's JSON.
+        Findings as in the result's JSON, by name of the run.
     written : callable
-        How a message is written on this terminal.
+        Converts a message to the characters of this terminal.
     """
     grave: dict[str, dict[str, Mapping[str, Any]]] = {}
     notes = 0
@@ -107,27 +107,27 @@ def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], writte
 
 
 def classic_text(classic: Classic) -> str:
-    """Return the report's own numbers, marked as what they are."""
+    """Return the results of the lab report's own method, marked as such."""
     lines = ["By the report's own method (biased, for comparison only):"]
     lines += [f"  {name.replace('_', ' '):<22} {estimate}" for name, estimate in classic.estimates.items()]
     return "\n".join([*lines, f"  {'chi-square of its fit':<22} {classic.chi2:.4g}"])
 
 
 def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str:
-    """Return a comparison as an aligned table in ASCII, and what it says in words.
+    """Return a comparison as an aligned ASCII table, followed by its message.
 
     Parameters
     ----------
     comparison : Comparison
     analyses : sequence of Analysis
-        Of its runs, in their order.
+        Analyses of the compared runs, in the same order.
     """
     rows = [("run", "period", "mass that swings", "spring constant", "residual / u")]
     for name, analysis, k, pull in zip(comparison.names, analyses, comparison.each, comparison.pulls, strict=True):
         mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Oscillation) else None
         period = str(analysis.estimates["period"])
         rows.append((visible(name).encode("ascii", "replace").decode(), period, str(mass), str(k), f"{pull:+.1f}"))
-    # Of constants that disagree there is no mean to give.
+    # Constants that disagree have no meaningful mean.
     mean = str(comparison.spring_constant) if comparison.agree else "none"
     rows.append(("together", "", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))
     widths = [max(len(row[i]) for row in rows) for i in range(5)]
@@ -137,17 +137,17 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str
 
 
 def wrapped(text: str, indent: str = "", columns: int = 100) -> str:
-    """Return text wrapped to the terminal, at most so many columns, lines after the first indented."""
+    """Return text wrapped to the terminal or to ``columns``, with all lines after the first indented."""
     width = min(shutil.get_terminal_size((columns, 24)).columns, columns)
     shown = visible(" ".join(text.splitlines()))
     return textwrap.fill(shown, width, subsequent_indent=indent, break_on_hyphens=False)
 
 
 def fitted(text: str, width: int) -> str:
-    """Return lines broken between words where they are wider than a terminal."""
+    """Return text with lines wider than a terminal broken between words."""
     return "\n".join(textwrap.fill(line, width, subsequent_indent="    ") for line in text.splitlines())
 
 
 def visible_lines(text: str) -> str:
-    """Return text from outside with its control characters visible, lines kept."""
+    """Return external text with control characters made visible and line breaks kept."""
     return "\n".join(map(visible, text.splitlines()))

@@ -1,4 +1,4 @@
-"""How far a long task is: on a terminal a bar on stderr that is gone at its end, elsewhere a line if asked for."""
+"""Show the progress of a long task on stderr: a temporary bar on a terminal, elsewhere optional lines."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ if TYPE_CHECKING:
 __all__ = ["TaskProgress", "counted"]
 
 EVERY_S = 10.0
-"""Between two lines where no terminal shows a bar."""
+"""Time between two progress lines if no terminal shows a bar, s."""
 
 Item = TypeVar("Item")
 
 
 class TaskProgress:
-    """Shows how many of how many are done and how long the others take; used in a ``with``.
+    """Shows the number of finished items and the time left; used as a context manager.
 
     Parameters
     ----------
     what : str
-        Plural noun of what is counted: ``"runs"``, ``"reports"``.
+        Plural noun of the items, for example ``"runs"`` or ``"reports"``.
     total : int, optional
-        How many there are, where that is known before the first.
+        Number of items, if it is known from the start.
     lines : bool
-        Whether to write a line every ten seconds where no terminal shows the bar.
+        Whether to write a line every ten seconds if no terminal shows the bar.
     quiet : bool
         Whether to show nothing.
     seconds : callable
-        Of a clock that runs on, s.
+        Returns the time of a monotonic clock, s.
 
     Notes
     -----
-    A line reads ``reports 12/300, 40 s left``. The time left takes the others to be as quick as those done on average.
+    A line reads ``reports 12/300, 40 s left``. The time left is estimated from the average time per finished item.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class TaskProgress:
             self._bar.stop()
 
     def update(self, done: int, total: int | None = None) -> None:
-        """Show that so many are done, of so many where their number has changed."""
+        """Show the number of finished items, and set the total if it is given."""
         self._total = self._total if total is None else total
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=self._total)
@@ -86,7 +86,7 @@ class TaskProgress:
 
 
 def counted(items: Iterable[Item], total: int, what: str, *, quiet: bool = False) -> Iterator[Item]:
-    """Yield items, and show on a terminal how many of them are done; of a single one nothing."""
+    """Yield items, and show on a terminal how many are done if there are at least two."""
     with TaskProgress(what, total, quiet=quiet or total < 2) as progress:
         for done, item in enumerate(items, 1):
             yield item

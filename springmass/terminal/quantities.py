@@ -1,4 +1,4 @@
-"""Quantities as a person reads them: a prefix that leaves few zeros, ± or the digits in parentheses."""
+"""Format quantities for readers: a prefix that leaves few zeros, with ± or digits in parentheses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["concise", "shown"]
 
 
 def shown(estimate: Estimate | None, style: TerminalStyle) -> str:
-    """Return an estimate for a stream: plain SI for a pipe, with prefix and ± where the terminal can."""
+    """Return an estimate as text: plain SI for a pipe, with prefix and ± if the terminal supports it."""
     if estimate is None:
         return "-"
     chosen = estimate if style.si else prefixed(estimate)
@@ -23,7 +23,7 @@ def shown(estimate: Estimate | None, style: TerminalStyle) -> str:
 
 
 def concise(estimate: Estimate | None, style: TerminalStyle) -> str:
-    """Return an estimate with its uncertainty as digits in parentheses, where many stand side by side.
+    """Return an estimate with its uncertainty as digits in parentheses, for many estimates side by side.
 
     Examples
     --------

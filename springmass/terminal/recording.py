@@ -1,4 +1,4 @@
-"""What a recording shows on stderr: on a terminal a few lines in place, elsewhere a line now and then."""
+"""Show a recording on stderr: a few lines rewritten in place on a terminal, occasional lines elsewhere."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from springmass.terminal.trace import trace_of
 
 __all__ = ["END_WORDS", "ProgressLine", "line_of", "trust_in"]
 
-# Off a terminal one line of so many is printed: working out the motion for each is a tenth of what recording costs.
+# Without a terminal, one of this many lines is printed: the motion for each would add a tenth to the recording's cost.
 UNWATCHED_LINES = 30
-PATIENCE_S = 0.5  # what is shown and not taken within it has no reader, and the run says so
-SILENT_S = 1.5  # of a sensor, said in the progress line
+PATIENCE_S = 0.5  # output not written within this time has no reader, which is noted in the run
+SILENT_S = 1.5  # silence of a sensor that the progress line reports
 FIRST_MOTION_S = 1.5
 SHOWN_PERIODS, SHOWN_S = 4.0, 4.0
 KEYS = "space marks, Ctrl-C stops"
@@ -27,21 +27,21 @@ END_WORDS = {
     EndReason.PAGE: "its page",
     EndReason.DISK: "the disk",
 }
-"""What ended a recording, for people: "stopped by ..."."""
+"""Words for the end of a recording, after "stopped by"."""
 
 
 class ProgressLine:
-    """The progress on stderr: rewritten in place on a terminal; elsewhere after 1, 10, 40, 70 s and so on.
+    """Shows the progress on stderr: rewritten in place on a terminal, elsewhere after 1, 10, 40, 70 s and so on.
 
     Parameters
     ----------
     console : Console
     style : TerminalStyle
-        Of stderr; its width is asked for anew at every turn.
+        Style of stderr; the current width is determined at every update.
     trace : bool
-        Whether the latest periods are drawn, where the terminal has braille.
+        Whether to draw the latest periods if the terminal supports Unicode.
     keys : bool
-        Whether somebody can type marks.
+        Whether marks can be typed.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class ProgressLine:
         self._trouble: TroubleKind | None = None
 
     def __call__(self, progress: Progress) -> None:
-        """Show where the recording stands."""
+        """Show the progress of the recording."""
         if progress.tick:
             self._shown += 1
         if self._style.terminal:
@@ -71,11 +71,11 @@ class ProgressLine:
         self._trouble = None if trouble is None else trouble.kind
 
     def end(self) -> None:
-        """Leave the lines where they are."""
+        """Leave the lines in place."""
         self._console.settle()
 
     def _lines(self, progress: Progress) -> list[str]:
-        # The first analysis loads what it needs: troubles and keys do not wait for that.
+        # The first analysis loads its libraries; troubles and keys are shown without waiting for this.
         found = progress.motion() if progress.seconds >= FIRST_MOTION_S else NotYet("listening")
         lines = [_head(progress, found, self._style, self._console.columns - 1)]
         if troubles := _troubles(progress):
@@ -92,18 +92,19 @@ class ProgressLine:
 
 
 def trust_in(found: LiveMotion, missing_share: float) -> str:
-    """Return how far what is shown can be trusted: good, fair or poor.
+    """Return how reliable the displayed motion is: good, fair or poor.
 
     Parameters
     ----------
     found : LiveMotion
     missing_share : float
-        Of the readings of the last second.
+        Fraction of missing values in the latest readings.
 
     Notes
     -----
-    Good: the period to a thousandth, the amplitude to a fiftieth, and at most a twentieth of the readings missing.
-    Fair: ten times that for period and amplitude, and a third of the readings. Else poor.
+    Good: the relative uncertainty is at most 1/1000 for the period and 1/50 for the amplitude, and at most 1/20 of the
+    readings are missing. Fair: these uncertainties are at most ten times as large, and at most 1/3 of the readings are
+    missing. Otherwise poor.
     """
     period, amplitude = found.period, found.amplitude
     off = max(period.u / period.value / 1e-3, amplitude.u / max(abs(amplitude.value), 1e-12) / 2e-2)
@@ -113,7 +114,7 @@ def trust_in(found: LiveMotion, missing_share: float) -> str:
 
 
 def _head(progress: Progress, found: LiveMotion | NotYet, style: TerminalStyle, width: int) -> str:
-    """As much as fits of: time, motion and trust in it, rate, what is missing, what is safe on the disk."""
+    """Return as many parts as fit: time, motion and its reliability, rate, missing values, bytes safe on disk."""
     parts = ["waiting for the bob" if progress.waiting else f"{progress.seconds:.0f} s"]
     if isinstance(found, LiveMotion):
         parts += [f"T {concise(found.period, style)}", f"A {concise(found.amplitude, style)}"]
@@ -132,7 +133,7 @@ def _head(progress: Progress, found: LiveMotion | NotYet, style: TerminalStyle, 
 
 
 def _troubles(progress: Progress) -> list[str]:
-    """What is wrong at this moment, what to check with it."""
+    """Return the current troubles, with what to check."""
     parts = list(progress.gone)
     if not progress.gone and progress.silent_s > SILENT_S:
         parts.append(f"no reading for {progress.silent_s:.0f} s: check power, wiring and baud rate")
@@ -150,7 +151,7 @@ def _worded(trouble: Trouble) -> str:
 
 
 def line_of(progress: Progress) -> str:
-    """Return a progress line: time, period, amplitude, rate, drop-outs, what is safe on the disk, what is wrong."""
+    """Return a progress line: time, period, amplitude, rate, missing values, bytes safe on disk, troubles."""
     state = "waiting for the bob" if progress.waiting else f"{progress.seconds:6.0f} s"
     found = progress.motion()
     motion = f"T {found.period}, A {found.amplitude}" if isinstance(found, LiveMotion) else found.why

@@ -1,4 +1,4 @@
-"""What a stream can show: a terminal or a pipe, its characters, its width."""
+"""Determine the capabilities of a stream: terminal or pipe, characters, width."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ PROBE = "±−·⁻⁰¹²³⁴⁵⁶⁷⁸⁹µ"
 
 @dataclass(frozen=True, slots=True)
 class TerminalStyle:
-    """How text is shown on a stream.
+    """The style of text on a stream.
 
     Parameters
     ----------
     terminal : bool
-        Whether somebody watches: colour, lines rewritten in place.
+        Whether the stream is a terminal, with colour and lines rewritten in place.
     unicode : bool
-        Whether it is a terminal that has ± and superscripts.
+        Whether the stream is a terminal that can show ± and superscripts.
     si : bool
-        Whether quantities stay in SI units without prefixes.
+        Whether quantities are in SI units without prefixes.
     width : int
-        Columns.
+        Width in columns.
     """
 
     terminal: bool = False
@@ -39,13 +39,13 @@ PLAIN = TerminalStyle()
 
 
 def style_of(stream: TextIO, *, si: bool = False) -> TerminalStyle:
-    """Return what a stream can show; a pipe, a file and a terminal without a cursor get ASCII with the same numbers.
+    """Return the style of a stream; a pipe, a file or a terminal without a movable cursor gets plain ASCII.
 
     Parameters
     ----------
     stream : text stream
     si : bool
-        As asked for on the command line.
+        Whether the command line requests SI units without prefixes.
     """
     if not watched(stream):
         return TerminalStyle(si=si)
@@ -58,7 +58,7 @@ def style_of(stream: TextIO, *, si: bool = False) -> TerminalStyle:
 
 
 def watched(stream: TextIO | None) -> bool:
-    """Tell whether a stream is a terminal that can move its cursor."""
+    """Return whether a stream is a terminal that can move its cursor."""
     try:
         return (
             stream is not None

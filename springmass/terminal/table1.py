@@ -1,4 +1,4 @@
-"""Table 1 for a terminal or a pipe."""
+"""Format Table 1 for a terminal or a pipe."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ from springmass.terminal.style import PLAIN, TerminalStyle
 
 __all__ = ["text_table"]
 
-NARROWEST = 24  # columns for the names of quantities, which wrap
+NARROWEST = 24  # minimum width of the column for the names of quantities, which wrap
 
 
 def text_table(
     names: Sequence[str], runs: Sequence[Analysis | Mapping[TableKey, Estimate]], style: TerminalStyle = PLAIN
 ) -> str:
-    """Return Table 1, aligned; runs that do not fit side by side follow in a further block.
+    """Return Table 1 in aligned columns; runs that do not fit side by side follow in another block.
 
     Parameters
     ----------
     names : sequence of str
-        Of the runs; shortened where they are wider than their column.
-    runs : sequence of Analysis, or of what :func:`springmass.report.tables.table_estimates` kept of one
+        Names of the runs, shortened if they are wider than their column.
+    runs : sequence of Analysis or of mapping
+        Analyses, or their estimates from :func:`springmass.report.tables.table_estimates`.
     style : TerminalStyle
-        Of the stream. For a pipe it is ASCII; on a terminal it has rules and ±. Runs that do not
-        fit side by side have the digits of u in parentheses.
+        Style of the stream. A pipe gets ASCII; a terminal gets rules and ±. If the runs do not fit side by side, the
+        uncertainty is given as digits in parentheses.
 
     Examples
     --------
@@ -58,7 +59,7 @@ def text_table(
         if together >= len(names):
             break
     else:
-        # Long names of quantities wrap, if that lets all runs stand side by side.
+        # Long names of quantities wrap if all runs then fit side by side.
         wrapped = style.width - middle + 3 - len(names) * (widest + 3)
         if wrapped >= NARROWEST:
             left, together = wrapped, len(names)
@@ -85,7 +86,7 @@ def _plain(
 
 
 def _drawn(rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Sequence[str]], style: TerminalStyle) -> str:
-    """Draw it by rich, in colour unless NO_COLOR says otherwise."""
+    """Return the table drawn by rich, in colour unless NO_COLOR is set."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -94,7 +95,7 @@ def _drawn(rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Seque
     table = Table(
         box=box.SIMPLE_HEAD if style.unicode else box.ASCII2, pad_edge=False, show_edge=False, header_style="bold"
     )
-    table.add_column("quantity")  # on a narrow terminal the law by which it is stated wraps
+    table.add_column("quantity")  # on a narrow terminal, the name of the damping law wraps
     table.add_column("", style="dim", no_wrap=True)
     for head in heads:
         table.add_column(Text(head), no_wrap=True)
@@ -112,12 +113,12 @@ def _line(quantity: str, symbol: str, cells: Sequence[str], left: int, middle: i
 
 
 def _noted(row: TableRow, width: int) -> str:
-    """Return why a row has no values, as far as its column is wide."""
+    """Return the reason why a row has no values, shortened if it does not fit the column."""
     return row.note if len(row.note) <= width else "no mass"
 
 
 def _shortened(name: str, width: int) -> str:
-    # Names of one experiment differ at their ends as often as at their beginnings: keep both.
+    # Names of one experiment differ at the end as often as at the beginning, so both are kept.
     return name if len(name) <= width else f"{name[: width // 2 - 1]}..{name[len(name) - (width - width // 2 - 1) :]}"
 
 

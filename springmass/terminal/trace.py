@@ -1,4 +1,4 @@
-"""The latest seconds of a motion in a few lines of braille: two dots across and four down in each character."""
+"""Draw the last seconds of a motion in a few lines of braille, with two by four dots per character."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ __all__ = ["ROWS", "trace_of"]
 
 ROWS = 4
 LABEL = 10
-_DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])  # Unicode, block 2800
+_DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])  # dot bits, added to U+2800
 
 
 def trace_of(t: F8, y: F8, columns: int, seconds: float) -> list[str]:
-    """Return ROWS lines that show the last seconds, their highest and lowest distance at the right.
+    """Return ROWS lines that show the last seconds, with the limits of the distance scale at the right.
 
     Parameters
     ----------
-    t, y : (n,) float64, s, m
-        NaN where unmeasured, which leaves a hole.
+    t, y : (n,) float64
+        Times in s and distances in m. An unmeasured distance is NaN and leaves a gap.
     columns : int
-        Width of the lines with their labels.
+        Width of the lines including their labels.
     seconds : float
-        How much to show.
+        Duration to show, s.
 
     Notes
     -----
-    The scale is that of the middle 96 % of the distances: a false echo does not flatten the motion, it stands at the
-    edge. Samples are dots, nothing is drawn between them.
+    The scale covers the middle 96 % of the distances, so a false echo does not flatten the motion but is drawn at the
+    edge. Samples are dots without lines between them.
     """
     wide = columns - LABEL
     known = np.isfinite(y) & (t > t[-1] - seconds) if t.size else np.zeros(0, bool)

@@ -1,4 +1,4 @@
-"""What is wrong with a command line, in one line of ours: worded from the fields of the parser's errors."""
+"""Describe errors in a command line in one line, worded from the fields of the parser's errors."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ ROOT_OPTIONS = ("--help", "--version", "--completion", "--quiet", "--verbose")
 
 
 def worded(error: CycloptsError, commands: Iterable[str]) -> str:
-    """Return what is wrong with a command line and what to do.
+    """Return a description of an error in a command line, with a remedy.
 
     Parameters
     ----------
     error : CycloptsError
     commands : iterable of str
-        The names of all commands, for the nearest one.
+        Names of all commands, from which the closest is suggested.
     """
     called = " ".join(("springmass", *(error.command_chain or ())))
     what = _what(error, called, commands)
@@ -68,7 +68,7 @@ def _what(error: CycloptsError, called: str, commands: Iterable[str]) -> str:
 
 
 def _name(argument: Argument) -> str:
-    """Return an option as it was typed, or the name of an argument."""
+    """Return an option as typed, or the name of an argument."""
     return next((token.keyword for token in argument.tokens if token.keyword), argument.name)
 
 
@@ -80,7 +80,7 @@ def _demand(error: CoercionError, argument: Argument) -> str:
     if choices := argument.get_choices(force=True):
         return f"must be one of {', '.join(choices)}"
     if isinstance(error.__cause__, ValueError) and error.msg is not None:
-        return str(error.msg)  # of a converter of ours
+        return str(error.msg)  # the message of one of this program's converters
     return "must be a whole number" if error.target_type is int else "must be a number"
 
 

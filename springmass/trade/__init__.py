@@ -1,5 +1,6 @@
-"""What accuracy costs: ways to evaluate a record, and to solve a motion, by their error and their time.
+"""The cost of accuracy: error and time of methods that evaluate a record, and of methods that solve a motion.
 
-In: a truth to simulate, or a track, and methods. Out: errors and times as tables, JSON and figures. Free to change:
-kinds of hostile records (``truth.HOSTILE``) and reference methods (``methods.methods``), one entry each.
+In: methods, and either true values to simulate or a track. Out: errors and times as tables, JSON and figures. Free to
+change: kinds of hostile records (``truth.HOSTILE``) and reference methods (``methods.references``), each of which is
+one entry.
 """

@@ -1,4 +1,4 @@
-"""Error against time: of methods on simulated records, and of integrators on scenes."""
+"""Plots of error against time for methods on simulated records and for integrators on scenes."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ __all__ = ["front", "integrators_figure", "trade_figure"]
 LABELS = {"frequency": "frequency", "amplitude": "amplitude", "damping_rate": "damping"}
 MARKERS = "oDsx^vP*+"
 SMALLEST = 1e-15
-"""Smaller errors are drawn there: double precision knows none, and a logarithmic axis has no zero."""
+"""Smaller errors are drawn at this value: double precision cannot resolve them, and a logarithmic axis has no zero."""
 
 
 def trade_figure(trade: Trade) -> Figure:
-    """Draw one panel per quantity: error over the bound against time, the Pareto front and the bound."""
+    """Draw one panel per quantity with the error over the bound against time, the Pareto front and the bound."""
     with style():
         figure, axes = _panels(len(trade.bound), "time for one record / ms")
         for axis, quantity in zip(axes, trade.bound, strict=True):
@@ -40,7 +40,7 @@ def trade_figure(trade: Trade) -> Figure:
 
 
 def front(rows: Sequence[Row], quantity: str) -> list[Row]:
-    """Return the methods that none beats in both time and error, quickest first; errors within 1 % are equal."""
+    """Return the methods on the Pareto front of time and error, quickest first; errors within 1 % count as equal."""
     edge: list[Row] = []
     for row in sorted((row for row in rows if quantity in row.error), key=lambda row: row.seconds):
         if not edge or row.error[quantity] * (1.0 + EQUAL) < edge[-1].error[quantity]:
@@ -49,7 +49,7 @@ def front(rows: Sequence[Row], quantity: str) -> list[Row]:
 
 
 def integrators_figure(rows: Sequence[Work], label: str = "time for 120 s at 100 Hz / ms") -> Figure:
-    """Draw a panel a scene: error against time of every integrator, and a ring around what auto takes."""
+    """Draw one panel per scene: error against time of every integrator, with a ring around each choice of auto."""
     scenes, names = (list(dict.fromkeys(getattr(row, key) for row in rows)) for key in ("scene", "method"))
     with style():
         figure, axes = _panels(len(scenes), label)
@@ -71,7 +71,7 @@ def _curve(rows: Sequence[Work]) -> tuple[list[float], list[float]]:
 
 
 def _panels(count: int, label: str) -> tuple[Figure, list[Axes]]:
-    """Make panels with logarithmic axes, one above the other, that share the axis of time."""
+    """Make panels, one above the other, with logarithmic axes and a shared time axis."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 0.9 + 2.3 * count), layout="constrained")

@@ -1,7 +1,8 @@
 """The cost of a trajectory: error and time of every integrator on this machine, and the time of ``auto``.
 
-Each time is the least of several runs; that of ``auto`` includes all halvings. Errors are against DOP853 at a relative
-tolerance of 1e-13, with friction against Strang splitting in a quarter of the shortest step that is measured.
+Each time is the minimum of several runs; the time of ``auto`` includes all halvings. Errors are measured against DOP853
+at a relative tolerance of 1e-13, or with friction against Strang splitting with a quarter of the shortest measured
+step.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ ROUNDS = 3
 PARTS = (1, 2, 4, 8, 16)
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 RTOLS = (1e-6, 1e-9, 1e-12)
-LONG_RADIANS, LONG_S = 2e4, 1.0  # of a run that adaptive methods are not put to; of one that is run once
-DIVERGED = 1e3  # times the amplitude: what has grown so far is no solution
+LONG_RADIANS, LONG_S = 2e4, 1.0  # maximum phase for adaptive methods, rad; maximum time of a repeated run, s
+DIVERGED = 1e3  # error over the amplitude above which a solution counts as diverged
 SCENES = {
     "linear": Equation.from_laws(8.66, gamma_per_s=0.0073),
     "mixed drag": Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235),
@@ -51,13 +52,13 @@ class Work:
     scene : str
     method : str
     setting : str
-        Its step or its tolerance.
+        Step or tolerance of the method, in words.
     error : float
-        Largest, over the amplitude.
+        Maximum error, divided by the amplitude.
     seconds : float
-        Least time of the run, s.
+        Minimum time of the run, s.
     tolerance : float or None
-        For which ``auto`` took it; None where it was not asked.
+        Tolerance for which ``auto`` chose this method; None if the row is not of ``auto``.
     """
 
     scene: str
@@ -91,24 +92,24 @@ def measure_scene(
     Parameters
     ----------
     name : str
-        Of the scene.
+        Name of the scene.
     problem : Problem
     spacing_s, count
-        Of the samples.
+        Spacing of the samples, s, and their number.
     timer : callable
-        Seconds of a clock that runs on.
+        Returns the time of a monotonic clock, s.
     rounds : int
-        Runs of which the quickest counts; of what takes more than a second, one.
+        Number of runs, of which the quickest counts; a run of more than a second is not repeated.
 
     Raises
     ------
     DynamicsError
-        If nothing solves the problem well enough to measure errors against.
+        If no method solves the problem accurately enough to serve as the reference.
     """
     solutions = []
     for tolerance in TOLERANCES:
         timed = _quickest(partial(auto, problem, spacing_s, count, tolerance), timer, rounds)
-        if timed is None:  # beyond what double precision reaches in this time; so is any smaller one
+        if timed is None:  # out of reach of double precision over this time; so are smaller tolerances
             break
         solutions.append((tolerance, *timed))
     strang_parts = [solution.parts for _, solution, _ in solutions if solution.integrator is STRANG]
@@ -133,7 +134,7 @@ def measure_scene(
 
 
 def _settings(problem: Problem, spacing_s: float) -> Iterator[tuple[Integrator, int, str]]:
-    """Yield each integrator that solves such a problem, its steps a sample, and its setting in words."""
+    """Yield each integrator that can solve the problem, its steps per sample, and its setting in words."""
     for integrator in INTEGRATORS.values():
         if integrator.refusal(problem):
             continue
@@ -146,7 +147,7 @@ def _settings(problem: Problem, spacing_s: float) -> Iterator[tuple[Integrator, 
 
 
 def _quickest(run: Callable[[], Result], timer: Callable[[], float], rounds: int) -> tuple[Result, float] | None:
-    """Return a result and the least time of some runs, s; None where the method cannot do it."""
+    """Return the result and the minimum time of several runs in s, or None if the method fails."""
     least_s = math.inf
     for _ in range(rounds):
         start = timer()
@@ -161,13 +162,13 @@ def _quickest(run: Callable[[], Result], timer: Callable[[], float], rounds: int
 
 
 def recommended(rows: Sequence[Work], tolerance: float) -> Work:
-    """Return the quickest measured way whose error is within a tolerance; the most exact where none is."""
+    """Return the quickest measured method whose error is within a tolerance, or else the most accurate one."""
     good = [row for row in rows if row.error <= tolerance]
     return min(good, key=lambda row: row.seconds) if good else min(rows, key=lambda row: row.error)
 
 
 def integrators_text(rows: Sequence[Work]) -> str:
-    """Return a table a scene, the choices of auto at its end."""
+    """Return one table per scene, with the choices of auto at its end."""
     parts = []
     for scene, group in itertools.groupby(rows, key=lambda row: row.scene):
         table = [["method", "error / amplitude", "time / ms", "setting"]]

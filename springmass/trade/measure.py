@@ -1,4 +1,4 @@
-"""The measurement: every method on the same simulated records, its errors against the bound, its time."""
+"""The measurement: errors relative to the bound, and times, of every method on the same simulated records."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ from springmass.trade.truth import Truth, bounds, record
 
 __all__ = ["EQUAL", "OwnResult", "Row", "Trade", "measure", "own_record"]
 
-ENOUGH = 1.10  # times the bound: what a tier may err before a slower one is recommended
-EQUAL = 0.01  # errors that differ by less than this share are equal
+ENOUGH = 1.10  # maximum error of a recommended tier, as a multiple of the bound
+EQUAL = 0.01  # relative difference up to which errors count as equal
 FAILURES = (AnalysisError, ValueError, ArithmeticError, np.linalg.LinAlgError)
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What one method reached.
+    """The result of one method.
 
     Parameters
     ----------
     method : Method
     seconds : float
-        Least time of one record, s: what the method costs without the machine's other work.
+        Minimum time for one record, s: the cost of the method without delays by other programs.
     error, bias : mapping of str to float
-        Root mean square error and mean error over the bound, by quantity; of the records that it could evaluate.
+        Root mean square error and mean error, divided by the bound, by quantity; only of records that the method could
+        evaluate.
     failed : int
-        Records on which it gave up.
+        Number of records that the method could not evaluate.
     """
 
     method: Method
@@ -45,13 +46,13 @@ class Row:
 
     @property
     def worst(self) -> float:
-        """The largest of its errors, infinite where it evaluated no record."""
+        """The largest error of the method; infinite if it evaluated no record."""
         return max(self.error.values(), default=math.inf)
 
 
 @dataclass(frozen=True, slots=True)
 class Trade:
-    """A measurement on ``seeds`` records of one truth; ``bound`` is in SI units, by quantity."""
+    """A measurement on ``seeds`` records with the same true values; ``bound`` is in SI units, by quantity."""
 
     truth: Truth
     seeds: int
@@ -59,19 +60,19 @@ class Trade:
     rows: tuple[Row, ...]
 
     def over_least(self, row: Row) -> dict[str, float]:
-        """Return a row's errors over the least that any row has in the same quantity."""
+        """Return a row's errors, each divided by the smallest error of any row in the same quantity."""
         return {q: error / min(each.error.get(q, math.inf) for each in self.rows) for q, error in row.error.items()}
 
     @property
     def enough(self) -> float:
-        """Error over the bound that is within a tenth of it.
+        """The largest error over the bound that counts as within a tenth of the bound.
 
-        Two standard deviations of a root mean square of so many errors are added.
+        It includes two standard deviations of a root mean square of ``seeds`` errors.
         """
         return ENOUGH * (1.0 + 2.0 / math.sqrt(2.0 * self.seeds))
 
     def beaten(self, row: Row) -> str | None:
-        """Return which method is quicker, estimates as much and is nowhere worse: the most exact such, or None."""
+        """Return the most accurate method that is quicker, estimates as much and is nowhere worse, or None."""
         better = [
             each
             for each in self.rows
@@ -83,7 +84,10 @@ class Trade:
 
     @property
     def recommended(self) -> Row:
-        """The quickest tier whose errors are all within a tenth of the bound, else the most exact one."""
+        """The quickest tier that never failed and whose errors are all within a tenth of the bound.
+
+        If there is none, it is the tier that failed least often, or of several such tiers the most accurate one.
+        """
         tiers = [row for row in self.rows if row.method.name in TIERS]
         good = [row for row in tiers if row.failed == 0 and row.worst <= self.enough]
         return min(good, key=lambda row: row.seconds) if good else min(tiers, key=lambda row: (row.failed, row.worst))
@@ -97,23 +101,23 @@ def measure(
     timer: Callable[[], float],
     progress: Callable[[int], None] = lambda _: None,
 ) -> Trade:
-    """Run every method on every record, in turn, so that a busy machine slows all alike.
+    """Run all methods in turn on each record, so that a busy machine slows all of them alike.
 
     Parameters
     ----------
     truth : Truth
     methods : sequence of Method
     seeds : int
-        Records; number i is made by ``default_rng(i)``.
+        Number of records; record i is made by ``default_rng(i)``.
     timer : callable
-        Seconds of a clock that runs on.
+        Returns the time of a monotonic clock, s.
     progress : callable
-        Called after each record with how many are done.
+        Called after each record with the number of finished records.
 
     Returns
     -------
     Trade
-        Deterministic but for its times.
+        Deterministic apart from its times.
     """
     bound = bounds(truth)
     true = {"frequency": truth.frequency_hz, "amplitude": truth.amplitude_m, "damping_rate": truth.damping_rate}
@@ -123,7 +127,7 @@ def measure(
         track = Track.from_arrays(truth.times, record(truth, np.random.default_rng(seed)), kind="simulated")
         for i, method in enumerate(methods):
             if seed == 0:
-                _timed(method, track, timer)  # imports and caches are paid before the measurement
+                _timed(method, track, timer)  # an untimed first run imports modules and fills caches
             estimates, spent_s = _timed(method, track, timer)
             times[i].append(spent_s)
             if not isinstance(estimates, str):
@@ -133,7 +137,7 @@ def measure(
 
 
 def _timed(method: Method, track: Track, timer: Callable[[], float]) -> tuple[Mapping[str, Estimate] | str, float]:
-    """Run a method; return its estimates, or why it gave up, and the time, s."""
+    """Run a method; return its estimates or the reason for its failure, and the time in s."""
     start = timer()
     try:
         estimates: Mapping[str, Estimate] | str = method.run(track)
@@ -150,13 +154,13 @@ def _row(method: Method, times: list[float], errors: list[dict[str, float]]) -> 
 
 
 OwnResult = tuple[Method, Mapping[str, Estimate] | str, float]
-"""A method, its estimates or why it gave up, and its time, s."""
+"""A method, its estimates or the reason for its failure, and its time in s."""
 
 
 def own_record(
     track: Track, methods: Sequence[Method], *, timer: Callable[[], float], rounds: int = 5
 ) -> list[OwnResult]:
-    """Run every method on one record; the time is the least of some rounds."""
+    """Run every method on one record; the time is the minimum of several rounds."""
     results = []
     for method in methods:
         rounds_of = [_timed(method, track, timer) for _ in range(rounds)]

@@ -1,7 +1,7 @@
-"""Reference methods: how such a record is evaluated elsewhere, each as its textbook has it.
+"""Reference methods: common ways to evaluate such a record, each as in textbooks.
 
-They are here to be compared with; no analysis uses them. They take evenly sampled distances, so straight lines bridge
-the gaps of a track before; tiers get the track as it is. What scipy has is scipy's.
+They serve only for comparison; no analysis uses them. They need evenly sampled distances, so gaps of a track are first
+bridged by straight lines; tiers get the unchanged track. Functions that scipy offers are taken from scipy.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ class Method:
     Parameters
     ----------
     name, label : str
-        As in JSON and as printed.
+        The name in JSON and the printed label.
     kind : {"tier", "reference"}
     run : callable
-        Of a track to estimates by name; u is NaN where the method states none. Raises AnalysisError where it finds no
-        oscillation.
+        Takes a track and returns estimates by name; u is NaN if the method states no uncertainty. Raises AnalysisError
+        if it finds no oscillation.
     """
 
     name: str
@@ -53,14 +53,14 @@ def tiers(*, linear: bool = False) -> list[Method]:
     Parameters
     ----------
     linear : bool
-        Whether to take the damping rate of the linear law, to compare with methods that take that law for granted; the
+        Whether to take the damping rate of the linear law, for comparison with methods that assume this law. The
         printed rate includes the choice of a law.
     """
     return [Method(tier, f"springmass {tier}", "tier", _tier(tier, linear)) for tier in TIERS]
 
 
 def references() -> list[Method]:
-    """Return how such records are evaluated elsewhere."""
+    """Return the common methods for such records."""
     return [
         Method("classic", "classic lab method", "reference", lambda track: _compared(classic(track).estimates)),
         Method("zero_crossings", "zero crossings", "reference", _bridged(zero_crossings)),
@@ -71,7 +71,7 @@ def references() -> list[Method]:
 
 
 def _bridged(estimate: Callable[[F8, F8], Estimates]) -> Callable[[Track], Estimates]:
-    """Let a function of times and distances take a track."""
+    """Turn a function of times and distances into a function of a track; straight lines bridge the gaps."""
 
     def run(track: Track) -> Estimates:
         known = np.isfinite(track.y) & np.isfinite(track.t)
@@ -98,12 +98,12 @@ def _compared(estimates: Estimates) -> Estimates:
 
 
 def zero_crossings(t: F8, y: F8) -> Estimates:
-    """Regress the times of upward crossings of the mean, interpolated between two samples, on their number.
+    """Regress the interpolated times of upward crossings of the mean on the number of the crossing.
 
     Notes
     -----
-    A crossing counts after the signal was an eighth of its range below the mean. Where a swing stays under that, the
-    count goes on by the time that passed.
+    A crossing counts only if the signal goes from an eighth of its range below the mean to an eighth above it. After
+    smaller swings, the elapsed time determines the number of the next crossing.
     """
     from scipy.stats import linregress
 
@@ -148,7 +148,7 @@ def _largest_line(t: F8, y: F8) -> tuple[float, complex]:
 
 
 def hilbert(t: F8, y: F8) -> Estimates:
-    """Regress phase and log-amplitude of the analytic signal on time, a twentieth left out at either end."""
+    """Regress phase and log-amplitude of the analytic signal on time, without a twentieth at either end."""
     from scipy.signal import hilbert as analytic_signal
     from scipy.stats import linregress
 
@@ -164,7 +164,7 @@ def hilbert(t: F8, y: F8) -> Estimates:
 
 
 def damped_sine(t: F8, y: F8) -> Estimates:
-    """Fit amplitude, frequency, damping rate, phase and offset by scipy's curve_fit, started from the spectrum."""
+    """Fit amplitude, frequency, damping rate, phase and offset with scipy's curve_fit, starting from the spectrum."""
     from scipy.optimize import curve_fit
 
     def model(t: F8, frequency: float, amplitude: float, damping_rate: float, phase: float, offset: float) -> F8:
@@ -176,6 +176,6 @@ def damped_sine(t: F8, y: F8) -> Estimates:
         values, covariance = curve_fit(model, t, y, p0=start)
     except RuntimeError as error:
         raise AnalysisError(f"curve_fit: {error}") from error
-    values[1] = abs(values[1])  # a negative amplitude is the same motion half a turn on
+    values[1] = abs(values[1])  # a negative amplitude is the same motion with the phase shifted by half a turn
     u = np.sqrt(np.diag(covariance))
     return {name: Estimate(float(values[i]), float(u[i]), unit) for i, (name, unit) in enumerate(UNITS.items())}

@@ -19,7 +19,7 @@ HEADS = {"frequency": "frequency", "amplitude": "amplitude", "damping_rate": "da
 
 
 def trade_text(trade: Trade) -> str:
-    """Return a row a method, and which accuracy to take."""
+    """Return a table with one row per method, and the recommended accuracy."""
     truth = trade.truth
     echoes = f", {truth.echoes:.1%} false echoes" if truth.echoes else ""
     rows = [["method", "time / ms", *(f"{HEADS[q]} / bound" for q in UNITS), "failed", "beaten in time and error by"]]
@@ -45,7 +45,7 @@ def trade_text(trade: Trade) -> str:
 
 
 def trade_json(trade: Trade, version: str) -> dict[str, Any]:
-    """Return the measurement as a JSON object; errors stand over the bound."""
+    """Return the measurement as a JSON object, with errors divided by the bound."""
     rows = [
         {**_row(row), "kind": row.method.kind, "beaten_by": trade.beaten(row)}
         | {"error_over_bound": row.error, "bias_over_bound": row.bias}
@@ -61,7 +61,7 @@ def _row(row: Row) -> dict[str, Any]:
 
 
 def hostile_text(trades: Mapping[str, Trade]) -> str:
-    """Return a line a kind of record: each tier's errors over the least of them, and its time over the quickest."""
+    """Return one line per kind of record: each tier's errors over the smallest ones, and its time over the shortest."""
     first = next(iter(trades.values()))
     rows = [["record", *(f"{row.method.name}: f, A, damping; time" for row in first.rows), ""]]
     for name, trade in trades.items():
@@ -79,7 +79,7 @@ def hostile_text(trades: Mapping[str, Trade]) -> str:
 
 
 def hostile_json(trades: Mapping[str, Trade], version: str) -> dict[str, Any]:
-    """Return the same as a JSON object; errors stand in SI units too."""
+    """Return the results for all kinds of records as a JSON object, with errors in SI units too."""
     records = []
     for name, trade in trades.items():
         errors = [{q: error * trade.bound[q] for q, error in row.error.items()} for row in trade.rows]
@@ -92,7 +92,7 @@ def hostile_json(trades: Mapping[str, Trade], version: str) -> dict[str, Any]:
 
 
 def own_text(path: str, results: Sequence[OwnResult]) -> str:
-    """Return each method's estimates from one record, and why one gave up."""
+    """Return each method's estimates from one record, or the reason for its failure."""
     rows = [["method", "time / ms", "period / s", "amplitude / mm", "damping / (1/s)"]]
     notes = []
     for method, estimates, seconds in results:
@@ -138,12 +138,12 @@ def _ratios(errors: Mapping[str, float]) -> list[str]:
 
 
 def ratio(value: float) -> str:
-    """Return an error over its bound to the digits that a hundred records know."""
+    """Return an error over its bound, rounded to the digits that a hundred records determine."""
     return f"{value:.2f}" if value < 10 else f"{value:.3g}" if value < 1000 else f"{value:.0f}"
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Set rows in columns: the first and the last to the left, numbers to the right; a rule below the head."""
+    """Align rows in columns, the first and the last to the left, the others to the right; add a rule below the head."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     inner = [f"{{:>{width}}}" for width in widths[1:-1]]
     form = "  ".join([f"{{:<{widths[0]}}}", *inner, "{}"])

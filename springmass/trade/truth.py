@@ -1,4 +1,4 @@
-"""Simulated records for the trade, and the Cramér-Rao bounds of what is in them; shares no code with any estimator."""
+"""Simulated records for the trade and the Cramér-Rao bounds of their parameters; shares no code with any estimator."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ F8 = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """A free oscillation in white noise, :math:`y = o + A(t)\\cos(2\\pi f t + \\varphi)`, and what spoils it.
+    """A free oscillation in white noise, :math:`y = o + A(t)\\cos(2\\pi f t + \\varphi)`, and its disturbances.
 
-    With linear drag :math:`A(t) = A e^{-\\gamma t}`; with quadratic drag too, :math:`dA/dt = -\\gamma A - \\beta A^2`,
+    With linear drag :math:`A(t) = A e^{-\\gamma t}`; with additional quadratic drag,
+    :math:`dA/dt = -\\gamma A - \\beta A^2`,
     the amplitude is :math:`A e^{-\\gamma t} / (1 + \\beta A (1 - e^{-\\gamma t}) / \\gamma)`.
 
     Parameters
@@ -27,13 +28,13 @@ class Truth:
         Standard deviation of one distance, m.
     frequency_hz, amplitude_m, damping_per_s, offset_m : float
     echoes : float
-        Share of samples that are false echoes: anywhere up to 2 m.
+        Fraction of samples that are false echoes, at random distances up to 2 m.
     quadratic_per_m_s : float
         Quadratic drag, 1/(m s).
     clip_m : float
         Displacement beyond which crests are cut off, m.
     drift_m : float
-        By how much the rest position moves within the record, m.
+        Change of the rest position within the record, m.
     sideways_m : float
         Amplitude of a second mode at six tenths of the frequency, m.
     quantum_m : float
@@ -56,12 +57,12 @@ class Truth:
 
     @property
     def damping_rate(self) -> float:
-        """Logarithmic rate of the amplitude at the start, 1/s."""
+        """Damping rate at the start, -(dA/dt)/A, 1/s."""
         return self.damping_per_s + self.quadratic_per_m_s * self.amplitude_m
 
     @property
     def times(self) -> F8:
-        """Sample times, (n,) float64, s."""
+        """Sample times in s, (n,) float64."""
         return np.arange(round(self.seconds * self.rate_hz)) / self.rate_hz
 
 
@@ -78,11 +79,11 @@ HOSTILE = {
     "sideways mode of 1 mm": Truth(seconds=60.0, sideways_m=1e-3),
     "linear and quadratic drag": Truth(seconds=60.0, damping_per_s=0.0073, quadratic_per_m_s=0.235),
 }
-"""Kinds of records that are not so simple, by name, and the simple one to compare with."""
+"""Difficult kinds of records, by name, and a simple one for comparison."""
 
 
 def record(truth: Truth, rng: np.random.Generator) -> F8:
-    """Return one record at ``truth.times``, (n,) float64, m; its phase is drawn too."""
+    """Return the distances of one record at ``truth.times`` in m, (n,) float64, with a random phase."""
     t = truth.times
     decay = np.exp(-truth.damping_per_s * t)
     integral_s = t if truth.damping_per_s == 0 else (1.0 - decay) / truth.damping_per_s
@@ -102,18 +103,19 @@ def record(truth: Truth, rng: np.random.Generator) -> F8:
 
 
 def bounds(truth: Truth) -> dict[str, float]:
-    """Return the least standard deviations of any unbiased estimate (Cramér-Rao), by name, in SI units.
+    """Return the minimum standard deviations of unbiased estimates (Cramér-Rao), by name, in SI units.
 
     Returns
     -------
     dict
-        frequency (Hz), amplitude at t = 0 (m), damping_rate (1/s), all unknown, with phase and offset. A method that
-        takes an undamped motion for granted knows more, and may fall below the amplitude's bound.
+        Bounds of frequency (Hz), amplitude at t = 0 (m) and damping_rate (1/s) where all three, the phase and the
+        offset are unknown. A method that assumes an undamped motion has more information, and may fall below the
+        amplitude's bound.
 
     Notes
     -----
-    The inverse Fisher information of (A, f, phase, o, gamma) in white noise, averaged over the phase. A false echo
-    gives no information.
+    The variances are those of the inverse Fisher information of (A, f, phase, o, gamma) in white noise, averaged over
+    the phase. A false echo gives no information.
     """
     t, size = truth.times, truth.amplitude_m
     decay = np.exp(-truth.damping_per_s * t)

@@ -1,4 +1,4 @@
-"""Build one sensor's run file: samples and the log as they come, the header at the end."""
+"""Build one sensor's run file: write samples and bytes of the log as they arrive, and the header at the end."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from storage.wire_log.scanning import Damage, LogContents
 __all__ = ["SensorRun"]
 
 FIRST_SAMPLES = 1000
-"""Number of first samples that determine the host time of t = 0; later ones would add the sensor's clock error."""
+"""Number of initial samples that determine the host time of t = 0; later ones would add the sensor's clock error."""
 
 
 class SensorRun:
@@ -34,7 +34,7 @@ class SensorRun:
         The log.
     sensor : SensorEntry
     chain : SensorChain
-        Decodes the samples.
+        The chain that decodes the samples.
     """
 
     def __init__(self, writer: RunWriter, contents: LogContents, sensor: SensorEntry, chain: SensorChain) -> None:
@@ -81,7 +81,7 @@ class SensorRun:
         faults, damage = decoding["faults"], self._contents.damage
         end_ns = end_of(notes.events(), [last_ns], header.mono_ns)
         losses = self._losses.losses(notes.events(self._sensor.channel), header.mono_ns, end_ns)
-        # A host time may be late but never early, so the earliest is the best.
+        # A host time may be late but never early, so the earliest estimate is the best.
         origin = min(self._first_ns, default=header.mono_ns)
         self._writer.finish(
             self._chain.info(self._sensor.port, header.kind),

@@ -1,7 +1,7 @@
-"""What a recording lost: a disconnected sensor, a target out of sight, readings that did not fit in the queue.
+"""Count the losses of a recording: a disconnected sensor, a target out of sight, readings dropped by a full queue.
 
-All of it follows from the samples and the events of the log, so the end of a recording, ``recover`` and an analysis
-report the same losses.
+All losses follow from the samples and the events of the log, so the end of a recording, ``recover`` and an analysis
+report the same ones.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from acquisition.recordings.recording import Trap
 __all__ = ["LossCount", "Losses", "end_of"]
 
 SILENCE_S, SILENT_PERIODS = 1.5, 5.0
-"""A sensor is gone if it sent no reading for longer than this, and than this many sample periods, before the end."""
+"""A sensor counts as gone if it was silent at the end for longer than this time, s, and this many sample periods."""
 NO_TARGET_S = 1.0
-"""Shorter losses of the target are reported as missing samples only."""
+"""Minimum duration of a reported loss of the target, s; shorter ones appear only as missing samples."""
 UNCONFIRMED = ("restarted", "assumed")
-"""Values of ``sensor`` in a "reopened" event which leave open whether it is the same sensor."""
+"""Values of ``sensor`` in a "reopened" event that leave open whether it is the same sensor."""
 
 Event = tuple[int, Mapping[str, Any]]
-"""Host's monotonic clock, ns, and ``{"kind", "facts"}`` as in the log."""
+"""Time of an event on the host's monotonic clock, ns, and its ``{"kind", "facts"}`` as in the log."""
 
 
 @dataclass(frozen=True, slots=True)
 class Losses:
-    """What one sensor's run lacks.
+    """The losses of one sensor's run.
 
     Parameters
     ----------
@@ -39,21 +39,21 @@ class Losses:
     gone_s : float or None
         Time from the sensor's last reading to the end, s; None if readings came until the end.
     why : str
-        Why the port was lost; empty if the port was there but silent.
+        Reason for the loss of the port; empty if the port was present but silent.
     away : tuple of float
         Duration of each interruption after which the port came back, s.
     refused : int
-        How often another device came in its place and was not recorded.
+        Number of times that another device was connected instead of the sensor and was not recorded.
     unconfirmed : int
-        How often a sensor came back that cannot be distinguished from another of its kind.
+        Number of times that a sensor came back which cannot be distinguished from another of the same model.
     continued_in : int or None
         Channel that continues this one, because another sensor came back on the port.
     continues : int or None
         Channel that this one continues, because this sensor came back in place of another.
     no_target_s, longest_no_target_s : float
-        How long the sensor answered without a distance, s: in total, and the longest stretch.
+        Total and longest time during which the sensor answered without a distance, s.
     dropped_reads, dropped_bytes : int
-        Reads that were dropped because the recorder's queue was full.
+        Number of reads, and of their bytes, that were dropped because the recorder's queue was full.
     """
 
     seconds: float
@@ -128,7 +128,7 @@ class Losses:
 
 
 class LossCount:
-    """Counts what is missing in one sensor's samples, as they are decoded.
+    """Counts the losses in one sensor's samples as they are decoded.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class LossCount:
 
     @property
     def last_ns(self) -> int | None:
-        """Host's clock at the last reading."""
+        """Time of the last reading on the host's monotonic clock, ns; None before the first reading."""
         return self._last_ns
 
     def push(self, samples: Block) -> None:
@@ -160,7 +160,7 @@ class LossCount:
         start = float(samples.t[0]) if self._known_t is None else self._known_t
         self._last_t = float(samples.t[-1])
         if known.size:
-            # The time between consecutive distances if readings without a distance lie between them.
+            # The time between consecutive distances, if there are readings without a distance between them.
             t = np.concatenate(([start], samples.t[known]))
             between = np.diff(known, prepend=-1) > 1
             between[0] |= self._missing_since
@@ -171,7 +171,7 @@ class LossCount:
             self._known_t, self._missing_since = start, True
 
     def losses(self, events: Iterable[Event], start_ns: int, end_ns: int) -> Losses:
-        """Return the losses between two times of the host's clock, from the samples and the events."""
+        """Return the losses between two times of the host's clock, determined from the samples and the events."""
         if self._missing_since and self._known_t is not None:
             self._add(np.array([self._last_t - self._known_t]))
             self._missing_since = False
@@ -203,13 +203,13 @@ class LossCount:
 
 
 def _number(facts: Mapping[str, Any], name: str) -> float:
-    """Return a number of an event; 0 if a damaged or foreign log has no number there."""
+    """Return a number from an event's facts; 0 if a damaged or foreign log has no number there."""
     value = facts.get(name)
     return float(value) if isinstance(value, int | float) else 0.0
 
 
 def end_of(events: Sequence[Event], last_ns: Iterable[int | None], start_ns: int) -> int:
-    """Return the host's clock at the end of a recording: from the "ended" event, else from the last record."""
+    """Return the host's time at the end of a recording, from the "ended" event or else from the last record, ns."""
     for mono_ns, content in events:
         if content.get("kind") == "ended":
             return mono_ns

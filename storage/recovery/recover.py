@@ -1,8 +1,8 @@
 """Build a run file from a wire log, even a damaged one: at the end of every recording, and after a crash.
 
 The bytes go through the same chain as in the live view, so both give the same samples. The run file includes the whole
-log, bit for bit, so nothing is lost that decoding leaves out. Log and samples are processed in pieces, so a run may
-have any length.
+log, bit for bit, so bytes that are not decoded are also preserved. Log and samples are processed in pieces, so a run
+may have any length.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from storage.wire_log.wire_samples import LogDecoder, chains_of
 __all__ = ["LogGrowing", "RecoverReport", "RecoveredRun", "recover", "run_paths", "verify_against_log"]
 
 SENSORS_PER_PASS = 4
-"""Run files written in one pass over the log; each needs some megabytes of memory."""
+"""Maximum number of run files written in one pass over the log; each needs some megabytes of memory."""
 FOREIGN = "springmass writes no such log; ask where it comes from"
 
 
 class LogGrowing(StorageError):
-    """A log that a recording still writes: its run file would be incomplete and block that of the recording."""
+    """A log that a recording still writes: a run file made now would be incomplete and take the recording's place."""
 
 
 def recover(
@@ -53,28 +53,28 @@ def recover(
     provenance: Mapping[str, Any] | None = None,
     growing: bool = False,
 ) -> RecoverReport:
-    """Build the run file of a log, or one for each sensor if there are several.
+    """Build the run file of a log, or one run file per sensor if there are several sensors.
 
     Parameters
     ----------
     log : str, PathLike or LogContents
-        The log; finished, torn or damaged.
+        The log, which may be finished, cut short or damaged.
     out_path : str or PathLike, optional
         The run file; by default the log's name with the suffix ``.h5``. With several sensors the channel comes before
-        the suffix: ``run.0.h5``, ``run.1.h5``. If another sensor came back on the port of a single one, the files are
-        ``run.h5`` and ``run.1.h5``.
+        the suffix: ``run.0.h5``, ``run.1.h5``. If a single sensor was replaced by another one on its port, the files
+        are ``run.h5`` and ``run.1.h5``.
     overwrite : bool
         Whether existing run files may be replaced.
     remove_log : bool
-        Whether to remove the log after every run file that holds it is verified.
+        Whether to remove the log after all run files, each of which contains it, are verified.
     header : LogHeader, optional
-        Used if every copy of the header in the log is lost.
+        Header to use if every copy of the header in the log is lost.
     speed_of_sound_m_per_s : float, optional
-        Used for echo times instead of the value in the log, m/s.
+        Speed of sound for echo times, m/s; replaces the value in the log.
     provenance : mapping, optional
         Further entries of the run file's provenance: software, version, ...
     growing : bool
-        Whether to accept a log that a recording still writes, as far as it goes.
+        Whether to accept a log that a recording still writes, and to use its records so far.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def recover(
     LogGrowing
         If a recording still writes the log.
     NotALog
-        If there is no log, or nothing in it can be read.
+        If the log does not exist or is unreadable.
     RunExists, WriteFailed
         If a run file exists or cannot be written. The existing file and the log are then unchanged.
     RunDamaged
@@ -118,7 +118,7 @@ def recover(
         ):
             _check_log_inside(run.path, contents)
             runs[run.path] = run
-    if occupied:  # the other run files exist by now
+    if occupied:  # by now the other run files exist
         raise _already_exists(occupied[0])
     return RecoverReport(
         contents.path,
@@ -134,7 +134,7 @@ def recover(
 
 
 def _notes(contents: LogContents) -> Notes:
-    """Read marks and events of the log first, because a calibration at its end applies from the first sample on."""
+    """Read the marks and events of the log first, because a calibration at its end applies to all samples."""
     notes = Notes()
     try:
         for record in contents:
@@ -146,7 +146,7 @@ def _notes(contents: LogContents) -> Notes:
 
 
 def _sensors(header: Sequence[SensorEntry], notes: Notes, speed_of_sound_m_per_s: float | None) -> list[SensorEntry]:
-    """Return the calibrated sensors: those of the header, then those that came back in their place."""
+    """Return the calibrated sensors: first those of the header, then those that replaced them."""
     known: dict[int, SensorEntry] = {}
 
     def add(sensor: SensorEntry) -> None:
@@ -214,7 +214,7 @@ def _check_log_inside(path: Path, contents: LogContents) -> None:
 
 
 def _existing_run(path: Path, sensor: SensorEntry, contents: LogContents) -> RecoveredRun | None:
-    """Return an existing run file if it holds all of this log, as after a killed recovery; else None."""
+    """Return an existing run file if it contains this whole log, as after a killed recovery; otherwise None."""
     try:
         _check_log_inside(path, contents)
         with open_run(path) as run:
@@ -278,10 +278,10 @@ def _build(
 
 
 def _remove(contents: LogContents) -> bool:
-    """Remove a log whose bytes are all in verified run files; a log that has grown since then stays."""
+    """Remove a log whose bytes are all in verified run files, unless it has grown or been replaced since then."""
     with contextlib.suppress(OSError):
         if all(part.in_place() for part in contents.parts):
-            for part in contents.parts:  # the first file first, so that the others do not look like a whole log
+            for part in contents.parts:  # begin with the first file, so that the others do not look like a whole log
                 part.path.unlink()
             return True
     return False

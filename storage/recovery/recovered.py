@@ -1,4 +1,4 @@
-"""The result of a recovery: the run files made from a log, and their description."""
+"""Describe the result of a recovery: the run files made from a log."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class RecoveredRun:
         The file, verified against the log.
     samples : int
     faults : mapping of str to int
-        The decoder's counts.
+        Number of faults of each kind, as counted by the decoder.
     decoding : mapping
         The chain's report: gaps, restarts, the clock's rate error.
     losses : Losses
-        What the run lacks.
+        The losses of the run.
     existed : bool
-        Whether the file existed already, with the whole log in it.
+        Whether the file already existed and contained the whole log.
     """
 
     sensor: SensorEntry
@@ -86,7 +86,7 @@ class RecoverReport:
     parts : int
         Number of files of the log.
     parts_of : mapping of int to int
-        For each channel of a sensor that replaced another, the channel of the sensor before.
+        For each channel of a sensor that replaced another, the channel of the replaced sensor.
     leftovers : tuple of Path
         Temporary files of killed builds, which were removed from the folder.
     """
@@ -113,7 +113,7 @@ class RecoverReport:
         return channel
 
     def describe(self) -> Iterator[str]:
-        """Yield lines for the user: some about each run file, and one about the log."""
+        """Yield lines for the user: about removed temporary files, about each run file, and one about the log."""
         for path in self.leftovers:
             yield f"{path}: removed, left by a killed build"
         for run in self.runs:

@@ -1,4 +1,4 @@
-"""The arrays of a run file during writing: samples chunk by chunk, original files as their bytes come."""
+"""Write the arrays of a run file: samples chunk by chunk, original files as their bytes arrive."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Columns:
         self._written = 0
 
     def append(self, block: Block) -> None:
-        """Append a block, and write the chunks that are complete."""
+        """Append a block, and write all complete chunks."""
         if self.first is None:
             self.first, self.quantity = block.first, block.quantity
         self._demand_fit(block)
@@ -94,7 +94,7 @@ class Columns:
         if column.name not in self.digests:
             self.digests[column.name] = hashlib.sha256()
             _create(self.file, column.path, column.dtype, None if growing else len(values))
-            for start in range(0, self._written, CHUNK):  # fill a column that earlier blocks lacked
+            for start in range(0, self._written, CHUNK):  # fill a column that is missing in earlier blocks
                 self._extend(column, start, np.full(CHUNK, column.fill, column.dtype))
         self._extend(column, self._written, values)
 
@@ -107,7 +107,7 @@ class Columns:
 
 
 def _create(file: Any, path: str, dtype: str, length: int | None) -> Any:
-    """Make an array of known length, or a growing one; HDF5 allows zero length only for a growing array."""
+    """Create an array of fixed length, or a growing one; HDF5 allows zero length only for a growing array."""
     if length:
         return file.create_dataset(path, (length,), dtype, chunks=(min(length, CHUNK),), **layout.filters(path))
     chunk = CHUNK if length is None else 1
@@ -115,7 +115,7 @@ def _create(file: Any, path: str, dtype: str, length: int | None) -> Any:
 
 
 class Originals:
-    """The original files of a run, written as their bytes come."""
+    """The original files of a run, written as their bytes arrive."""
 
     def __init__(self, file: Any, files: Sequence[tuple[str, int]]) -> None:
         self._names = [name for name, _ in files]
@@ -140,7 +140,7 @@ class Originals:
             self._bytes[start : start + len(data)] = np.frombuffer(data, np.uint8)
 
     def entries(self) -> tuple[FileEntry, ...]:
-        """Return the entries of the files in the header.
+        """Return the files' entries for the header.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class Originals:
 
 
 def _dimension(group: Any, name: str, arrays: Sequence[Any]) -> None:
-    """Attach arrays to a dimension without coordinates as netCDF does: by a scale with this exact title."""
+    """Attach arrays to a dimension without coordinates as netCDF does, with a scale of this exact title."""
     length = arrays[0].shape[0]
     growing: dict[str, Any] = {} if length else {"maxshape": (None,), "chunks": (1,)}
     scale = group.create_dataset(name, (length,), ">f4", **growing)

@@ -1,4 +1,4 @@
-"""A run's samples as an ``xarray.Dataset``: read from the file on demand, or checked and in memory."""
+"""Return a run's samples as an ``xarray.Dataset``: read from the file on demand, or verified and held in memory."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["checked_dataset", "lazy_dataset"]
 
 
 def lazy_dataset(contents: Contents) -> xr.Dataset:
-    """Return a dataset that reads from the run's own open file; see :meth:`storage.run_file.reading.Run.dataset`.
+    """Return a dataset that reads from the run's open file; see :meth:`storage.run_file.reading.Run.dataset`.
 
     Raises
     ------
@@ -27,19 +27,19 @@ def lazy_dataset(contents: Contents) -> xr.Dataset:
     import xarray as xr
 
     for name in contents.header.columns:
-        contents.column(name)  # checks type and length, which lazy reading does not
+        contents.column(name)  # checks type and length, unlike lazy reading
     contents.demand_own_signal()
     with reading(contents.path, layout.SIGNAL):
         # Through the run's open handle, because the path may lead to another file by now.
         file = h5netcdf.File(contents.file(), "r")
         store = xr.backends.H5NetCDFStore(file, group=layout.SIGNAL)
-        dataset = xr.open_dataset(store, decode_times=False)  # elapsed seconds are no dates
+        dataset = xr.open_dataset(store, decode_times=False)  # elapsed seconds are not dates
     dataset.attrs = _attributes(contents.header)
     return dataset
 
 
 def checked_dataset(contents: Contents, samples: Block) -> xr.Dataset:
-    """Return a dataset of samples that were checked; see :meth:`storage.run_file.reading.Run.load_dataset`."""
+    """Return a dataset of verified samples; see :meth:`storage.run_file.reading.Run.load_dataset`."""
     import xarray as xr
 
     header = contents.header

@@ -1,8 +1,8 @@
-"""An open run file and its header, which all ways of reading a run share.
+"""Provide an open run file and its header to all ways of reading a run.
 
-In HDF5 a name can lead outside the file: by a soft or external link, or to an array whose bytes are in other files
-(external storage, virtual arrays). A run file never needs that, so none of these is followed: a file from a stranger
-must not read other files of this computer, nor wait for a pipe.
+In HDF5 a name can lead outside the file: through a soft or external link, or to an array whose bytes are in other
+files (external storage, virtual arrays). Run files never need this, so no such reference is followed: opening a file
+from a stranger must not read other files of this computer or wait for a pipe.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class Contents:
     path : Path
         The file.
     handle : h5py.File
-        The same, open.
+        The open file.
     header : Header
-        Its header, with a checked digest.
+        The header of the file.
     sha256 : str
         Digest of the header.
     unverified : bool
@@ -97,7 +97,7 @@ class Contents:
         return self.array(column.path, column.dtype, self.header.samples, f"the column {name!r}")
 
     def demand_within(self, name: str, values: Any, start: int) -> None:
-        """Check values of a column, from sample ``start`` on, against its range.
+        """Check values of a column, of which the first is that of sample ``start``, against the column's range.
 
         Raises
         ------
@@ -109,7 +109,7 @@ class Contents:
             raise RunDamaged(self.path, str(error), FOREIGN) from error
 
     def demand_own_signal(self) -> None:
-        """Check that there are no further arrays in the signal and at the root, which other tools would show instead.
+        """Check that the signal and the root contain no additional arrays, which other tools would show instead.
 
         Raises
         ------
@@ -124,7 +124,7 @@ class Contents:
                     raise damaged(self.path, f"/{name}", "it is not a link to a column and was added later")
 
     def check(self, name: str, sha256: str) -> None:
-        """Compare a column's digest with that in the header.
+        """Compare a column's digest with the one in the header.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class Contents:
 
 
 def open_header(path: Path, *, unverified: bool = False) -> tuple[Any, Header, str]:
-    """Open a file that begins like HDF5; return it with its header and the header's digest.
+    """Open a file with the signature of HDF5; return it with its header and the header's digest.
 
     Parameters
     ----------
@@ -146,9 +146,9 @@ def open_header(path: Path, *, unverified: bool = False) -> tuple[Any, Header, s
     Raises
     ------
     NotARun
-        If it is HDF5 of another layout.
+        If the file is HDF5 of another layout.
     RunDamaged
-        If it cannot be read, or its header is damaged or has a value that is not allowed.
+        If the file cannot be read, or its header is damaged or has a value that is not allowed.
     """
     import h5py
 
@@ -196,10 +196,10 @@ def _read_header(path: Path, file: Any, unverified: bool) -> tuple[Header, str]:
 
 
 MOST_NAMES = 1000
-"""Largest number of groups and arrays; a run file has about forty."""
+"""Maximum number of groups and arrays; a run file has about forty."""
 
 _PACKED = {"header.samples": 1, "header.originals, their sizes": 64}
-"""Samples, or bytes of original files, per byte of the file: text compresses well, distances do not."""
+"""Maximum number of samples, or of bytes of original files, per byte of a file: only text compresses well."""
 
 
 def _check_text(dtype: Any, shape: tuple[int, ...], longest: int) -> None:
@@ -208,7 +208,7 @@ def _check_text(dtype: Any, shape: tuple[int, ...], longest: int) -> None:
 
 
 def _check_links(path: Path, file: Any) -> None:
-    """Go through the whole file without following links, and refuse every name that leads out of the file."""
+    """Visit the whole file without following links, and refuse every name that may lead out of the file."""
     import h5py
 
     seen, groups, count = set(), [file["/"]], 0
@@ -237,7 +237,7 @@ def _check_links(path: Path, file: Any) -> None:
 
 
 def _form(found: Any) -> tuple[str, tuple[int, ...]]:
-    """Return type and shape of an array; for any other item its kind and an empty shape."""
+    """Return the type and shape of an array; for any other item, return its kind and an empty shape."""
     import h5py
 
     return (found.dtype.str, found.shape) if isinstance(found, h5py.Dataset) else (type(found).__name__, ())

@@ -1,4 +1,4 @@
-"""The header of a run file: everything but the arrays, as one canonical JSON text."""
+"""Define the header of a run file: everything except the arrays, as one canonical JSON text."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ __all__ = ["LONGEST_HEADER", "MOST_UNWRITTEN", "SCHEMA", "FileEntry", "Header", 
 
 SCHEMA = 1
 LONGEST_HEADER = 1 << 26
-"""Largest size of the header's text, bytes; a day of events needs a thousandth of it."""
+"""Maximum size of the header's text, bytes; a day of events needs a thousandth of this."""
 MOST_UNWRITTEN = 10_000_000
-"""Number of samples, or of bytes of original files, that is always accepted: a day at 100 Hz.
+"""Number of samples that is always accepted: a day at 100 Hz. For bytes of original files the limit is 64 times higher.
 
-A larger number must not exceed the size of the file. Otherwise a small file could fill the memory (a decompression
-bomb).
+A larger number of samples must not exceed the size of the file in bytes. Otherwise a small file could fill the memory
+(a decompression bomb).
 """
 DEEPEST = 33
-"""Largest depth of nested tables and lists, including the header itself."""
+"""Maximum depth of nested tables and lists, including the header itself."""
 
 _Text = Annotated[str, Meta(max_length=1 << 20)]
 _Word = Annotated[str, Meta(max_length=200)]
@@ -92,7 +92,7 @@ class _DecodingNote(Struct, frozen=True):
 
 
 class _Provenance(Struct, frozen=True):
-    """The entries of the provenance that other code reads; there may be further ones."""
+    """The entries of the provenance that other code reads; further ones are allowed."""
 
     sensor: _SensorNote = _SensorNote()
     start_time: _Word | None = None
@@ -113,15 +113,15 @@ class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     originals : tuple of FileEntry
         The original files.
     title, channel, format : str
-        As in a recording.
+        Title, measured quantity and format family, as in a recording.
     scene, provenance : mapping or None, mapping
-        JSON-able, with string keys.
+        Tables that JSON can store, with string keys.
     traps : tuple of TrapEntry
         Remarks of the reader.
     malformed_rows : int
-        Rows that were not samples.
+        Number of rows that were not samples.
     quantity, unit : str
-        Quantity and unit of the samples, as in :class:`acquisition.block.Block`. Empty in older files, which hold
+        Quantity and unit of the samples, as in :class:`acquisition.block.Block`. Empty in older files, which contain
         lengths in metres.
     """
 
@@ -155,14 +155,14 @@ class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @classmethod
     def decode(cls, text: bytes) -> Header:
-        """Read the text that :meth:`encode` wrote.
+        """Decode the text that :meth:`encode` returned.
 
         Raises
         ------
         storage.schema.ValueRefused
             If a value is not allowed for its key.
         ValueError
-            If the text is of another schema.
+            If the text has another schema.
         """
         content = parsed(text, "header")
         schema = content.pop("schema", None) if isinstance(content, dict) else None

@@ -1,4 +1,4 @@
-"""The run file's layout: names, types, units and attributes, in one place.
+"""Define the layout of a run file: names, types, units and attributes.
 
 ::
 
@@ -11,20 +11,21 @@
         distance_errors   f4 m, standard deviation; only if the source knows it, NaN if unmeasured
         quality           u1 @flag_masks @flag_meanings
         velocity          f8 m/s; only if the recording states one
-                          (for another quantity than a length: that unit, and that unit per second)
+                          (if the quantity is not a length, its unit replaces m in both)
     /entry/instrument     name, kind, clock, rate_hz, quantum_m, sigma_m, stated_error_m
     /entry/scene          @json: the scene's tables
     /entry/provenance     @software @version @configuration @traps ...; header, see below
-    /raw                  sequence u4 (sample index); host_mono_ns i8 if a host recorded the samples
+    /raw                  sequence u4 (sample index); host_mono_ns i8, only if a host recorded the samples
     /wire                 bytes u1; record_offset, record_len, record_mono_ns; one record per original file
 
 Texts have a fixed length, as in files of the netCDF library: xarray, netCDF4 and NeXus tools return them as
 text, h5py returns ``bytes``.
 
-The file states everything twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII)
-of everything but the arrays, with the SHA-256 of every array's decoded little-endian values; the SHA-256 of the text
-is its attribute. :class:`storage.run_file.reading.Run` reads only that text. The attributes and fields above are made
-from it for people and other tools, and :meth:`storage.run_file.reading.Run.verify` compares them with it.
+The file states all metadata twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII) of
+everything except the arrays. It includes the SHA-256 of every array's decoded little-endian values; the SHA-256 of
+the text is stored as an attribute. :class:`storage.run_file.reading.Run` reads only this text. The attributes and
+fields above are made from it for people and other tools, and :meth:`storage.run_file.reading.Run.verify` compares them
+with it.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ FILTERS: Mapping[str, Any] = {
 """Filters that every reader can undo without a plugin. The checksum turns a flipped bit into a read error."""
 
 UNPACKED: Mapping[str, Any] = {"fletcher32": True}
-"""Filters of noisy columns: compression saves a quarter of their size and triples the time to read them."""
+"""Filters of noisy columns: compression would save a quarter of their size and triple the time to read them."""
 
 NOISY = frozenset({"distance", "velocity"})
 """Columns whose last digits are noise; they are not compressed."""
@@ -101,13 +102,13 @@ class Column:
     path : str
         Path in the file.
     dtype : str
-        Its type, little-endian.
+        Data type of the array, little-endian.
     attributes : mapping
         Units and description; :func:`attributes` adds those that depend on the run.
     fill : float or int
-        Value of the samples before the first value of an optional column.
+        Value for the samples of blocks that lack an optional column.
     least, greatest : float or int
-        Smallest and largest value; NaN is allowed too. The limits are far beyond any bench, but squares and sums of
+        Minimum and maximum value; NaN is also allowed. The limits are far beyond any bench, but squares and sums of
         values between them are finite.
     """
 
@@ -119,14 +120,14 @@ class Column:
     greatest: float | int = 1e12
 
     def demand_within(self, values: NDArray[Any], start: int) -> None:
-        """Check values of samples from ``start`` on against the range.
+        """Check values, of which the first is that of sample ``start``, against the range.
 
         Raises
         ------
         ValueRefused
             For the first value outside the range.
         """
-        # fmin and fmax skip NaN without a warning; an array of NaN alone passes.
+        # fmin and fmax skip NaN without a warning; an array that contains only NaN passes.
         low, high = np.fmin.reduce(values, initial=self.greatest), np.fmax.reduce(values, initial=self.least)
         if low < self.least or high > self.greatest:
             at = int(np.flatnonzero((values < self.least) | (values > self.greatest))[0])
@@ -135,7 +136,7 @@ class Column:
 
     @property
     def name(self) -> str:
-        """The path's last part."""
+        """The last part of the path."""
         return self.path.rpartition("/")[2]
 
 
@@ -163,7 +164,7 @@ COLUMNS: tuple[Column, ...] = (
         least=0.0,
         greatest=1e30,
     ),
-    Column(f"{SIGNAL}/quality", "|u1", _quality(), least=0, greatest=255),  # also bits of later versions
+    Column(f"{SIGNAL}/quality", "|u1", _quality(), least=0, greatest=255),  # includes the flags of later versions
     Column(
         f"{SIGNAL}/velocity",
         "<f8",
@@ -200,7 +201,7 @@ def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None
     Returns
     -------
     dict
-        Arrays of shape (n,), by name.
+        Arrays of shape (n,), by column name.
     """
     errors = None
     if sigma_m is not None:
@@ -281,7 +282,7 @@ def fields(header: Header) -> dict[str, Any]:
 
 
 _UNITS = {"hz": "Hz", "m": "m"}
-"""By the last part of a field's name."""
+"""Units of fields, by the last part of the field's name."""
 
 
 def _units_of(path: str) -> dict[str, str]:

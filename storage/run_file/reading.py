@@ -46,9 +46,9 @@ __all__ = ["CHECKED", "Run", "is_run", "open_run"]
 
 
 def is_run(head: bytes) -> bool:
-    """Return whether a file may be a run file, from its first eight bytes: whether it is HDF5.
+    """Return whether a file's first eight bytes are those of HDF5, so that it may be a run file.
 
-    :func:`open_run` checks whether it is a run file.
+    :func:`open_run` checks whether it really is one.
     """
     return head.startswith(layout.MAGIC)
 
@@ -60,17 +60,17 @@ def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
     ----------
     path : str or PathLike
     unverified : bool
-        Whether to return data even if their digest differs; :meth:`Run.differences` lists what differs.
+        Whether to return data even if their digest differs; :meth:`Run.differences` lists the differences.
 
     Returns
     -------
     Run
-        Use it in a ``with``, or close it.
+        The open file. Use it in a ``with``, or close it.
 
     Raises
     ------
     NotARun
-        If there is no file, or it is not a run file.
+        If the file does not exist or is not a run file.
     RunDamaged
         If the file cannot be read, or its header is damaged or has a value that is not allowed.
     """
@@ -93,8 +93,8 @@ class Run(Contents):
     and every column that is read to its end is compared with its SHA-256. :meth:`blocks` and :meth:`dataset` read
     lazily, :meth:`samples` and :meth:`load_dataset` read everything.
 
-    ``sha256`` is the digest of the header, which holds the digests of all arrays and original files. So two files with
-    the same content have the same ``sha256``, even if their bytes differ.
+    ``sha256`` is the digest of the header, which contains the digests of all arrays and original files. Two files with
+    the same content therefore have the same ``sha256``, even if their bytes differ.
     """
 
     __slots__ = ()
@@ -128,12 +128,12 @@ class Run(Contents):
 
     @property
     def channel(self) -> str:
-        """The quantity or column taken as distance."""
+        """The quantity or column of the recording that is used as the distance."""
         return self.header.channel
 
     @property
     def format(self) -> str:
-        """The family of recordings that it was read from; empty if there is none."""
+        """The format family of the recording from which the run was made; empty if there is none."""
         return self.header.format
 
     @property
@@ -167,15 +167,15 @@ class Run(Contents):
         Returns
         -------
         iterable of Block
-            It can be iterated more than once, while the run is open.
+            The blocks. They can be iterated more than once while the run is open.
 
         Raises
         ------
         ValueError
             If ``size`` is not positive.
         RunDamaged
-            During iteration: for a chunk that cannot be read, and before the blocks of the last chunk if the checksum
-            of a whole column differs.
+            During iteration, if a chunk cannot be read; and before the blocks of the last chunk, if the checksum of a
+            whole column differs.
         """
         if size < 1:
             raise ValueError(f"size must be at least 1 sample, got {size}")
@@ -204,7 +204,7 @@ class Run(Contents):
         Returns
         -------
         xarray.Dataset
-            On the dimension ``time``: time (s), distance (m), quality, and if the file has them distance_errors (m)
+            On the dimension ``time``: time (s), distance (m), quality and, if the file has them, distance_errors (m)
             and velocity (m/s), with the file's attributes. The attributes of the dataset are kind, channel, title,
             format and the instrument's name, clock and numbers.
 
@@ -216,11 +216,11 @@ class Run(Contents):
         Notes
         -----
         Opening reads the times, because they are the index; other data are read when they are used. A part of a
-        column cannot be compared with the digest of the whole. A flipped bit is still an error (every chunk has a
-        checksum, and reading it raises ``OSError``), but an array that was rewritten goes unnoticed.
-        :meth:`load_dataset` detects both, and so does :meth:`verify`. After the run is closed, data that were not read
-        are no longer available (``KeyError``): use the dataset inside the run's ``with``, or call ``load()`` there.
-        Closing the dataset leaves the run open.
+        column cannot be compared with the digest of the whole column. A flipped bit is still an error (every chunk has
+        a checksum, and reading it raises ``OSError``), but an array that was rewritten goes unnoticed.
+        :meth:`load_dataset` and :meth:`verify` detect both. After the run is closed, data that were not read are no
+        longer available (``KeyError``): use the dataset inside the run's ``with``, or call ``load()`` there. Closing
+        the dataset does not close the run.
         """
         return lazy_dataset(self)
 
@@ -230,7 +230,8 @@ class Run(Contents):
         Returns
         -------
         xarray.Dataset
-            The same as :meth:`dataset`. It needs 25 to 40 bytes per sample and can be used after the run is closed.
+            The same content as that of :meth:`dataset`. It needs 25 to 40 bytes per sample and remains usable after
+            the run is closed.
 
         Raises
         ------
@@ -245,7 +246,7 @@ class Run(Contents):
         Raises
         ------
         RunDamaged
-            If one is damaged.
+            If an original file is damaged.
         """
         return tuple(
             Original(entry.name, b"".join(verify.original_pieces(self, entry, start)))
@@ -258,7 +259,7 @@ class Run(Contents):
         Returns
         -------
         tuple of RunDamaged
-            Empty for a file that verifies.
+            The errors; empty if the file is undamaged.
         """
         return tuple(verify.differences(self))
 
@@ -268,7 +269,7 @@ class Run(Contents):
         Parameters
         ----------
         but : iterable of str
-            Columns to leave out, such as :data:`CHECKED`, which :meth:`samples` has checked.
+            Columns to leave out, such as those of :data:`CHECKED` after :meth:`samples` has checked them.
 
         Raises
         ------
@@ -291,7 +292,7 @@ class _Blocks:
         names = [name for name in _BLOCK_COLUMNS if name in run.header.columns]
         columns = {name: run.column(name) for name in names}
         digests = {name: hashlib.sha256() for name in names}
-        step = self.size * max(1, CHUNK // self.size)  # whole blocks, about a chunk at a time
+        step = self.size * max(1, CHUNK // self.size)  # read whole blocks, about one chunk at a time
         for start in range(0, samples, step):
             values = {}
             for name in names:
@@ -316,10 +317,10 @@ _BLOCK_COLUMNS = {
     "velocity": "velocity",
 }
 CHECKED = tuple(_BLOCK_COLUMNS)
-"""The columns of blocks: their digests are checked when all blocks are read."""
+"""The columns of a block, whose digests are checked when all blocks are read."""
 
 
 def _block(header: Header, first: int, values: Mapping[str, NDArray[Any]]) -> Block:
     fields: dict[str, Any] = {_BLOCK_COLUMNS[n]: array for n, array in values.items() if n in _BLOCK_COLUMNS}
-    # Older files do not state the quantity; they hold lengths.
+    # Older files do not state the quantity; they contain lengths.
     return Block(first, **fields, quantity=header.quantity or "length", unit=header.unit or "m")

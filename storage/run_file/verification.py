@@ -22,13 +22,13 @@ __all__ = ["differences", "entries", "original_pieces"]
 
 
 def differences(contents: Contents, *, but: Iterable[str] = ()) -> Iterator[RunDamaged]:
-    """Yield an error for each difference; nothing for a file that verifies.
+    """Yield an error for each difference between a file and its header; yield nothing for an undamaged file.
 
     Parameters
     ----------
     contents : Contents
     but : iterable of str
-        Columns that were checked already.
+        Columns that have already been checked.
 
     Raises
     ------
@@ -52,14 +52,14 @@ def differences(contents: Contents, *, but: Iterable[str] = ()) -> Iterator[RunD
 
 
 def original_pieces(contents: Contents, entry: FileEntry, start: int) -> Iterator[bytes]:
-    """Yield an original file in pieces, and compare its digest at its end.
+    """Yield an original file in pieces, and compare its digest at the end.
 
     Parameters
     ----------
     contents : Contents
     entry : FileEntry
     start : int
-        Index of its first byte.
+        Index of the file's first byte.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def _field(contents: Contents, path: str, value: Any) -> None:
 
 
 def _attributes(contents: Contents, path: str, expected: dict[str, Any]) -> None:
-    """Compare the attributes for other tools with the header: none missing, none added, none changed."""
+    """Check that the attributes for other tools match the header: none is missing, added or changed."""
     carrier = contents.at(path, f"an attribute of {path}")
     with reading(contents.path, f"an attribute of {path}"):
         attributes = carrier.attrs
@@ -162,7 +162,7 @@ def _attributes(contents: Contents, path: str, expected: dict[str, Any]) -> None
 
 
 def _check_form(stored_item: Any, value: Any) -> None:
-    """Check type, shape and size before reading: texts of variable length can hang HDF5, large ones fill the memory."""
+    """Check type, shape and size before reading: variable-length texts can hang HDF5, large ones fill the memory."""
     data, dtype = stored(value)
     expected = np.asarray(data, dtype)
     actual, required = (stored_item.dtype.kind, stored_item.shape), (expected.dtype.kind, expected.shape)
@@ -179,6 +179,6 @@ def _compare(contents: Contents, what: str, actual: Any, value: Any) -> None:
 
 
 def _cut(value: Any) -> str:
-    """Return the repr of a value, at most 200 characters of it."""
+    """Return the repr of a value, cut after 200 characters."""
     words = repr(value)
     return words if len(words) <= 200 else f"{words[:200]}..."

@@ -53,29 +53,30 @@ def write_run(
 ) -> Path:
     """Write a run file whole.
 
-    The blocks are written as they come, so memory holds at most a chunk of 65536 samples.
+    The blocks are written as they arrive, so at most a chunk of 65536 samples and one block are kept in memory.
 
     Parameters
     ----------
     path : str or PathLike
-        The file to make.
+        The file to create.
     blocks : iterable of Block
-        Consecutive blocks. If some lack a column, it is filled there as in :func:`acquisition.block.concatenate`.
+        Consecutive blocks. A column that some blocks lack is filled as in :func:`acquisition.block.concatenate`.
     info : SourceInfo
         The source; its ``kind`` is stored with the data.
     originals : sequence of Original
-        Files to keep bit for bit.
+        Files to store bit for bit.
     scene : mapping, optional
-        The scene's tables; JSON-able, string keys. Tuples come back as lists.
+        The scene's tables, which JSON must be able to store, with string keys. Tuples are read back as lists.
     title, channel, format : str
-        The run's title, the quantity that is read as distance, the family of recordings.
+        The run's title, the quantity that is used as the distance, and the format family of the recording.
     traps : sequence of Trap
         Remarks of the reader.
     malformed_rows : int
-        Rows that were not samples.
+        Number of rows that were not samples.
     provenance : mapping, optional
-        Anything else that is known; JSON-able, string keys. ``software``, ``version``, ``created_utc``,
-        ``start_time`` (ISO 8601, the time of t = 0) and ``configuration`` also become attributes for other tools.
+        Any further information, which JSON must be able to store, with string keys. ``software``, ``version``,
+        ``created_utc``, ``start_time`` (ISO 8601, the time of t = 0) and ``configuration`` also become attributes for
+        other tools.
     overwrite : bool
         Whether an existing file may be replaced.
 
@@ -87,7 +88,7 @@ def write_run(
     Raises
     ------
     RunExists
-        If the file exists and may not be replaced; no block has been read then.
+        If the file exists and may not be replaced; in this case no block has been read.
     WriteFailed
         If the file cannot be written, blocks are not consecutive or have different quantities, or JSON cannot store
         the scene or the provenance. Errors of the iterable of blocks pass through. In all cases an existing file is
@@ -116,14 +117,14 @@ def write_run(
 def run_writer(
     path: str | os.PathLike[str], *, sigma_m: float | None = None, overwrite: bool = False
 ) -> Iterator[RunWriter]:
-    """Give a writer of a run file; the file is put in place when the ``with`` ends without an error.
+    """Yield a writer of a run file, and move the file into place when the ``with`` ends without an error.
 
     Parameters
     ----------
     path, overwrite
         As in :func:`write_run`.
     sigma_m : float, optional
-        Standard deviation of a distance, m, as the source knows it.
+        Standard deviation of a distance, as stated by the source, m.
 
     Raises
     ------
@@ -139,7 +140,7 @@ def run_writer(
 
 
 class RunWriter:
-    """Writes a run file piece by piece; :func:`run_writer` gives one. Memory holds a chunk of samples."""
+    """Writes a run file piece by piece with one chunk of samples in memory; made by :func:`run_writer`."""
 
     def __init__(self, path: Path, file: Any, sigma_m: float | None) -> None:
         self.path, self.finished = path, False
@@ -153,7 +154,7 @@ class RunWriter:
         Raises
         ------
         WriteFailed
-            If they do not follow the last ones, are of another quantity, or cannot be written.
+            If the samples do not follow the previous ones, have another quantity, or cannot be written.
         """
         self._columns.append(block)
 

@@ -1,6 +1,6 @@
-"""The wire log: every byte off the wire, kept while a run is recorded.
+"""The wire log: every byte received from the sensors, stored while a run is recorded.
 
-In: records (reads, marks, events), appended and never changed. Out: every sound record of a log, whatever happened to
-the file around it, an account of what is missing, and the samples that the bytes decode to.
-To change: what an event says. The layout in ``records`` is fixed: logs of every version so far must stay readable.
+In: records (reads, marks, events), appended and never changed. Out: every valid record of a log, even if the file
+around it is damaged; the counts of missing records; and the samples decoded from the bytes. Free to change: the
+content of events. The layout in ``records`` is fixed: logs of all previous versions must remain readable.
 """

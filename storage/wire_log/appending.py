@@ -39,17 +39,17 @@ from storage.wire_log.records import Kind, LogHeader, ends_item, frames
 __all__ = ["Item", "LogFile", "WireLogWriter", "Written", "open_log_file"]
 
 FIRST_COPY = 8192
-"""Byte of the log after which the header is first repeated."""
+"""Offset in the log after which the header is repeated for the first time, bytes."""
 WRITE_BYTES = 1 << 18
-"""Bytes per write if many records are queued."""
+"""Size of a batch of queued records at which it is written, bytes."""
 _APPEND = os.O_WRONLY | os.O_APPEND  # without O_CREAT: the file must exist
 
 Item = tuple[Kind, int, int, bytes]
-"""The parts of a record: kind, channel, host's monotonic clock in ns, payload."""
+"""The parts of a record: kind, channel, time on the host's monotonic clock in ns, payload."""
 
 
 class Written(NamedTuple):
-    """Size of a log: records, and bytes of the file."""
+    """Size of a log: number of records, and size of the file in bytes."""
 
     records: int = 0
     bytes: int = 0
@@ -58,17 +58,18 @@ class Written(NamedTuple):
 class WireLogWriter:
     """Appends records to a new log.
 
-    One thread appends; others may call :meth:`sync` at the same time. :attr:`written` counts what the kernel has taken,
-    ``synced`` what is on the disk, and ``extended`` the items of the last :meth:`extend` that are whole in the log.
+    One thread appends; others may call :meth:`sync` at the same time. :attr:`written` counts the records that the
+    kernel has accepted, ``synced`` those on the disk, and ``extended`` the items of the last :meth:`extend` that are
+    completely in the log.
 
     Parameters
     ----------
     path : str or PathLike
-        The log to make; its folder must exist.
+        The log to create; its folder must exist.
     header : LogHeader
-        Written and synced before the constructor returns.
+        The first record, which is written and synced before the constructor returns.
     open_file : callable
-        Makes a file; tests replace it.
+        Creates the file; tests replace it.
     log : int, optional
         The log number in all records; random by default.
 
@@ -77,7 +78,7 @@ class WireLogWriter:
     RunExists
         If the file exists: a recording is never overwritten.
     WriteFailed
-        If the log cannot be made; no file is left then.
+        If the log cannot be created; in this case no file remains.
     """
 
     def __init__(
@@ -95,7 +96,7 @@ class WireLogWriter:
         self._next_copy = FIRST_COPY
         self._syncing = threading.Lock()
         self._counting = threading.Lock()
-        self._in_flight = (0, 0)  # records and whole items of the write that has begun and not returned
+        self._in_flight = (0, 0)  # numbers of records and whole items in a write that has not returned yet
         self._append_error: WriteFailed | None = None
         self._sync_error: WriteFailed | None = None
         try:
@@ -139,13 +140,13 @@ class WireLogWriter:
         Raises
         ------
         WriteFailed
-            If the disk does not take all of it. The writer then accepts nothing more; earlier records are kept.
+            If the disk does not accept the whole record. The writer then refuses further records; earlier ones remain.
         """
         self.extend(((kind, channel, mono_ns, payload),))
         return self.written.records - 1
 
     def extend(self, items: Iterable[Item]) -> None:
-        """Append the records of many items with few writes.
+        """Append the records of many items in few writes.
 
         Parameters
         ----------
@@ -154,8 +155,8 @@ class WireLogWriter:
         Raises
         ------
         WriteFailed
-            If the disk does not take all of them. The writer then accepts nothing more; :attr:`extended` counts the
-            items that are whole in the log.
+            If the disk does not accept all of them. The writer then refuses further items; :attr:`extended` counts the
+            items that are completely in the log.
         """
         self.extended = 0
         if error := self._append_error or self._sync_error:
@@ -165,7 +166,7 @@ class WireLogWriter:
         try:
             for kind, channel, mono_ns, payload in items:
                 if end >= self._next_copy:
-                    # The distance doubles: a day's log has about twenty copies, and no zeroed page destroys all.
+                    # The interval doubles: a day's log has about twenty copies, and a zeroed page cannot destroy all.
                     # The copy is written first, so that an error always means that the record itself is incomplete.
                     self._next_copy = 2 * end
                     end += self._lay(batch, Kind.HEADER, 0, mono_ns, self._header)
@@ -187,7 +188,7 @@ class WireLogWriter:
         return sum(map(len, batch[before:]))
 
     def _write(self, batch: list[bytes], items: int) -> None:
-        """Write the records of some items, and count those that are whole in the log."""
+        """Write the records of some items, and count those that are completely in the log."""
         if not batch:
             return
         data = b"".join(batch)
@@ -198,7 +199,7 @@ class WireLogWriter:
             self._in_flight = len(batch), items
         try:
             taken = self._file.write(data)
-            while taken < len(data):  # a nearly full disk takes a part, then reports the error
+            while taken < len(data):  # a nearly full disk accepts a part, then reports the error
                 more = self._file.write(memoryview(data)[taken:])
                 if more <= 0:
                     raise OSError(errno.EIO, f"only {taken} of {len(data)} bytes were written")
@@ -217,7 +218,7 @@ class WireLogWriter:
             self._in_flight = 0, 0
 
     def stop(self) -> int:
-        """Start no further write; return how many items of the last call are in the log or in a write that hangs."""
+        """Prevent further writes; return how many items of the last call are in the log or in a write that hangs."""
         with self._counting:
             self._append_error = self._append_error or WriteFailed(
                 self.path, "the recording was ended while the disk did not respond", "check the disk"
@@ -225,7 +226,7 @@ class WireLogWriter:
             return self.extended + self._in_flight[1]
 
     def append_beside(self, items: Iterable[Item]) -> None:
-        """Append items despite a write that hangs, through a second descriptor, and sync; only after :meth:`stop`.
+        """Append and sync items through a second descriptor while another write hangs; call :meth:`stop` first.
 
         Notes
         -----
@@ -235,7 +236,7 @@ class WireLogWriter:
         Raises
         ------
         OSError
-            If the disk does not take all of it, or the log no longer exists under its name.
+            If the disk does not accept all items, or the log no longer exists under its name.
         """
         batch: list[bytes] = []
         with self._counting:
@@ -251,13 +252,13 @@ class WireLogWriter:
             os.fsync(file.fileno())
 
     def sync(self) -> Written:
-        """Sync everything appended before the call to the disk, and return how much that is.
+        """Sync everything appended before the call to the disk, and return its size.
 
         Raises
         ------
         WriteFailed
-            If the sync fails. What :attr:`synced` counts is safe. The state of later records stays unknown: a kernel
-            forgets which pages it failed to write, so a second successful sync would prove nothing.
+            If the sync fails. The records that :attr:`synced` counts are safe. The state of later ones is unknown: a
+            kernel forgets which pages it failed to write, so a later successful sync would prove nothing.
         """
         with self._syncing:
             if self._sync_error:
@@ -272,12 +273,12 @@ class WireLogWriter:
         return reached
 
     def close(self) -> None:
-        """Close the file without syncing it; call once.
+        """Close the file without syncing it; call this only once.
 
         Raises
         ------
         WriteFailed
-            If the disk reports an earlier error only now.
+            If the disk reports an earlier error only at this point.
         """
         try:
             self._file.close()

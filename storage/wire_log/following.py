@@ -13,14 +13,14 @@ from storage.wire_log.window import Window
 __all__ = ["LogFollower"]
 
 AT_ONCE = 10_000
-"""Most records that one call returns: 100 s of a sensor at 100 Hz. So a long log is shown piece by piece."""
+"""Maximum number of records per call: 100 s of a sensor at 100 Hz. A long log is therefore shown piece by piece."""
 
 
 class LogFollower:
     """Returns each record of a growing log once.
 
-    It only reads, so a failure here does not affect the recording. It returns a record when it is whole in the file,
-    and skips damage like every reader of a log.
+    It only reads, so a failure here does not affect the recording. A record is returned once it is complete in the
+    file, and damage is skipped, as by every reader of a log.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class LogFollower:
     Raises
     ------
     NotALog
-        If there is no log, or none with a header.
+        If the log does not exist or has no header.
     """
 
     def __init__(self, path: Path) -> None:

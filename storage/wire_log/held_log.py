@@ -1,4 +1,4 @@
-"""A log that is kept open for reading during the recording, so that it can be read even after a rename or deletion."""
+"""Keep a log open for reading during the recording, so that it can be read even after a rename or deletion."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ __all__ = ["HeldLog"]
 
 
 class HeldLog:
-    """One read descriptor of a log, which is closed with the last reference to it.
+    """A read descriptor of a log, which is closed with the last reference to this object.
 
-    Not for Windows, where an open file cannot be renamed or deleted.
+    It is not for Windows, where an open file cannot be renamed or deleted.
 
     Parameters
     ----------
     path : Path
-        The log, just after it was made.
+        The log, which has just been created.
 
     Raises
     ------
     OSError
-        If it cannot be opened.
+        If the log cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
@@ -35,7 +35,7 @@ class HeldLog:
         weakref.finalize(self, os.close, self._descriptor)
 
     def astray(self) -> str:
-        """Return in words whether the log was deleted, renamed or replaced; empty if its name still leads to it."""
+        """Return a text if the log was deleted, renamed or replaced; empty if its path still leads to it."""
         own = os.fstat(self._descriptor)
         try:
             there = os.stat(self._path)
@@ -44,17 +44,17 @@ class HeldLog:
         return "" if os.path.samestat(there, own) else "another file has taken the name of the log"
 
     def contents(self) -> LogContents:
-        """Return the current content of the log, under its first name.
+        """Return the current content of the log, which keeps its original path in messages.
 
         Raises
         ------
         NotALog
-            If it cannot be read.
+            If the log cannot be read.
         """
         return LogContents(self._path, [LogPart.at(self._path, self._opened)])
 
     def _opened(self) -> BinaryIO:
-        # A duplicate descriptor shares its position, so passes over the log must not overlap.
+        # A duplicate descriptor shares the file position, so passes over the log must not overlap.
         file = os.fdopen(os.dup(self._descriptor), "rb")
         file.seek(0)
         return file

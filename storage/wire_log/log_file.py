@@ -1,4 +1,4 @@
-"""The file of a log: the interface between the log's writer and the disk."""
+"""Define the file of a log: the interface between the log's writer and the disk."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ class LogFile(Protocol):
     """The interface between the log's writer and the disk; tests replace it with a failing one."""
 
     def write(self, data: bytes | memoryview) -> int:
-        """Append; return how many bytes were written, as ``os.write`` does. Raises OSError."""
+        """Append bytes; return how many of them were written, as ``os.write`` does. Raises OSError."""
         ...
 
     def sync(self) -> None:
-        """Sync what was written to the disk. Raises OSError."""
+        """Sync all written bytes to the disk. Raises OSError."""
         ...
 
     def close(self) -> None:
-        """Close."""
+        """Close the file."""
         ...
 
 
 class _NewFile(io.FileIO):
-    """A new file, locked while it is open, and without buffers outside the kernel."""
+    """A new file that is locked while it is open and has no buffers outside the kernel."""
 
-    # macOS and Windows have no fdatasync; fsync does the same and more.
+    # macOS and Windows have no fdatasync; fsync also syncs the metadata.
     _sync: Callable[[int], None] = staticmethod(getattr(os, "fdatasync", os.fsync))
 
     def __init__(self, path: Path) -> None:
@@ -51,7 +51,7 @@ class _NewFile(io.FileIO):
 
 
 def open_log_file(path: Path) -> LogFile:
-    """Make a new file for appending and sync its name to the disk. Raises OSError."""
+    """Create a new file for appending and sync its name to the disk. Raises OSError."""
     file = _NewFile(path)
     with contextlib.suppress(OSError):  # a disk that cannot sync a folder
         sync_folder(path.parent)

@@ -1,4 +1,4 @@
-"""The JSON records of a wire log: its header (sensors, clocks, bench) and its events."""
+"""Define the JSON records of a wire log: its header (sensors, clocks, bench) and its events."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ __all__ = ["LATEST_NS", "LOG_VERSION", "LONGEST_TEXT", "LogHeader", "SensorEntry
 
 LOG_VERSION = 1
 LONGEST_TEXT = 64 * 65535
-"""Size of the longest header, mark or event, bytes."""
+"""Maximum size of a header, mark or event, bytes."""
 LATEST_NS = 1 << 62
-"""Largest time of a clock, ns: 146 years after the start of the host, or the year 2116 in UTC."""
+"""Maximum time of a clock, ns: 146 years after the start of the host, or the year 2116 in UTC."""
 DEEPEST = 17
-"""Largest depth of nested tables and lists, including the header or event itself."""
+"""Maximum depth of nested tables and lists, including the header or event itself."""
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _Nanoseconds = Annotated[int, Meta(ge=0, le=LATEST_NS)]
@@ -33,20 +33,20 @@ class SensorEntry(Calibrated, frozen=True, forbid_unknown_fields=True):
     Parameters
     ----------
     channel : int
-        Its number within the run.
+        Number of the sensor within the run.
     family : str
         Name of the sensor family.
     port : str
         Address of the port.
     baud : int
     rate_hz : float or None
-        Readings per second that it is set to, Hz; None for the family's rate.
+        Configured number of readings per second, Hz; None for the family's rate.
     options : mapping
         Options of the family's decoder.
     calibration : mapping
         Numbers of :class:`acquisition.live.calibration.Calibration` by name; empty for the default.
     clock_ppm : float or None
-        Largest rate error of its clock, ppm; None for the family's.
+        Maximum rate error of the sensor's clock, ppm; None for the value of the family.
     """
 
     channel: Annotated[int, Meta(ge=0, le=255)]
@@ -64,15 +64,16 @@ class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     Parameters
     ----------
     sensors : tuple of SensorEntry
-        Each with a different channel.
+        The sensors, each with a different channel.
     mono_ns, unix_ns : int
-        The host's monotonic clock and UTC since 1970 at the same moment, ns; they map one clock to the other.
+        Times of the host's monotonic clock and of UTC (since 1970) at the same moment, ns; they map one clock to the
+        other.
     kind : {"live", "simulated", "replay"}
-        It stays with the data, so that simulated data cannot pass for measured.
+        Kind of source. It is stored with the data, so that simulated data cannot be mistaken for measured data.
     scene : mapping or None
-        The scene's tables; JSON-able.
+        The scene's tables, which JSON must be able to store.
     title, version : str
-        The run's title; the version of springmass that records it.
+        The run's title, and the version of springmass that records it.
     """
 
     sensors: Annotated[tuple[SensorEntry, ...], Meta(min_length=1, max_length=256)]
@@ -89,7 +90,7 @@ class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise ValueRefused("sensors", f"expected different channels, got {channels}")
 
     def utc(self, mono_ns: int) -> str:
-        """Return the time of the monotonic clock in ns as UTC (ISO 8601); empty after the year 9999."""
+        """Convert a time of the monotonic clock in ns to UTC (ISO 8601); empty after the year 9999."""
         micros = (self.unix_ns + mono_ns - self.mono_ns) // 1000
         try:
             return (_EPOCH + timedelta(microseconds=micros)).isoformat(timespec="microseconds")
@@ -113,7 +114,7 @@ class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @classmethod
     def decode(cls, payload: bytes) -> LogHeader:
-        """Read the payload that :meth:`encode` made.
+        """Decode the payload that :meth:`encode` returned.
 
         Raises
         ------
@@ -125,7 +126,7 @@ class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             if (version := content.pop("log", None)) != LOG_VERSION:
                 reason = f"expected {LOG_VERSION}, the version of the layout, got {shown(version)}"
                 raise ValueRefused("header.log", reason)
-            content.pop("start_utc", None)  # for people; mono_ns and unix_ns hold the same
+            content.pop("start_utc", None)  # for people; unix_ns states the same time
         return decoded(content, cls, "header", DEEPEST)
 
 
@@ -137,7 +138,7 @@ class _Event(Struct, frozen=True, forbid_unknown_fields=True):
 def event_content(payload: bytes) -> dict[str, Any]:
     """Return the kind and the facts of an event record.
 
-    For a record without them the kind is "unreadable", and the facts hold the beginning of its bytes.
+    If they cannot be read, the kind is "unreadable", and the facts contain the reason and the record's first bytes.
     """
     try:
         return plain(decoded(parsed(payload, "event"), _Event, "event", DEEPEST))

@@ -1,4 +1,4 @@
-"""The marks, events and calibrations of a log, in bounded memory."""
+"""Collect the marks, events and calibrations of a log in bounded memory."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Notes:
     calibrations : dict of int to mapping
         The last calibration of each channel.
     parts : dict of int to int
-        For each channel of a sensor that replaced another, the channel of the sensor before.
+        For each channel of a sensor that replaced another, the channel of the replaced sensor.
     left_out : int
-        Number of notes that were not kept. They are in the log inside the run file.
+        Number of notes that were not kept. They remain in the log inside the run file.
     """
 
     def __init__(self) -> None:
@@ -43,12 +43,12 @@ class Notes:
         self._last_ends: dict[tuple[int, str], tuple[int, dict[str, Any]]] = {}
 
     def take(self, record: Record) -> None:
-        """Collect a record that is no data record.
+        """Collect a record that is not a data record.
 
         Raises
         ------
         storage.schema.ValueRefused
-            If it is a calibration with a value out of range.
+            If the record is a calibration with a value out of range.
         """
         self.counts[record.kind] += 1
         if record.kind is Kind.EVENT:
@@ -59,7 +59,7 @@ class Notes:
             elif content["kind"] == "continues" and isinstance(of := content["facts"].get("of"), int):
                 self.parts.setdefault(record.channel, of)
             elif content["kind"] == "replaced":
-                # States the same link as "continues", in case that record is damaged.
+                # This event states the same link as "continues", in case the "continues" record is damaged.
                 part = content["facts"].get("channel")
                 if isinstance(part, int) and 0 <= part <= HIGHEST_CHANNEL and part != record.channel:
                     self.parts.setdefault(part, record.channel)
@@ -76,7 +76,7 @@ class Notes:
                 self._last_ends[record.channel, content["kind"]] = record.mono_ns, content
 
     def events(self, channel: int | None = None) -> list[tuple[int, Mapping[str, Any]]]:
-        """Return the events of one channel, or of all, in order: host time in ns, kind and facts."""
+        """Return the events of one channel, or of all channels, in order: host time in ns, kind and facts."""
         events = [(each.channel, (each.mono_ns, content)) for each, content in self._notes if each.kind is Kind.EVENT]
         events += [
             (of_channel, event)

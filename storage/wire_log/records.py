@@ -1,12 +1,12 @@
-"""The wire log's layout: the bytes of a record.
+"""Define the layout of a wire log: the bytes of a record.
 
 A log is a sequence of records and nothing else, little-endian::
 
     offset  size  field
          0     2  magic      F5 A9; F5 occurs in no UTF-8 text
          2     2  length     u16, bytes of payload
-         4     4  sequence   u32, 0 for the first record, one more for each, modulo 2^32
-         8     8  mono_ns    i64, ns, host's monotonic clock: of the read for data, of the moment otherwise
+         4     4  sequence   u32, number of the record, counted from 0, modulo 2^32
+         8     8  mono_ns    i64, ns, host's monotonic clock: time of the read for data, of the event otherwise
         16     4  log        u32, random, the same in every record of a log
         20     1  kind       1 header, 2 data, 3 mark, 4 event, 5 end
         21     1  channel    u8, the sensor; 0 if the record belongs to no sensor
@@ -14,8 +14,8 @@ A log is a sequence of records and nothing else, little-endian::
         24     4  crc32      of bytes 0 to 23 and the payload (zlib's polynomial)
         28        payload
 
-``log`` distinguishes the records from those of another log: an old one whose disk blocks reappear after a power cut,
-or one that a device sends as its data. Payloads over 65535 bytes are split into consecutive parts.
+``log`` distinguishes the records from those of another log: an old log whose disk blocks reappear after a power cut,
+or a log that a device sends as its data. Payloads over 65535 bytes are split into consecutive parts.
 
 =======  ====================================================================================================
 header   JSON, see :class:`LogHeader`. Repeated after 8, 16, 32, ... KiB, so that no lost page destroys all copies
@@ -55,12 +55,12 @@ __all__ = [
 ]
 
 HIGHEST_CHANNEL = 255
-"""Largest channel: a record has one byte for it."""
+"""Maximum channel number: a record has one byte for it."""
 
 MAGIC = b"\xf5\xa9"
 MAX_PAYLOAD = 65535
 MOST_PARTS = LONGEST_TEXT // MAX_PAYLOAD
-"""Records of the longest mark, event or header; longer ones are not joined."""
+"""Maximum number of parts of a mark, event or header; longer ones are not joined."""
 _HEAD = struct.Struct("<2sHIqIBBH")
 _CRC = struct.Struct("<I")
 _HEAD_AND_CRC = struct.Struct(_HEAD.format + "I")
@@ -79,7 +79,7 @@ class Kind(enum.IntEnum):
 
 
 class Parts(enum.IntFlag):
-    """How a record continues its neighbours if a payload was split."""
+    """Flags that show how a record continues its neighbours if a payload was split."""
 
     GOES_ON = 1
     GOES_ON_FROM = 2
@@ -95,11 +95,11 @@ class Record(NamedTuple):
     Parameters
     ----------
     offset : int
-        Byte of the log at which it begins.
+        Offset of the record in the log, bytes.
     sequence : int
-        As written, modulo 2^32.
+        Number of the record as written, modulo 2^32.
     mono_ns : int
-        Host's monotonic clock, ns.
+        Time on the host's monotonic clock, ns.
     kind : Kind
     channel : int
     payload : bytes
@@ -120,7 +120,7 @@ class Record(NamedTuple):
         return self.payload.decode("utf-8", "replace")
 
     def json(self) -> Mapping[str, Any]:
-        """Return the payload as a JSON object; empty if it is not one."""
+        """Return the payload as a JSON object; empty if the payload is not a JSON object."""
         try:
             content = parsed(self.payload, "record")
         except ValueRefused:
@@ -176,7 +176,7 @@ Unframed = tuple[int, int, int, Kind, int, int, bytes]
 
 
 def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
-    """Return the record that begins at a byte; None if there is no complete and valid one.
+    """Return the record that begins at an index; None if there is no complete and valid record.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
     at : int
         Index of the record's first byte.
     log : int or None
-        Number of the log to which it must belong; None for any log.
+        Number of the log to which the record must belong; None for any log.
 
     Returns
     -------
@@ -195,7 +195,7 @@ def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
     if start > len(data):
         return None
     magic, length, sequence, mono_ns, log_number, code, channel, parts, crc = _HEAD_AND_CRC.unpack_from(data, at)
-    # Cheap checks first, because a search through damaged bytes comes here for every accidental magic.
+    # Cheap checks first, because a search through damaged bytes calls this for every accidental magic.
     kind = _KINDS.get(code)
     if magic != MAGIC or kind is None or parts > _ALL_PARTS or start + length > len(data):
         return None

@@ -1,4 +1,4 @@
-"""One pass over the bytes of a log: it finds the valid records in order and counts what is missing between them."""
+"""Scan the bytes of a log once: find the valid records in order and count what is missing between them."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class Damage:
     records : int
         Number of valid records.
     lost : int
-        Number of missing or incomplete records, from the sequence numbers. Losses after the last valid record are not
-        counted.
+        Number of missing or incomplete records, derived from the sequence numbers. Losses after the last valid record
+        are not counted.
     skipped_bytes : int
-        Bytes between records that belong to none.
+        Number of bytes between records that belong to no record.
     stretches : tuple of (int, int)
-        Offset and length of the first hundred such stretches.
+        Offset and length of the first hundred stretches of such bytes.
     strays : int
-        Valid records whose number runs backward: copies of earlier ones. They are not delivered.
+        Number of valid records whose sequence number runs backward: copies of earlier ones. They are not delivered.
     tail_bytes : int
-        Bytes after the last valid record: an incomplete record, or pages that were never written.
+        Number of bytes after the last valid record: an incomplete record, or pages that were never written.
     ended : bool
         Whether the last record is the end record of a recording.
     """
@@ -71,7 +71,7 @@ class Scan:
         self._log = log
         self._expected = 0
         self._records = self._lost = self._strays = self._skipped = self._tail = 0
-        self._unreported = 0  # lost records that the next delivered record will report
+        self._unreported = 0  # number of lost records that the next delivered record will report
         self._stretches: list[tuple[int, int]] = []
         self._parts: list[Record] = []
         self._ended = False
@@ -84,7 +84,7 @@ class Scan:
     def records(self) -> Iterator[Record]:
         """Yield the valid records; :meth:`damage` is complete after the last.
 
-        For a live log these are the records so far; the next call yields later ones.
+        For a live log, this call yields the records so far, and the next call yields later ones.
         """
         window = self._window
         if window.live:
@@ -100,7 +100,7 @@ class Scan:
             self._drop_parts()
 
     def _resynchronise(self) -> bool:
-        """Go to the next valid record and count the bytes before it; return False if there is none."""
+        """Advance to the next valid record and count the bytes before it; return False if there is none."""
         start = self._window.offset
         is_there = self._window.seek(self._log)
         length = self._window.offset - start
@@ -137,7 +137,7 @@ class Scan:
         return Record(offset, sequence, mono_ns, kind, channel, payload, lost_before)
 
     def _joined(self, record: Record, parts: int, missing: int) -> Record | None:
-        """Return a text when all its parts are there; None before its last part, or if one is missing."""
+        """Return a joined record when all its parts are present; None before the last part or if one is missing."""
         goes_on_from = bool(parts & Parts.GOES_ON_FROM)
         if self._parts and (missing or not goes_on_from or self._parts[0].kind is not record.kind):
             self._drop_parts()

@@ -1,7 +1,7 @@
-"""Read wire logs: every valid record, however damaged the file is around it, and the count of missing records.
+"""Read wire logs: return every valid record, even of a badly damaged file, and count the missing records.
 
-No content of a file raises an error. After damage the reader continues at the next magic whose record has a correct
-checksum, the number of the log and an increasing sequence number. What lies between is counted, never guessed.
+Damage to a file raises no error. After damage the reader continues at the next magic whose record has a correct
+checksum, the number of the log and an increasing sequence number. The bytes between are counted, never interpreted.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ __all__ = ["Damage", "LogContents", "NotALog", "Record", "parse_log", "read_log"
 
 
 class LogContents:
-    """The records of a log. Every iteration reads the log again, in memory that does not grow with the log.
+    """The records of a log. Every iteration reads the log again, with memory that does not grow with the log.
 
     Parameters
     ----------
     path : Path
         Name of the log in messages.
     parts : sequence of LogPart
-        Its files, in order, each with its size at the time of opening.
+        The files of the log, in order, each with its size at the time of opening.
     """
 
     def __init__(self, path: Path, parts: Sequence[LogPart]) -> None:
@@ -41,7 +41,7 @@ class LogContents:
 
     @property
     def size(self) -> int:
-        """Bytes of all parts."""
+        """Total size of all parts, bytes."""
         return sum(part.size for part in self.parts)
 
     def __iter__(self) -> Iterator[Record]:
@@ -53,8 +53,8 @@ class LogContents:
         Parameters
         ----------
         take_bytes : callable
-            Called with all bytes of the log in order, as they are read, and the number of their part. So a copy of
-            the log has exactly the bytes that were decoded.
+            Called with the number of the part and the bytes of the log, in order, as they are read. A copy made from
+            these calls contains exactly the bytes that were decoded.
 
         Raises
         ------
@@ -67,10 +67,11 @@ class LogContents:
         self._damage = scan.damage()
 
     def number(self) -> int | None:
-        """Return the number of the log: that of its first record, which was on the disk before the run began.
+        """Return the log number of the first record, which was on the disk before the run began.
 
-        If that record is lost, the majority of the valid records decides, because the first of them may come from a
-        device's data or from an old log whose disk blocks reappeared. None if there is no valid record.
+        If that record is lost, return the most frequent number of the first thousand valid records. The first of them
+        alone may come from a device's data or from an old log whose disk blocks reappeared. Return None if there is no
+        valid record.
         """
         with contextlib.closing(Window(self.parts)) as window:
             if (first := window.record(None)) is not None:
@@ -86,7 +87,7 @@ class LogContents:
 
     @property
     def damage(self) -> Damage:
-        """The damage found by the last complete iteration; reads the log if there was none."""
+        """The damage found by the last complete iteration; if there was none, the log is read first."""
         if self._damage is None:
             for _ in self:
                 pass
@@ -100,7 +101,7 @@ class LogContents:
         Raises
         ------
         NotALog
-            If it has a value that is not allowed.
+            If the header has a value that is not allowed.
         """
         for record in self:
             if record.kind is Kind.HEADER:
@@ -116,8 +117,8 @@ class LogContents:
 def read_log(path: str | os.PathLike[str]) -> LogContents:
     """Open a log, whether finished, damaged or still being written.
 
-    Version 0.1.0 continued a log in further files, ``run.001.wire`` and so on. They are read with the first one. A file
-    of such a name with the records of another log is ignored.
+    Version 0.1.0 continued a log in further files, ``run.001.wire`` and so on. They are read with the first file. A
+    file with such a name but the records of another log is ignored.
 
     Parameters
     ----------
@@ -127,7 +128,7 @@ def read_log(path: str | os.PathLike[str]) -> LogContents:
     Returns
     -------
     LogContents
-        Of any file; one that is not a log has no records.
+        The records of the file; a file that is not a log has none.
 
     Raises
     ------
@@ -146,11 +147,11 @@ def read_log(path: str | os.PathLike[str]) -> LogContents:
 
 
 def _further(path: Path) -> list[Path]:
-    """Return the files next to a log that have the names of its further parts, in order."""
+    """Return the files next to a log whose names are those of its further parts, in order."""
     form = re.compile(re.escape(path.stem) + r"\.([0-9]{3,9})" + re.escape(path.suffix))
     try:
         names = os.listdir(path.absolute().parent)
-    except OSError:  # a folder that may be read but not listed
+    except OSError:  # a folder whose files can be opened but not listed
         tried = (path.with_name(f"{path.stem}.{number:03d}{path.suffix}") for number in itertools.count(1))
         return list(itertools.takewhile(Path.exists, tried))
     numbered = [(int(match[1]), name) for name in names if (match := form.fullmatch(name))]

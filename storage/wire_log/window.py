@@ -1,4 +1,4 @@
-"""A window of a log's bytes in memory, for logs of any length and in several files."""
+"""Keep a window of a log's bytes in memory, for logs of any length and in several files."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from storage.wire_log.records import HEAD_BYTES, MAGIC, MAX_PAYLOAD, Unframed, u
 __all__ = ["LONGEST_RECORD", "LogPart", "NotALog", "TakeBytes", "Window"]
 
 LONGEST_RECORD = HEAD_BYTES + MAX_PAYLOAD
-"""Size of the longest record, bytes."""
+"""Maximum size of a record, bytes."""
 STRETCH = 1 << 20
-"""Bytes that are read at a time."""
+"""Number of bytes that are read at a time."""
 
 TakeBytes = Callable[[int, bytes], object]
-"""Called with the number of the part, from 0, and the bytes of the log as they are read."""
+"""Called with the number of the part, counted from 0, and the bytes of the log as they are read."""
 
 
 class NotALog(StorageError):
-    """A path without a wire log, or with one of which nothing can be read."""
+    """A path without a wire log, or with an unreadable one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,10 @@ class LogPart:
     ----------
     path : Path
     size : int
-        Its size at the time of the check, bytes. Later bytes are not read, so that every pass reads the same.
+        Size of the file at the time of the check, bytes. Later bytes are not read, so that every pass reads the same
+        bytes.
     open : callable
-        Opens it for reading, at its beginning.
+        Opens the file for reading at its beginning.
     stat : os.stat_result, optional
         Identifies the file; None for bytes in memory.
     """
@@ -51,13 +52,13 @@ class LogPart:
 
     @classmethod
     def at(cls, path: Path, opened: Callable[[], BinaryIO] | None = None) -> LogPart:
-        """Return a file with its current size.
+        """Return the part for a file, with its current size.
 
         Parameters
         ----------
         path : Path
         opened : callable, optional
-            Opens the file if its name may no longer lead to it; by default it is opened by its name.
+            Opens the file if its path may no longer lead to it; by default it is opened by its path.
 
         Raises
         ------
@@ -73,17 +74,17 @@ class LogPart:
         return cls(path, stat.st_size, opened, stat)
 
     def in_place(self) -> bool:
-        """Return whether its name still leads to it and its size is unchanged. Raises OSError."""
+        """Return whether the path still leads to the same file with the same size. Raises OSError."""
         there = os.stat(self.path)
         return self.stat is not None and os.path.samestat(there, self.stat) and there.st_size == self.size
 
     def sha256(self) -> str:
-        """Return the SHA-256 of its first ``size`` bytes as they are on the disk now.
+        """Return the SHA-256 of the file's first ``size`` bytes that are on the disk now.
 
         Raises
         ------
         NotALog
-            If it can no longer be read.
+            If the file can no longer be read.
         """
         digest, remaining = hashlib.sha256(), self.size
         try:
@@ -97,7 +98,7 @@ class LogPart:
 
 
 class Window:
-    """The part of a log in memory: the bytes ``data``, from byte ``base`` of the log on.
+    """The part of a log in memory: the bytes ``data``, which begin at byte ``base`` of the log.
 
     Parameters
     ----------
@@ -148,7 +149,7 @@ class Window:
         self.data = b"".join(pieces)
 
     def _read(self) -> bytes:
-        """Return the next bytes of the log; none at the end of its last file."""
+        """Return the next bytes of the log; empty at the end of its last file."""
         while self._number < len(self._parts):
             part, last = self._parts[self._number], self._number == len(self._parts) - 1
             try:
@@ -169,21 +170,21 @@ class Window:
         return b""
 
     def record(self, log: int | None) -> Unframed | None:
-        """Return the record that begins at :attr:`at`; None if there is no complete and valid one."""
+        """Return the record that begins at :attr:`at`; None if there is no complete and valid record."""
         if len(self.data) - self.at < LONGEST_RECORD and not self.whole:
             self.fill()
         return unframe(self.data, self.at, log)
 
     def seek(self, log: int | None) -> bool:
-        """Go to the next valid record after :attr:`at`, or to the end; return whether there is one.
+        """Advance :attr:`at` to the next valid record or to the end; return whether there is such a record.
 
-        In a live log without a next record the position stays: the record that begins here may not be complete yet.
+        In a live log without a next record the position is unchanged, because the current record may be incomplete.
         """
         at = self.at + 1
         while True:
             at = self.data.find(MAGIC, at)
             if not self.whole and (at < 0 or len(self.data) - at < LONGEST_RECORD):
-                # The last byte may be the first of a magic.
+                # The last byte may be the first byte of a magic.
                 self.at = len(self.data) - 1 if at < 0 else at
                 self.fill()
                 at = 0

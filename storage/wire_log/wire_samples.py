@@ -1,4 +1,4 @@
-"""Decode the records of a wire log to samples, by the same chains as in the live view."""
+"""Decode the records of a wire log into samples, with the same chains as the live view."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ __all__ = ["BREAKS", "LogDecoder", "chains_of", "decode_log"]
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
 """Events that interrupt the bytes of a channel."""
 HELD_READS = 4096
-"""Reads that are decoded at a time; more would take more memory, fewer would give many small arrays."""
+"""Number of reads decoded at a time; more would take more memory, fewer would give many small arrays."""
 HELD_BYTES = 1 << 18
-"""Or bytes that are decoded at a time, because a read may hold many readings."""
+"""Number of bytes at which fewer reads are decoded, because a read may contain many readings."""
 
 
 def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
@@ -42,10 +42,10 @@ def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
 
 
 class LogDecoder:
-    """Decodes the records of a log to samples, piece by piece.
+    """Decodes the records of a log into samples, piece by piece.
 
     If records are missing or a port was lost, no frame spans the gap, and the first sample after it is flagged.
-    Channels of other sensors are skipped.
+    The channels of other sensors are skipped.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class LogDecoder:
     reads : list of int
         Number of reads of each sensor's port so far.
     last_ns : int
-        Host time of the log's last record in any channel, ns; known at the end.
+        Host time of the log's last record in any channel, ns; set at the end.
     """
 
     def __init__(
@@ -75,13 +75,13 @@ class LogDecoder:
         self._held: list[list[tuple[int, bytes]]] = [[] for _ in self.sensors]
 
     def blocks(self, log: Iterable[Record], *, growing: bool = False) -> Iterator[tuple[int, Block]]:
-        """Yield samples as they are decoded, with the index of their sensor.
+        """Yield the index of a sensor and its samples, as they are decoded.
 
         Parameters
         ----------
         log : iterable of Record
         growing : bool
-            Whether a later call brings more records.
+            Whether a later call will pass more records.
         """
         places = {sensor.channel: (number, held) for number, (sensor, held) in enumerate(self._places())}
         size = mono_ns = 0

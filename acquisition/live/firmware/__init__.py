@@ -1,7 +1,7 @@
-"""The firmware of the rangefinder that is part of the package: built from firmware/springmass_rangefinder.
+"""The firmware of the rangefinder, included in this package and built from firmware/springmass_rangefinder.
 
-It provides the path of the hex file, its version and its wiring as text. ``make firmware`` builds the hex file, and a
-test compares it with the one here, byte for byte.
+The module provides the path and version of the hex file, and a text that shows the wiring. ``make firmware`` builds the
+hex file, and a test compares the result byte for byte with the file in this folder.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ MODEL = "springmass-rangefinder"
 VERSION = "2.0.0"
 HEX = Path(__file__).with_name("springmass_rangefinder.hex")
 BAUDS = (115200, 57600)
-"""Speeds of the bootloaders: the first for the Uno and Nanos since 2018, the second for older Nanos and most clones."""
+"""Baud rates of the bootloaders: first for the Uno and Nanos since 2018, then for older Nanos and most clones."""
 
 WIRING = """\
 Arduino Uno or Nano (ATmega328P, 16 MHz, 5 V)     HC-SR04
@@ -32,5 +32,5 @@ If wanted, a DS18B20 thermometer, flat side towards you:
 
 
 def avrdude_arguments(port: str, baud: int) -> list[str]:
-    """Return the command, as a list of arguments, that writes the firmware through the bootloader of a board."""
+    """Return the command line that writes the firmware through the bootloader of a board, as a list of arguments."""
     return ["avrdude", "-p", "atmega328p", "-c", "arduino", "-P", port, "-b", str(baud), "-D", "-U", f"flash:w:{HEX}:i"]

@@ -1,11 +1,12 @@
 """Any table: rows of numbers below any headings, from programs without a separate family.
 
-It is tried last. :func:`acquisition.recordings.tables.table_layout.find_table` finds the table; this module decides
-which of its columns are times. What is easy to get wrong:
+This family is tried last. :func:`acquisition.recordings.tables.table_layout.find_table` finds the table; this module
+decides which of its columns are times. What is easy to get wrong:
 
-- A column is a time by its name, in a dozen languages, and only if it rises; or, if its name allows it, because it is
-  the only one that rises. Row numbers and periods are not times.
-- Clock times (``10:04:59.812``) count from the first one; midnight may lie between them.
+- A rising column is read as the times if its name denotes time, in one of a dozen languages. Otherwise a column with a
+  neutral name may be the times because of its even steps, or because no other column rises. Row numbers and periods
+  are not times.
+- Clock times (``10:04:59.812``) are converted to seconds since the first one; midnight may lie between them.
 - Oscilloscopes write ``Start`` and ``Increment`` above a column of row numbers.
 """
 
@@ -35,7 +36,7 @@ def _evidence(head: bytes) -> str:
     if not is_text(head) or head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<"):
         return ""
     if foreign_format("", head) is not None:
-        return ""  # the refusal of the file names its kind
+        return ""  # the error message will name the kind of file
     _, table = _find(Text.of(head))
     if table is None:
         return ""
@@ -94,7 +95,7 @@ def _contents(path: str, data: bytes) -> Contents:
 
 
 def _units_beside(table: TableLayout) -> tuple[list[Heading], set[int]]:
-    """Return the headings with units from columns of units after the numbers, and these columns."""
+    """Return the headings, with units taken from columns of units to the right of the numbers, and these columns."""
     headings, words = list(table.headings), set()
     for column, cells in enumerate(zip(*table.rows, strict=True)):
         known = measure_of(cells[0]) is not None or time_power(cells[0]) is not None
@@ -105,7 +106,7 @@ def _units_beside(table: TableLayout) -> tuple[list[Heading], set[int]]:
 
 
 def _find(text: Text) -> tuple[Text, TableLayout | None]:
-    """Find the table in the text after prefixes of rows are removed."""
+    """Remove prefixes of rows from a text, and find the table in it."""
     text, headings = without_prefix(text) or (text, ())
     table = find_table(text.head(_HEAD_LINES))
     if table is not None and len(headings) == len(table.headings):
@@ -128,14 +129,14 @@ def _preamble(table: TableLayout) -> tuple[Trap, ...]:
 
 
 def _formula(table: TableLayout) -> Formula | None:
-    """Return the times that an oscilloscope states after the names: start and increment."""
+    """Return the times that an oscilloscope states by a start and an increment after the names; else None."""
     settings = {name.lower(): parse_number(value) for name, value in table.spare}
     start, step = settings.get("start"), settings.get("increment")
     return None if start is None or not step or not step > 0 else Formula(start, step)
 
 
 def _without_clock(text: Text, table: TableLayout, column: int) -> tuple[Text, str]:
-    """Replace a column of clock times by seconds since the first clock time, and also return that first time."""
+    """Replace a column of clock times by seconds since the first clock time; return the text and the first time."""
     mark = table.mark.encode() or None
     lines: list[bytes] = []
     first, last, days, shown = None, 0.0, 0, ""

@@ -1,7 +1,7 @@
 """A zip archive with recordings: phyphox's CSV export, a packed folder, Tracker's trz.
 
-Each file inside is read by its own format; if there are several, the user chooses one as the run. Pictures, videos and
-the like are skipped and listed.
+Each file inside is read by its own format; if there are several, each is a run and the user chooses one. Pictures,
+videos and similar files are skipped and listed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Bare numbers: rows without any text.
 
-Delimiter and decimal mark are inferred from the rows. A first column that rises in even steps, or the only column that
-rises, is read as the times, and this is reported; row numbers (steps of 1) are not times. The user must give the unit,
-the channel if there are several columns, and the rate if there are no times: none of them is guessed.
+The delimiter and the decimal mark are inferred from the rows. A first column that rises in even steps, or the only
+column that rises, is read as the times; this is reported unless it is the first column. Row numbers (steps of 1) are
+not times. The user must give the unit, the channel if there are several columns, and the rate if there are no times.
+None of these is guessed.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _ROWS = 100
 
 
 def _rows(lines: Sequence[str]) -> tuple[list[list[float]], str]:
-    """Return the numbers of the first rows and their separator; no rows if line 1 is not all numbers."""
+    """Return the numbers of the first rows and their separator; no rows if a cell of line 1 is not a number."""
     some = [line for line in lines if line.strip(" \t\0\x1a")][:_ROWS]
     mark = guess_delimiter(some[0]) if some else ""
     if mark == "," and not any(line.count(",") > 1 or "." in line for line in some):
@@ -38,7 +39,7 @@ def _rows(lines: Sequence[str]) -> tuple[list[list[float]], str]:
 
 
 def _comma(lines: Sequence[str]) -> str:
-    """Return whether the only comma of each line separates two whole numbers (",") or is a decimal mark ("")."""
+    """Return "," if the only comma in each line separates two whole numbers, or "" if it is a decimal mark."""
     behind = {len(line.partition(",")[2].strip()) for line in lines}
     # A column of decimal fractions usually has the same number of decimals; a few lines are not enough to decide.
     return "" if len(behind) == 1 and behind != {0} and len(lines) > 2 else ","
@@ -63,7 +64,7 @@ def _contents(path: str, data: bytes) -> Contents:
     names = tuple(f"column {column + 1}" for column in range(len(numbers)))
     sheet = Sheet(text, text.start, text.stop, 1, mark, names=names)
     counts = len(names) > 1 and are_row_numbers(numbers[0])
-    # A single column besides row numbers holds measured values, even if it rises.
+    # A single column besides row numbers contains measured values, even if it rises.
     time = times_by_steps([Heading("", "")] * len(names), numbers) if len(names) > 1 + counts else None
     channels = (
         Channel(name, "", sheet, "", column, time)

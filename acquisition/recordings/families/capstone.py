@@ -4,7 +4,7 @@ What is easy to get wrong:
 
 - Runs are side by side and end at different rows; derived columns (velocity, acceleration) are empty at the edges.
 - The decimal mark may differ between cells: ``-8,90E-4`` next to ``0.12``. Small numbers have an exponent.
-- The column of times may be missing: then the rate must be given.
+- The column of times may be missing; then the user must give the rate.
 - SPARKvue writes ``Time (s) Run 5``, and columns with dates as text.
 - Localised exports translate time and run, or have headings without any unit
   (``time;position;velocity;acceleration``).
@@ -33,7 +33,7 @@ _QUANTITIES = frozenset(
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
-    """Return the headings of a line and their separator; no headings for a line of another family."""
+    """Return the headings of a line, none for a line of another family, and their separator."""
     cells, mark = split_heading(line)
     matches = [_OF_RUN.fullmatch(cell) for cell in cells]
     if cells and all(each is not None or not cell for each, cell in zip(matches, cells, strict=True)) and any(matches):

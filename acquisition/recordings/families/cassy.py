@@ -1,7 +1,7 @@
 """CASSY Lab: ``.labx`` (XML with readable numbers) and the older ``.lab`` (text that begins with ``CL4`` or similar).
 
-In the XML every ``channel`` has its ``quantity``, ``symbol``, ``unit`` and ``values``; an empty value is a missing one.
-In the text three lines (quantity, symbol, unit) and a line of settings describe each channel. A line with the numbers
+In the XML every ``channel`` has its ``quantity``, ``symbol``, ``unit`` and ``values``; an empty value is a lost sample.
+In the text, three lines (quantity, symbol, unit) and a line of settings describe each channel. A line with the numbers
 of columns and rows comes before the rows, whose cells are separated by tabs.
 """
 
@@ -73,14 +73,14 @@ def _of_text(path: str, text: Text) -> Contents:
 
 
 def _of_rows(path: str, text: Text, above: Sequence[str], first: int, width: int) -> Contents:
-    # A channel is three lines of words and one of sixteen settings.
+    # Three lines of words and one line of sixteen settings describe a channel.
     described = [
         tuple(above[at - back].strip() for back in (3, 2, 1))
         for at, line in enumerate(above)
         if at >= 3 and len(cells := line.split()) == 16 and all(parse_number(cell) is not None for cell in cells)
     ]
     if len(described) == width + 1 and described[2][2] == "Hz":
-        del described[2]  # the axis of the spectrum comes after index and time, and has no column
+        del described[2]  # the axis of the spectrum is described after index and time, but has no column
     if len(described) != width:
         raise FormatError(path, f"expected {width} channels above the rows, got {len(described)}", _REMEDY)
     lines = text.head(first + 1)

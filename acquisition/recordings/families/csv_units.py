@@ -12,7 +12,7 @@ from acquisition.recordings.tables.text import head_lines, parse_number
 __all__ = ["FORMAT"]
 
 _OTHERS = (capstone.FORMAT, logger_pro.FORMAT, phyphox.FORMAT, motion_sensor.FORMAT)
-"""Families that know more about such columns."""
+"""Families that interpret similar columns in more detail, and to which such files are left."""
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:

@@ -1,6 +1,6 @@
 """PASCO DataStudio: a line ``Voltage, ChA, Run #1``, a line ``Time ( s )<TAB>Voltage ( V )``, rows; then the next run.
 
-Most numbers are fixed point; small ones have an exponent (``-2.441E-4``). Times are row numbers over the rate.
+Most numbers are fixed point; small ones have an exponent (``-2.441E-4``). Times are row numbers divided by the rate.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MARK = b" #"
 
 
 def _headings(title: str, line: str) -> tuple[Heading, ...]:
-    """Return the headings in two lines; none for lines of another family."""
+    """Return the headings that two lines contain; none for lines of another family."""
     of_run = _TITLE.fullmatch(title)
     cells, _ = split_heading(line)
     named = [name_and_unit(cell) for cell in cells]

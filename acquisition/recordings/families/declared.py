@@ -48,7 +48,7 @@ _MOST_HEADING = 1000
 
 
 def dialects() -> Iterator[ColumnFormat]:
-    """Yield the families that the user declares, by name.
+    """Yield the families that the user declares, sorted by name.
 
     Raises
     ------
@@ -70,13 +70,13 @@ def dialect(path: str, text: str) -> ColumnFormat:
     Parameters
     ----------
     path : str
-        Its file, whose stem is the family's name.
+        Path of the declaration; its stem is the family's name.
     text : str
 
     Raises
     ------
     AcquisitionError
-        If it is not valid; one line with file, key and what is allowed.
+        If the declaration is not valid; the message is one line with the file, the key and the allowed values.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """Vernier's Logger Pro and Graphical Analysis: CSV, and the files that the programs save.
 
-In the CSV runs are side by side under ``Latest: Position (m)`` or ``Data Set 1:Time(s)``. A saved file is XML (cmbl)
+In the CSV, runs are side by side under ``Latest: Position (m)`` or ``Data Set 1:Time(s)``. A saved file is XML (cmbl)
 or a tar archive with XML (gambl): a ``DataSet`` is a run, and a ``DataColumn`` has its name, its unit and a line for
 each number in ``ColumnCells``; an empty line, or ``Z1 1:``, is a lost sample.
 """

@@ -6,12 +6,12 @@ rows. What is easy to get wrong:
 
 - The separator is the character after the word ``Separator``. ``Decimal_Separator`` may be absent; the decimal mark is
   detected in each cell.
-- ``X_Columns`` No: the first cell of a row is empty and t = X0 + i Delta_X. One: the first column holds t. Multi: a
+- ``X_Columns`` No: the first cell of a row is empty and t = X0 + i Delta_X. One: the first column is t. Multi: a
   column of times precedes each channel.
-- Headers may be outdated: more or fewer rows than ``Samples``, another step than ``Delta_X``. If the column of times
+- Headers may be outdated: more or fewer rows than ``Samples``, or a step other than ``Delta_X``. If the column of times
   agrees with the formula within its rounding, the formula is more accurate and is used; otherwise the column is used.
 - Channels of one segment may have different lengths; a comment column may follow.
-- A date of 1903 or 1904 is LabVIEW's zero and not a start time.
+- A date in 1903 or 1904 is LabVIEW's zero of time and not a start time.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _MOST_SEGMENTS = 10_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Header:
-    """The keys of a header with their cells, and the start of the next line."""
+    """The keys of a header with their cells, its first line, and the start of the line after it."""
 
     cells: Mapping[str, list[str]]
     first: Line
@@ -44,11 +44,11 @@ class _Header:
     next_line: int
 
     def first_of(self, key: str) -> str:
-        """Return the first cell of a key."""
+        """Return the first non-empty cell of a key."""
         return next((cell for cell in self.cells.get(key, ()) if cell), "")
 
     def of_column(self, key: str, column: int) -> str:
-        """Return the cell of a key above a column of the rows."""
+        """Return the cell of a key that belongs to a column of the rows."""
         cells = self.cells.get(key, [])
         return cells[column - 1] if 0 < column <= len(cells) else ""
 
@@ -74,7 +74,7 @@ def _contents(path: str, data: bytes) -> Contents:
 
 
 def _separator(path: str, text: Text) -> str:
-    """Return the character after the tag; without the tag, the one after the words of the first line."""
+    """Return the separator: the character after the tag ``Separator``, or else after the opening words of line 1."""
     first = next(text.lines(), None)
     if first is None or not first.text.lstrip().startswith(_MAGIC):
         problem = f'expected "{_MAGIC}" in the first line'
@@ -90,7 +90,7 @@ def _separator(path: str, text: Text) -> str:
 
 
 def _header(path: str, text: Text, start: int, number: int, mark: str) -> _Header:
-    """Read the lines up to the next end of a header."""
+    """Read the lines of a header up to its end mark."""
     cells: dict[str, list[str]] = {}
     first = None
     for count, line in enumerate(text.lines(start, number)):
@@ -107,11 +107,11 @@ def _header(path: str, text: Text, start: int, number: int, mark: str) -> _Heade
 
 
 def _segments(path: str, text: Text, top: _Header, mark: str) -> Iterator[tuple[_Header, int]]:
-    """Yield each segment's header and the byte where its rows end."""
+    """Yield each segment's header and the byte position where its rows end."""
     start, number = top.next_start, top.next_line
     for _ in range(_MOST_SEGMENTS):
         header = _header(path, text, start, number, mark)
-        # Searching for one character is ten times faster, and rows do not contain it.
+        # Searching for one character is ten times faster, and rows do not contain this character.
         star = text.data.find(_END[:1].encode(), header.next_start, text.stop)
         end = star if star < 0 else text.data.find(_END.encode(), star, text.stop)
         if end < 0:
@@ -124,7 +124,7 @@ def _segments(path: str, text: Text, top: _Header, mark: str) -> Iterator[tuple[
 
 
 def _begin_of_header(text: Text, low: int, end: int) -> int:
-    """Walk back from the end of a header over lines that begin with a word."""
+    """Return where a header begins: walk back from its end over empty lines and lines that begin with a word."""
     at = text.data.rfind(b"\n", low, end) + 1 or low
     while at > low:
         previous = max(text.data.rfind(b"\n", low, at - 1) + 1, low)
@@ -140,7 +140,7 @@ def _line_ends(data: bytes, start: int, stop: int) -> int:
 
 
 def _channels(text: Text, top: _Header, segment: _Header, stop: int, mark: str, run: str) -> Iterator[Channel]:
-    """Yield the channels in a segment's line of names."""
+    """Yield the channels that are listed in a segment's line of names."""
     names = next(iter(text.lines(segment.next_start, segment.next_line)), None)
     if names is None or names.start >= stop:
         return
@@ -173,7 +173,7 @@ def _channels(text: Text, top: _Header, segment: _Header, stop: int, mark: str, 
 
 
 def _name_and_unit(label: str, unit: str, column: int) -> tuple[str, str]:
-    """Take the unit from a channel's name if the header has none, or the same."""
+    """Split a channel's label into name and unit, unless the header states a different unit."""
     name, inside = name_and_unit(label)
     if inside and unit in ("", inside):
         return name, inside

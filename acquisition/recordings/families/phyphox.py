@@ -1,8 +1,8 @@
 """phyphox: exports as CSV with quoted headings, and saved states as XML.
 
 The phone measures the times, so their steps vary (9.964 to 9.972 ms); each sensor may have a separate column of
-times. In the XML the numbers of every buffer are in the ``init`` attribute of its container, and ``<export>`` names
-the buffers.
+times. In the XML, the ``init`` attribute of each container lists the numbers of a buffer, and ``<export>`` names the
+buffers.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _ROOT = re.compile(
 
 
 def _headings(line: str) -> tuple[tuple[Heading, ...], str]:
-    """Return quoted headings if the first one is a time with its unit; else none."""
+    """Return quoted headings, if the first is a time with its unit (else none), and their separator."""
     if not _QUOTED.fullmatch(line):
         return (), ""
     cells, mark = split_heading(line)
@@ -85,7 +85,7 @@ def _buffers(root: Element) -> Iterator[tuple[str, F8]]:
 
 
 def _channels(root: Element, buffers: Mapping[str, F8]) -> Iterator[Channel]:
-    """Yield the channels of every set of the export, each with the times of its set."""
+    """Yield the channels of every set in the export, each with the times of its set."""
     sets = list(root.iter("set"))
     for each in sets:
         run = each.get("name", "") if len(sets) > 1 else ""

@@ -1,8 +1,8 @@
 """TDMS: National Instruments' binary waveforms, read by npTDMS.
 
 Rate and start come from the waveform properties (``wf_increment``, ``wf_start_offset``); a channel without them needs
-times from a channel of its group or a given rate. ``wf_samples`` is the length of one written chunk and may be smaller
-than the number of samples. A start in 1903 or 1904 is LabVIEW's zero and not a start time.
+another channel of its group as its times, or a rate from the user. ``wf_samples`` is the length of one written chunk
+and may be smaller than the number of samples. A start in 1903 or 1904 is LabVIEW's zero of time, not a start time.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _contents(path: str, data: bytes) -> Contents:
     except FormatError:
         raise
     except Exception as error:
-        # npTDMS has no special error for a damaged file; its parser may raise anything.
+        # npTDMS has no special error for a damaged file; its parser may raise any exception.
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         problem = f"npTDMS cannot read it ({reason[:200]})"
         raise FormatError(path, problem, "check that it was copied whole; export it again") from error

@@ -2,11 +2,11 @@
 
 1. Copy this file to ``acquisition/recordings/families/NAME.py``. The docstring describes a file, with a few real lines,
    and what is easy to misread.
-2. ``_evidence`` returns, from the head of a file, why it belongs to this family, in a few words; empty if it does not.
-   It uses the content, never the file's name, and never raises.
+2. ``_evidence`` takes the head of a file and returns a few words on why the file belongs to this family, or an empty
+   text if it does not. It uses the content, never the file's name, and never raises.
 3. ``_contents`` finds the headers and describes the layout: runs, channels, units, times. It reads no numbers:
    :class:`acquisition.recordings.tables.sheet.ColumnFormat` does that and handles all faults of rows.
-4. Leave empty what the file does not state (unit, times). The user is then asked for it.
+4. Leave empty each item that the file does not state (unit, times). The reader then asks the user for it.
 5. Add one line to ``_TABLE`` of ``acquisition/recordings/identify.py``, or, in a separate package, an entry point in
    the group ``springmass.formats``.
 6. Add one ``Case`` to ``tests/conformance/test_formats.py``.
@@ -29,7 +29,7 @@ from acquisition.recordings.tables.text import head_lines, text_of
 
 __all__ = ["FORMAT"]
 
-_TITLE = re.compile(r"Height log, (\d+(?:\.\d+)?) Hz")  # change: what only your files have
+_TITLE = re.compile(r"Height log, (\d+(?:\.\d+)?) Hz")  # change: a title that only your files have
 
 
 def _evidence(head: bytes) -> str:
@@ -44,7 +44,7 @@ def _contents(path: str, data: bytes) -> Contents:
     if first is None or title is None or not float(title[1]) > 0:
         raise FormatError(path, "expected the title of a height log", "export the run again", line=1)
     rows = Sheet(text, start=first.next, stop=text.stop, first_line=2, delimiter=";")
-    # change: a channel for each column but the times. If a column holds times: time=COLUMN, time_unit="s".
+    # change: a channel for each column except the times. If a column contains times: time=COLUMN, time_unit="s".
     height = Channel("height", "mm", rows, column=1, formula=Formula(start_s=0.0, step_s=1 / float(title[1])))
     return Contents((height,), title=first.text, zeros=text.zeros)
 

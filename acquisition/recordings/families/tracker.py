@@ -4,9 +4,10 @@ The table has an optional line ``mass A`` and a line ``t x y``, without units. L
 stick, so the user must state it. Times are frame numbers at 25 or 30 per second. The name of the mass is in the user's
 language.
 
-A trk file is XML. Each ``PointMass`` holds pixels by frame number. ``ImageCoordSystem`` has origin, scale (pixels per
-unit of length) and the angle of the x axis (degrees, anticlockwise), for all frames or from a frame on. Pixels count
-downwards, y upwards. ``delta_t`` is the duration of a frame, ms. ``length_unit`` is the unit, if it was set.
+A trk file is XML. Each ``PointMass`` lists pixel positions by frame number. ``ImageCoordSystem`` has the origin, the
+scale (pixels per unit of length) and the angle of the x axis (degrees, anticlockwise), for all frames or starting at a
+given frame. Pixels are counted downwards, but y points upwards. ``delta_t`` is the duration of a frame, ms.
+``length_unit`` is the unit, if it was set.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def _cells(line: str) -> tuple[list[str], str]:
 
 
 def _find(lines: Sequence[str]) -> int:
-    """Return which of the first two lines is the headings; -1 if neither is, or no row follows."""
+    """Return the index (0 or 1) of the line of headings; -1 if there is none, or no row follows it."""
     for at, line in enumerate(lines[:2]):
         cells, mark = _cells(line)
         names = [name_and_unit(cell)[0] for cell in cells]
@@ -86,7 +87,7 @@ def _contents(path: str, data: bytes) -> Contents:
 
 
 def _row_mark(text: Text, headings: Line) -> str:
-    """Return the separator of the rows' cells if the headings are separated by blanks."""
+    """Return the separator of cells in the first row, needed if the headings are separated by blanks."""
     row = next(text.lines(headings.next), None)
     return guess_delimiter(row.text) if row else ""
 
@@ -140,7 +141,7 @@ def _number(path: str, of: Element | None, name: str, default: float = math.nan)
 
 
 def _frames(path: str, of: Element, names: Sequence[str]) -> Iterator[tuple[int, tuple[float, ...]]]:
-    """Yield number of frame and numbers of each entry of an object's ``framedata``."""
+    """Yield the frame number and the named values of each entry in an object's ``framedata``."""
     for array in of.findall("property"):
         for each in array.findall("property") if array.get("name") == "framedata" else ():
             frame, mark = re.fullmatch(r"\[(\d{1,9})\]", each.get("name", "")), each.find("object")
@@ -149,7 +150,7 @@ def _frames(path: str, of: Element, names: Sequence[str]) -> Iterator[tuple[int,
 
 
 def _world(frame: int, pixel: Sequence[float], systems: Sequence[tuple[int, Sequence[float]]]) -> tuple[float, float]:
-    """Return x and y in units of length, from pixels by the origin, angle and scale of the axes."""
+    """Convert pixels to x and y in units of length, by the origin, angle and scale of the axes."""
     x0, y0, degrees, x_scale, y_scale = next(
         (system for first, system in reversed(systems) if first <= frame), systems[0][1]
     )

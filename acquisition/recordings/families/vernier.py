@@ -78,7 +78,7 @@ def _encoded(text: Text, headings: str) -> bytes:
 
 
 def _set(text: Text, at: int, number: int) -> _Set | None:
-    """Read the name and the headings of a data set; None if no rows follow."""
+    """Read the name and the headings of a data set; return None if no rows follow."""
     above: list[Line] = []
     for line in text.lines(at, number):
         if not line.text.strip() and not line.text.strip(" "):
@@ -100,7 +100,7 @@ def _set(text: Text, at: int, number: int) -> _Set | None:
 
 
 def _headings(lines: Sequence[str], run: str) -> list[Heading]:
-    """Join long names and units; the units are the last line of two or three."""
+    """Combine long names with units; the units are in the last of two or three lines."""
     names = [cell.strip() for cell in lines[0].rstrip().split("\t")]
     if len(lines) == 1:
         return [Heading(*name_and_unit(name), run) for name in names]

@@ -1,4 +1,4 @@
-"""Bursts: times from a computer that reads several samples together, and the even times at which they were taken."""
+"""Find bursts of times, as stamped by a computer that reads several samples at once, and the even sampling times."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from acquisition.recordings.sampling.nominal import median
 
 __all__ = ["Bursts", "find_bursts"]
 
-_FEWEST = 20  # bursts, from which their interval is known
-_SHORT = 0.25  # of the mean step: within a burst
-_CLEAR = 0.95  # share of steps that are within a burst or between two
-_REGULAR = 0.9  # share of the bursts whose interval is within a half of the usual one
-_SAME_TIME = 3.0  # rows per burst, if they have one time: two may be two sensors
+_FEWEST = 20  # minimum number of bursts for which their interval can be determined
+_SHORT = 0.25  # maximum step within a burst, relative to the mean step
+_CLEAR = 0.95  # minimum share of steps that are clearly within a burst or between two bursts
+_REGULAR = 0.9  # minimum share of intervals that differ from the median by less than half of it
+_SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; two rows may be two sensors
 
 
 class Bursts(NamedTuple):
-    """Samples that were stamped in bursts.
+    """Properties of samples that were stamped in bursts.
 
     Parameters
     ----------
     size : float
         Samples per burst, on average.
     interval_s : float
-        From burst to burst, s.
+        Interval from one burst to the next, s.
     step_s, first_s : float
-        From sample to sample, if they are spread evenly, and the time of the first, s.
+        Interval between the samples if they are spread evenly, and the time of the first sample, s.
     complete : bool
-        Whether every stamp lies within one interval of its even time. Otherwise samples are missing somewhere.
+        Whether the last stamp of every burst lies within one interval of its evenly spaced time. Otherwise samples are
+        missing somewhere.
     """
 
     size: float
@@ -56,8 +57,8 @@ def find_bursts(t: F8) -> Bursts | None:
     Notes
     -----
     A computer that polls a sensor, or gets its samples in packets, stamps each sample when it arrives. The stamps of
-    one packet lie close together and say nothing about the moments of its samples. The stamps of the last samples do:
-    a straight line through them, over the row numbers, gives rate and start.
+    one packet lie close together and contain no information on when its samples were taken. The stamps of the last
+    samples of the packets do: a straight line fitted to them against the row numbers gives the rate and the start.
     """
     if t.size < 2 * _FEWEST or not np.isfinite(t).all():
         return None

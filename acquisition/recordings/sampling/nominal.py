@@ -41,11 +41,11 @@ class Rate(NamedTuple):
     rate_hz : float
         Samples per second, Hz.
     relative_u : float
-        Relative half width of the rates that the rounding of the times allows.
+        Relative half-width of the range of rates that are compatible with the rounding of the times.
     grid : Grid or None
-        The grid from which the times were rounded; None if they fit none.
+        The grid from which the times were rounded; None if they fit no grid.
     certain : bool
-        Whether no grid of one hertz more or less fits equally well.
+        Whether no grid with a rate one hertz higher or lower fits equally well.
     """
 
     rate_hz: float
@@ -64,7 +64,7 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
     resolution : float
         Last printed digit, s.
     rate_hz : float, optional
-        The rate if it is known: only its grid is tried.
+        The rate if it is known; then only grids of this rate are tried.
 
     Returns
     -------
@@ -107,26 +107,29 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
 
 
 def median(values: NDArray[np.number]) -> float:
-    """Return the median of finite numbers; numpy's median imports numpy.ma, a tenth of the start-up time."""
+    """Return the median of finite numbers.
+
+    This replaces numpy's median, which imports numpy.ma and thereby takes a tenth of the start-up time.
+    """
     half = values.size // 2
     part = np.partition(values, half)
     return float(part[half] if values.size % 2 else 0.5 * (part[:half].max() + part[half]))
 
 
 def _probe(apart: F8) -> F8:
-    """Return enough times to distinguish grids: all of a short run; both ends and some in between of a long one."""
+    """Return enough times to distinguish grids: all times of a short run, or both ends and a subset of a long run."""
     if apart.size <= 4 * _PROBE:
         return apart
     return np.concatenate((apart[:_PROBE], apart[:: apart.size // _PROBE], apart[-_PROBE:]))
 
 
 def _every_point(apart: F8, grid: Grid) -> bool:
-    """Return whether consecutive times are at consecutive grid points."""
+    """Return whether consecutive times usually lie at consecutive grid points."""
     return median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0
 
 
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
-    """Return the usual step of increasing times, s, and its relative half width, refined over longer spans."""
+    """Return the typical step of increasing times (s) and its relative half-width, refined over longer spans."""
     every = max(1, apart.size // _PROBE)
     step = max(median(apart[1::every] - apart[:-1:every]), resolution)
     span, relative_u = 1, resolution / step
@@ -135,7 +138,7 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
         steps = np.rint(lengths / step)
         step = median(lengths / np.maximum(steps, 1))
         relative_u = resolution / (span * step)
-    if apart.size > 2:  # over the whole length, if the number of its steps is certain
+    if apart.size > 2:  # use the whole length if the number of steps in it is certain
         length = float(apart[-1] - apart[0])
         steps_in_all = length / step
         if steps_in_all * relative_u < 0.5 <= steps_in_all:
@@ -144,7 +147,7 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
 
 
 def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F8, NDArray[np.bool_]]:
-    """Replace each time by its grid point if the two agree within the rounding of the print.
+    """Replace each time by the nearest grid point if the two agree within the rounding of the printed time.
 
     Parameters
     ----------
@@ -153,12 +156,12 @@ def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F
     resolution : float
         Last printed digit, s.
     out : (n,) float64, s, optional
-        Receives the times; may be ``t`` itself.
+        Array that receives the result; may be ``t`` itself.
 
     Returns
     -------
     t : (n,) float64, s
-        Grid points, and the unchanged times that do not agree with one.
+        Grid points; a time that agrees with no grid point is unchanged.
     agrees : (n,) bool
     """
     snapped = np.empty(t.size) if out is None else out
@@ -172,16 +175,16 @@ def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F
 
 
 def place_unread(t: F8, unread: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int) -> F8:
-    """Return times with those of rows that could not be read, from the grid and the neighbours.
+    """Return the times of all rows; infer those of unread rows from the grid and the neighbouring rows.
 
     Parameters
     ----------
     t : (n,) float64, s
-        Times; those of unread rows as printed, or NaN.
+        Times; for an unread row, the printed time or NaN.
     unread : (n,) bool
     grid : Grid or None
     expected : dict of int to str
-        The first cell of each unread row.
+        The first cell of an unread row, by row index; only the cell of the last row is used.
     decimals : int
         Number of printed decimals of a time.
 
@@ -204,7 +207,7 @@ def place_unread(t: F8, unread: NDArray[np.bool_], grid: Grid | None, expected: 
             ahead, behind = row - start + 1, stop - row
             guess = _time_of_row(float(t[row]), last, after, (before, ahead), behind, grid)
             if np.isnan(guess) and row == t.size - 1 and grid is not None and np.isfinite(last):
-                # The last row may stop within its time; then it must be the beginning of the next time.
+                # The last row may be cut within its time. Its first cell must then begin like the next time.
                 follows = float(grid.time(grid.nearest(np.array([last])) + 1)[0])
                 if expected.get(row, "") and f"{follows:.{decimals}f}".startswith(expected[row]):
                     guess = follows
@@ -216,7 +219,7 @@ def place_unread(t: F8, unread: NDArray[np.bool_], grid: Grid | None, expected: 
 def _time_of_row(
     printed: float, last: float, after: float, before: tuple[float, int], behind: int, grid: Grid | None
 ) -> float:
-    """Return the printed time of an unread row if it is at its place on the grid; else NaN."""
+    """Return the printed time of an unread row if it lies at the expected place on the grid; else NaN."""
     if not np.isfinite(printed) or printed <= last or printed >= after:
         return np.nan
     if grid is None:
@@ -225,7 +228,7 @@ def _time_of_row(
     if np.isfinite(last) and np.isfinite(after):
         return exact if last < exact < after else np.nan
     origin, steps = before if np.isfinite(before[0]) else (after, -behind)
-    # At an end of the file only the expected step is accepted, because a digit may be damaged.
+    # At either end of the file only the expected step is accepted, because a digit may be damaged.
     return exact if abs(exact - origin - steps / grid.rate_hz) < 0.5 / grid.rate_hz else np.nan
 
 
@@ -235,7 +238,7 @@ def _runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
 
 
 def _even(t: F8, longest: float) -> bool:
-    """Return whether every step is positive and none is long."""
+    """Return whether every step is positive and at most ``longest``."""
     for start in range(0, t.size - 1, _BLOCK):
         steps = np.diff(t[start : start + _BLOCK + 1])
         if not (steps.min() > 0 and steps.max() <= longest):
@@ -255,8 +258,8 @@ def time_flags(t: F8, step: float) -> U8:
     Returns
     -------
     (n,) uint8
-        Times of the samples without DUPLICATE_TIME and NON_MONOTONIC_TIME increase strictly. If a single time is
-        ahead of its neighbours, that time is flagged and not all that follow it.
+        Flags. The times of samples with neither DUPLICATE_TIME nor NON_MONOTONIC_TIME increase strictly. If a single
+        time is ahead of its neighbours, only that time is flagged, and not all the times after it.
 
     Examples
     --------

@@ -29,30 +29,31 @@ IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
 
 _COARSE_M = 1e-3
-_FAR_SPREADS, _FAR_GAP = 30.0, 3.0  # deviation of a lost target: times the usual, and times the next smaller one
+# Minimum deviation of a lost target from the median, relative to the median deviation and to the next smaller one.
+_FAR_SPREADS, _FAR_GAP = 30.0, 3.0
 _SAMPLE = 65536
-_FEWEST = 50  # distances; with fewer, a common step may be chance
+_FEWEST = 50  # minimum number of distances; with fewer, a common step may be accidental
 _ZEROS = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """One channel's rows, before they become samples.
+    """The rows of one channel, before they become samples.
 
     Parameters
     ----------
     printed : (n,) float64, s, or None
-        Times as printed; None if there are none.
+        Times as printed; None if there are no times.
     value : (n,) float64
-        In the channel's unit times the wanted power of ten; NaN if unread or absent.
+        Values in the channel's unit, multiplied by the wanted power of ten; NaN if unread or absent.
     unread, remark : (n,) bool
-        Rows that could not be read, and rows of text between samples, which are not samples.
+        Masks of the rows that could not be read, and of remarks: rows of text between samples, which are not samples.
     line : callable
-        Returns the one-based line of a row.
+        Returns the one-based line number of a row.
     time_resolution, resolution : float
-        Last printed digit of a time, s, and of a value; the latter is 0 for binary values.
+        Size of the last printed digit of a time (s) and of a value; the latter is 0 for binary values.
     tolerance : (n,) float64, s, or None
-        Half the last digit of each time, if they are to be compared with a formula in the header.
+        Half the last printed digit of each time, if the times are compared with a formula in the header.
     cut : bool
         Whether the last row is incomplete.
     last_cell : str
@@ -78,14 +79,14 @@ class Rows:
 
     @property
     def numbers(self) -> I8:
-        """Sample numbers of the rows, counted without remarks; a remark has the number of the row before."""
+        """Sample number of each row, not counting remarks; a remark has the number of the preceding row."""
         return np.cumsum(~self.remark) - 1
 
 
 def place(rows: Rows, timing: Timing) -> F8:
-    """Return the time of each row, s: from its row number, or as printed and snapped to the grid.
+    """Return the time of each row in seconds, from its row number or from the printed time, snapped to the grid.
 
-    The time of an unread row is inferred if possible, else NaN. The array of printed times is overwritten.
+    The time of an unread row is inferred if possible, else NaN. The array of printed times may be overwritten.
     """
     unread, t, grid = rows.unread, rows.printed, timing.grid
     if grid is not None and (timing.by_row or t is None):
@@ -108,7 +109,7 @@ def within(values: F8, limit: float) -> bool:
 
 
 def flags_of(t: F8, value: F8, unread: NDArray[np.bool_], rate_hz: float) -> U8:
-    """Flag what is wrong with times and values."""
+    """Return the flags for faults in the times and values."""
     flags = time_flags(t, 1.0 / rate_hz)
     missing = np.isnan(value)
     if missing.any():
@@ -119,7 +120,7 @@ def flags_of(t: F8, value: F8, unread: NDArray[np.bool_], rate_hz: float) -> U8:
 
 
 def row_traps(rows: Rows, timed: NDArray[np.bool_], zeros: int) -> Iterator[Trap]:
-    """Report which rows could not be read; ``timed`` are those with a time, which become samples."""
+    """Report the rows that could not be read; ``timed`` marks the rows with a time, which become samples."""
     if zeros:
         yield Trap("zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted")
     unread = rows.unread
@@ -137,7 +138,7 @@ def row_traps(rows: Rows, timed: NDArray[np.bool_], zeros: int) -> Iterator[Trap
 
 
 def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | None]) -> Iterator[Trap]:
-    """Report the flagged samples by flag; ``line`` returns the line of a sample."""
+    """Report the flagged samples, grouped by flag; ``line`` returns the line number of a sample."""
     if not flags.any():
         return
     kinds = (
@@ -165,16 +166,16 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
 def value_traps(
     distance: F8, flags: U8, resolution: float, line: Callable[[int], int | None], *, length: bool = True
 ) -> tuple[float, tuple[Trap, ...]]:
-    """Find distances that are rounded more coarsely than they are printed, and a lost target.
+    """Find zeros that fill the end, a lost target, and distances rounded more coarsely than printed.
 
     Parameters
     ----------
     distance : (n,) float64, m
-        Zeros that fill the end become NaN in place.
+        Zeros that fill the end are replaced by NaN in place.
     flags : (n,) uint8
-        Samples of a lost target get FALSE_ECHO in place, zeros that fill the end MISSING.
+        In place, samples of a lost target get FALSE_ECHO, and zeros that fill the end get MISSING.
     resolution : float
-        Last printed digit, m.
+        Size of the last printed digit, m.
     line : callable
     length : bool
         Whether these are distances. Voltages have no lost target, and 0 V is a normal reading.
@@ -208,7 +209,7 @@ def value_traps(
 
 
 def _zero_tail(distance: F8) -> int:
-    """Return the index of the first zero that fills the end; the number of samples if there are none."""
+    """Return the index of the first zero that fills the end; the number of samples if fewer than ten zeros do."""
     if distance.size <= _ZEROS or distance[-1] != 0.0 or distance[-_ZEROS:].any():
         return int(distance.size)
     nonzero = np.flatnonzero(distance != 0.0)
@@ -216,15 +217,15 @@ def _zero_tail(distance: F8) -> int:
 
 
 def _some(values: F8) -> F8:
-    """Return at most a few ten thousand finite values, evenly spread."""
+    """Return at most about 130 000 finite values, evenly spaced in the recording."""
     some = values[:: max(1, values.size // _SAMPLE)]
     return some[np.isfinite(some)]
 
 
 def _far(distance: F8, resolution: float) -> NDArray[np.int64]:
-    """Return the samples far from the median, relative to the deviation of the others, and beyond a gap.
+    """Return the samples that deviate far more from the median than the others, with a gap in between.
 
-    The size of the experiment is unknown, so no distance is far by itself; a decaying motion has no such gap.
+    The size of the experiment is unknown, so there is no absolute limit. A decaying motion has no such gap.
     """
     values, no_samples = _some(distance), np.empty(0, np.int64)
     if values.size < _ZEROS:

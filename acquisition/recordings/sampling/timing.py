@@ -19,7 +19,7 @@ from acquisition.recordings.sampling.nominal import Grid, find_rate
 __all__ = ["Timing", "check_rate", "clock_traps", "rate_needed", "time_by_column", "time_by_formula", "time_by_rate"]
 
 _SHARE_OF_JITTER = 0.2
-_ANY_RATE_HZ = 100.0  # an example of a rate, which many sensors have
+_ANY_RATE_HZ = 100.0  # an example: the rate of many sensors
 
 
 class Timing(NamedTuple):
@@ -31,17 +31,17 @@ class Timing(NamedTuple):
     grid : Grid or None
         None if the times fit no grid and are used as printed.
     resolution_s : float
-        Last printed digit, s.
+        Size of the last printed digit, s.
     certain : bool
         Whether the times or a header determine the rate.
     given : bool
         Whether the user gave the rate and the file does not confirm it.
     steps_s : (float, float) or None
-        The usual range of steps between times that fit no grid but jitter little about one step.
+        Range of the time steps (5th to 95th percentile) if the times fit no grid but jitter little about one step.
     by_row : bool
-        Whether row numbers give better times than the printed ones.
+        Whether times computed from row numbers are better than the printed times.
     bursts : Bursts or None
-        What the computer's times looked like, if samples were spread evenly instead.
+        The bursts in the computer's times, if evenly spaced times replace them.
     """
 
     rate_hz: float
@@ -61,23 +61,23 @@ def check_rate(path: str, rate_hz: float | None) -> None:
 
 
 def rate_needed(instead: MissingItem | None = None) -> MissingItem:
-    """Return the missing item for a rate.
+    """Return the missing item that represents a rate.
 
     Parameters
     ----------
     instead : MissingItem, optional
-        The column of times, which could be given instead.
+        The missing item for a column of times, which could be given in place of the rate.
     """
     return MissingItem(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
 
 
 def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
-    """Infer the rate from a column of times, s, of valid rows.
+    """Infer the rate from the printed times (s) of valid rows.
 
     Raises
     ------
     NeedsAnswer
-        If there are fewer than two different times, or bursts of times with samples missing, and no rate was given.
+        If no rate was given, and there are fewer than two different times, or bursts of times with missing samples.
     FormatError
         If the given rate contradicts the times.
     """
@@ -101,7 +101,7 @@ def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | N
 
 
 def _spread(path: str, bursts: Bursts, resolution: float, rate_hz: float | None) -> Timing:
-    """Return even times for samples that were stamped in bursts."""
+    """Return a timing with evenly spaced times for samples that were stamped in bursts."""
     if rate_hz is None and not bursts.complete:
         each = f"{bursts.size:.3g} samples every {1e3 * bursts.interval_s:.3g} ms"
         raise NeedsAnswer(Question(path, (rate_needed(),), reason=f"the times come in bursts of {each}, some missing"))
@@ -111,7 +111,7 @@ def _spread(path: str, bursts: Bursts, resolution: float, rate_hz: float | None)
 
 
 def _jitter(printed: F8) -> tuple[float, float] | None:
-    """Return the usual range of steps, if all but a few are close to one step."""
+    """Return the 5th and 95th percentiles of the time steps if these differ little; else None."""
     steps = np.diff(printed)
     steps = steps[steps > 0]
     if steps.size < 2:
@@ -134,21 +134,21 @@ def time_by_formula(
     Parameters
     ----------
     printed, tolerance : (n,) float64, s, or None
-        Times of the rows, NaN if unread, and half the last digit of each; None without a column.
+        Printed times of the rows (NaN if unread) and half the last digit of each; None if there is no column of times.
     numbers : (n,) int64
-        The i of each row.
+        The index i of each row.
 
     Returns
     -------
     Timing or None
-        None if header and column disagree.
+        None if the header and the column disagree, or if the times of the header are impossible.
     """
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
     if printed is not None and tolerance is not None:
         expected = start_s + step_s * numbers
         slack = 1e-9 * np.maximum(np.abs(expected), step_s)
-        if (np.abs(printed - expected) > tolerance * 1.0001 + slack).any():  # false for a NaN
+        if (np.abs(printed - expected) > tolerance * 1.0001 + slack).any():  # the comparison is false for a NaN
             return None
     rate = 1.0 / step_s
     rounded = float(f"{rate:.9g}")
@@ -160,14 +160,14 @@ def time_by_formula(
 
 
 def time_by_rate(path: str, rate_hz: float | None, why: str) -> Timing:
-    """Use the rate that the user gives, because the file has no times."""
+    """Use the rate that the user gives for a file without times."""
     if rate_hz is None:
         raise NeedsAnswer(Question(path, (rate_needed(),), reason=why))
     return Timing(rate_hz, Grid(rate_hz), 0.0, certain=True, given=True, by_row=True)
 
 
 def clock_traps(timing: Timing) -> Iterator[Trap]:
-    """Report the kind of the times."""
+    """Report how the times were obtained."""
     if timing.bursts is not None:
         size, interval_ms = timing.bursts.size, 1e3 * timing.bursts.interval_s
         message = (
@@ -196,7 +196,9 @@ def clock_traps(timing: Timing) -> Iterator[Trap]:
 
 
 def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int) -> F8:
-    """Return half the last printed digit of each time, s; for times with exponents at least that.
+    """Return half the last printed digit of each time, s; for a time with an exponent, an estimate from its size.
+
+    The estimate is not too small if the mantissa is at least 1.
 
     Parameters
     ----------
@@ -206,7 +208,7 @@ def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int)
     shift : int
         Power of ten from the printed unit to seconds.
     exponent : int
-        Added to the decimals in a form with an exponent.
+        Constant that is added to the number of decimals in the form of a number with an exponent.
     """
     usual = int(form[0]) if form.size else 0
     if 0 <= usual < exponent and (form == usual).all():

@@ -1,4 +1,4 @@
-"""Use a velocity column: find the sensor's tick, sum up the position, and join it with a position column."""
+"""Process a velocity column: find the sensor's tick, integrate to a position, and join it with a position column."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from acquisition.block import F8, I8
 __all__ = ["Path", "find_quantum", "find_tick", "integrate", "outer_join"]
 
 _FEWEST_VALUES = 20
-_FINEST = 4  # a tick below four last digits cannot be distinguished from the rounding
+_FINEST = 4  # minimum tick, in last printed digits; a smaller one cannot be distinguished from rounding
 _SHARE = 0.95
 _COARSEST = 24
 _COHERENT = 0.9
 
 
 def find_tick(values: F8, resolution: float) -> float | None:
-    """Find the largest step of which printed values are multiples, within their rounding.
+    """Find the largest step of which the printed values are multiples, within rounding.
 
     Parameters
     ----------
     values : (n,) float64
         Printed values; NaN is ignored.
     resolution : float
-        Last printed digit, in their unit.
+        Size of the last printed digit, in the unit of the values.
 
     Returns
     -------
     float or None
-        The step, in their unit; None if there is no evident step.
+        The step, in the unit of the values; None if there is no evident step.
 
     Notes
     -----
-    Gaps between neighbouring values are candidates for the step s. Each is refined by least squares of ``v = k s``
-    over larger and larger v, because the integers k of large v are certain only for an accurate s. The step must
-    explain 95 % of the values.
+    Gaps between neighbouring sizes of values are candidates for the step s. Each is refined by least squares of
+    ``v = k s`` over an increasing range of v, because the integers k of large v are certain only if s is accurate. The
+    step must explain 95 % of the different sizes.
 
     Examples
     --------
@@ -98,14 +98,14 @@ def find_quantum(values: F8, tick: float) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """Position summed up from velocity.
+    """Position integrated from velocity.
 
     Parameters
     ----------
     position : (n,) float64, m
         Zero at the first sample; NaN if the velocity is unknown.
     bridged : (n,) bool
-        Samples after a gap, whose offset from the earlier samples is not known.
+        Mask of the first sample after each gap; its offset from the earlier samples is not known.
     """
 
     position: F8
@@ -113,12 +113,12 @@ class Path:
 
 
 def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, rounding: float) -> Path:
-    """Sum backward differences to a position.
+    """Sum backward differences to obtain the position.
 
     Parameters
     ----------
     velocity : (n,) float64, m/s
-        ``(x[i] - x[i-1]) * rate_hz``; NaN if unknown. The first needs no value.
+        ``(x[i] - x[i-1]) * rate_hz``; NaN if unknown. The first value may be unknown.
     index : (n,) int64
         Sample numbers, increasing; a jump is a gap.
     rate_hz : float
@@ -164,15 +164,15 @@ def outer_join(left: I8, right: I8, regular: NDArray[np.bool_] | None = None) ->
     Parameters
     ----------
     left, right : (n,), (m,) int64
-        Sample numbers. The n-th row of a repeated number pairs with the n-th there.
+        Sample numbers. If a number repeats, its n-th row on the left pairs with its n-th row on the right.
     regular : (n,) bool, optional
-        Rows of ``left`` whose numbers are in order; all by default.
+        Mask of the rows of ``left`` whose numbers are in order; all by default.
 
     Returns
     -------
     from_left, from_right : (k,) int64
-        Row of each joined sample in either; -1 if it has none. Rows of ``left`` keep their order, and rows that only
-        ``right`` has are inserted by their number.
+        Row of each joined sample in ``left`` and in ``right``; -1 if there is none. Rows of ``left`` keep their order,
+        and rows that exist only in ``right`` are inserted according to their numbers.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Choose a channel from the answers of the user, and ask for what neither file nor user states."""
+"""Choose a channel according to the user's answers, and ask for information that neither file nor user states."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _FIRST_ROWS = 50
 _SHARE_OF_RESTARTS = 0.2
 _LAST_BYTES = 4096
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-"""Units of times since 1970, by their smallest size."""
+"""Units of times since 1970, each with the minimum of the numbers to which it applies."""
 _LIKELY = (
     (re.compile(r"gyr|omega|ω|ang\w*[ _.]*(vel|speed|ges)|winkelges|^g[xyz](?![^\W_])", re.IGNORECASE), "rad/s"),
     (re.compile(r"acc|beschl|versn|^a[xyz](?![^\W_])|g[-_ ]?f|^ac[xyz]", re.IGNORECASE), "m/s2"),
@@ -48,7 +48,7 @@ _LIKELY = (
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What the user states about a file; None for what is not stated."""
+    """The user's statements about a file; None for each item that is not stated."""
 
     channel: str | None = None
     rate_hz: float | None = None
@@ -64,7 +64,7 @@ def choose_channel(path: str, contents: Contents, answers: Answers) -> Channel:
     Raises
     ------
     NeedsAnswer
-        With the columns and all missing items.
+        If anything is missing; the question lists the columns and all missing items.
     FormatError
         If an answer contradicts the file.
     """
@@ -82,7 +82,7 @@ def choose_channel(path: str, contents: Contents, answers: Answers) -> Channel:
     if answers.time is not None:
         chosen = _timed_by(path, channels, chosen, answers.time)
     if isinstance(chosen.source, Sheet) and chosen.time is not None and _restarts(chosen.source, chosen.time):
-        chosen = replace(chosen, time=None, formula=None)  # chunks, with unknown times between them
+        chosen = replace(chosen, time=None, formula=None)  # chunks of times, with unknown intervals between them
     chosen = _with_time_unit(path, chosen, answers.time_unit)
     needs.extend(_missing_times(channels, chosen, answers))
     if chosen.measure is None and answers.unit is None:
@@ -150,7 +150,7 @@ def _timed_by(path: str, channels: Sequence[Channel], chosen: Channel, time: str
 
 
 def _column(sheet: Sheet, name: str) -> int | None:
-    """Return the column of a name, with or without unit, or of a number such as "column 2"; None if there is none."""
+    """Return the column with a name, with or without unit, or a number such as "column 2"; None if there is none."""
     bare = " ".join(name_and_unit(name)[0].lower().split())
     for wanted in (" ".join(name.lower().split()), bare):
         for column, each in enumerate(sheet.names):
@@ -213,7 +213,7 @@ def _missing_times(channels: Sequence[Channel], chosen: Channel, answers: Answer
 
 
 def _likely_time_unit(times: F8) -> str:
-    """Return the most likely unit of times of this size or with such steps."""
+    """Return the most likely unit of times, judging by their size and their steps."""
     if times.size < 2:
         return "ms"
     since_1970 = next((unit for from_size, unit in _EPOCHS if times[0] >= from_size), None)
@@ -221,7 +221,7 @@ def _likely_time_unit(times: F8) -> str:
 
 
 def _restarts(sheet: Sheet, column: int) -> bool:
-    """Return whether times jump back again and again, as in chunks of a few samples."""
+    """Return whether times repeatedly jump back, as in chunks of a few samples."""
     steps = np.diff(_first_times(sheet, column))
     return bool(steps.size >= 4 and np.mean(steps < 0) >= _SHARE_OF_RESTARTS)
 
@@ -255,7 +255,7 @@ def _time_name(chosen: Channel) -> str:
 
 
 def _times(chosen: Channel) -> Times | str:
-    """Return the range of the times; only their name if there are too few numbers, and an empty text without times."""
+    """Return the range of the times, only their name if there are too few numbers, or an empty text without times."""
     source = chosen.source
     if isinstance(source, Sheet):
         if chosen.time is None:
@@ -276,7 +276,7 @@ def _times(chosen: Channel) -> Times | str:
 
 
 def _last_times(sheet: Sheet, tail: int, column: int) -> F8:
-    """Return the last times, from a byte on; the bytes before the first line end are an incomplete line."""
+    """Return the times from byte ``tail`` to the end, without the incomplete line at the beginning."""
     line = tail if tail == sheet.start else sheet.text.data.find(b"\n", tail, sheet.stop) + 1 or tail
     return _first_times(replace(sheet, start=line), column, _LAST_BYTES)
 

@@ -1,4 +1,4 @@
-"""Read one channel of a file: its rows, which of them could not be read, and its samples."""
+"""Read one channel of a file: its rows, including those that could not be read, and its samples."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _T = TypeVar("_T", bound=np.generic)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelSamples:
-    """One channel's samples.
+    """The samples of one channel.
 
     Parameters
     ----------
@@ -35,11 +35,11 @@ class ChannelSamples:
     flags : (n,) uint8
     timing : Timing
     resolution : float
-        Last printed digit of a value.
+        Size of the last printed digit of a value.
     traps : tuple of Trap
         Remarks on times and rows.
     line : callable
-        Returns the one-based line of a sample; None for a binary file.
+        Returns the one-based line number of a sample; None for a binary file.
     malformed_rows : int
     behind : tuple of (rows,) float64
         The columns after the value, without the rows that could not be read.
@@ -79,7 +79,7 @@ def read_rows(path: str, channel: Channel, power: int) -> Rows:
 
 def _from_arrays(path: str, channel: Channel, arrays: Arrays, power: int) -> Rows:
     value = arrays.values / 10.0**-power if power else arrays.values.copy()
-    # A copy, because channels may share the times, and they are changed later.
+    # The times are copied, because channels may share them and they are changed later.
     t = None if arrays.t is None else arrays.t * time_factor(channel.time_unit) / 10.0 ** -power_of_times(path, channel)
     unread = np.zeros(value.size, bool) if t is None else ~np.isfinite(t)
     if unread.any():
@@ -148,10 +148,10 @@ def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Rows:
 
 
 def _columns(channel: Channel, sheet: Sheet) -> list[int]:
-    """Return the columns of a sheet to read for a channel: all if rows have a fixed width, else only those needed."""
+    """Return the columns to read for a channel: all if rows have a fixed width, else only the columns it needs."""
     if sheet.width:
         return list(range(sheet.width))
-    # The first column distinguishes rows from remarks, even if it belongs to another channel, unless it is empty.
+    # Unless it is empty, the first column distinguishes rows from remarks, even if it belongs to another channel.
     row = next(sheet.text.lines(sheet.start), None)
     leads = row is not None and row.text.split(sheet.delimiter or None)[:1] not in ([], [""])
     needed = ([0] if leads else []) + ([] if channel.time is None else [channel.time]) + [channel.column]
@@ -159,7 +159,7 @@ def _columns(channel: Channel, sheet: Sheet) -> list[int]:
 
 
 def _own_rows(table: Table, own: int, at: int | None, *, every: bool, ragged: bool) -> tuple[B1, B1, B1]:
-    """Return which rows of a table belong to a channel, which of them are remarks, and which could not be read.
+    """Return three masks of a table's rows: rows of the channel, remarks among them, and rows that could not be read.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def _own_rows(table: Table, own: int, at: int | None, *, every: bool, ragged: bo
     own, at : int, int or None
         The columns of the values and of the times.
     every : bool
-        Whether each row must have all numbers, so that none is a remark.
+        Whether every cell of a row must be a number, so that no row is a remark.
     ragged : bool
         See :class:`acquisition.recordings.tables.contents.Channel`.
     """
@@ -195,11 +195,11 @@ def _selected(column: NDArray[_T], rows: NDArray[np.int64] | None) -> NDArray[_T
 
 
 def _present(table: Table, own: int, at: int | None, ragged: bool) -> B1:
-    """Return which rows belong to the channel; others belong to a longer channel of the same table."""
+    """Return the mask of the rows of the channel; other rows belong to a longer channel of the same table."""
     empty = table.form[own] == EMPTY
     keep = np.ones(empty.size, bool) if at is None else ~(empty & (table.form[at] == EMPTY))
     if ragged or at is None:
-        # Empty cells at the end are after the channel's last sample; one in the middle is a lost sample.
+        # Empty cells at the end follow the channel's last sample; an empty cell before it is a lost sample.
         some = np.flatnonzero(~empty)
         keep[int(some[-1]) + 1 if some.size else 0 :] = False
     return keep
@@ -215,7 +215,7 @@ def to_samples(path: str, channel: Channel, rows: Rows, rate_hz: float | None, z
     channel : Channel
     rows : Rows
     rate_hz : float or None
-        The rate, if it is given.
+        The rate that the user gives, if any.
     zeros : int
         Number of zero bytes at the end of the file, which were left out.
 

@@ -1,4 +1,4 @@
-"""The content of a file before a channel is chosen: runs, channels, units, and the places of their numbers."""
+"""The content of a file before a channel is chosen: runs, channels, units, and the locations of their numbers."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ _BESIDE_TIME = frozenset(
         *("velocity", "acceleration", "raw", "sensor", "gps", "system", "rel", "abs"),
     )
 )
-"""Words that the name of a time column may have besides the word for time; others make it, for example, a period."""
+"""Words that may accompany the word for time in a time column's name; other words denote, for example, a period."""
 _WORDS = re.compile(r"[^\W\d_]+\d*|\d+")
 _ACCELERATION = re.compile(r"acc|beschl|versn|g[-_ ]?f|^a(?![^\W\d_])|^a[xyz](?![^\W_])", re.IGNORECASE)
 _UNCERTAIN = re.compile(
@@ -68,25 +68,25 @@ _UNCERTAIN = re.compile(
 )
 _CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _HEADING = re.compile(r"(?P<name>.*?)\s*[(\[<](?P<unit>[^()\[\]<>]*)[)\]>]\s*")
-_NO_UNIT = re.compile(r"\d+|.*:.*")  # the number of a channel, a remark
+_NO_UNIT = re.compile(r"\d+|.*:.*")  # text in brackets that is the number of a channel, or a remark
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sheet:
-    """Rows below one header.
+    """The rows below one header.
 
     Parameters
     ----------
     text : Text
     start, stop : int
-        Bytes where the rows begin and end.
+        Byte positions where the rows begin and end.
     first_line : int
-        One-based line of the first row.
+        One-based line number of the first row.
     delimiter : str
     width : int or None
-        Number of cells of every row, all of them numbers; None if rows may be ragged.
+        Number of cells in every row if all of them are numbers; None if rows may be ragged.
     names : tuple of str
-        Names of all columns, including times, if the family knows them, so that a user may name one as the time.
+        Names of all columns, including times, if the family knows them. The user can then name one as the times.
     """
 
     text: Text
@@ -100,7 +100,7 @@ class Sheet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrays:
-    """Numbers of a binary file, or numbers that were read already.
+    """Numbers of a binary file, or numbers that have already been read.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Arrays:
         Times in the channel's unit of time.
     values : (n,) float64
     time_name : str
-        Name of the times; empty if the file does not state it.
+        Name of the array of times; empty if the file does not state it.
     """
 
     t: F8 | None
@@ -132,27 +132,27 @@ class Channel:
     Parameters
     ----------
     name : str
-        Its name in the file, without unit.
+        Its name in the file, without the unit.
     unit : str
-        As printed in the file; empty if it is not.
+        Unit as printed in the file; empty if the file states none.
     run : str
-        Empty for a single run without a name.
+        Name of the run; empty for a single run without a name.
     source : Sheet or Arrays
     column : int
         Column of the sheet.
     time : int or None
-        Column of its times; None if there is none.
+        Column of its times; None if there is no such column.
     time_unit : str
-        As printed in the file; empty if it is not.
+        Unit of the times as printed in the file; empty if the file states none.
     formula : Formula or None
     clock : {"nominal", "device", "host"}
         Kind of the clock for times that fit no regular grid.
     start_time : str
-        ISO 8601, if the file states it; else empty.
+        Start time in ISO 8601 if the file states it; else empty.
     ragged : bool
-        Whether it may end before its times do, because these also belong to other channels.
+        Whether the channel may end before its times, because other channels share these times.
     difference : bool
-        Whether its values are differences to the row before, so that the first is NaN.
+        Whether its values are differences from the preceding row, so that the first value is NaN.
     aside : bool
         Whether it is an auxiliary column (a row number, an uncertainty), which is read only if it is named.
     """
@@ -180,7 +180,7 @@ class Channel:
     def measure(self) -> Measure | None:
         """The measure of its unit; None for an unknown unit.
 
-        The unit g is standard gravity only for a channel named as an acceleration, else a gram.
+        The unit g means standard gravity if the channel's name denotes an acceleration; otherwise it means gram.
         """
         measure = measure_of(self.unit if self.unit != "G" else "g")
         grams = measure is not None and measure.symbol in ("g", "mg") and not _ACCELERATION.search(self.name)
@@ -199,12 +199,12 @@ class Contents:
     Parameters
     ----------
     channels : tuple of Channel
-        At least one; times are not channels.
+        At least one channel; times are not channels.
     title : str
     traps : tuple of Trap
         Remarks on the file as a whole.
     zeros : int
-        Number of zero bytes at the end, which were left out.
+        Number of bytes at the end that were left out, because they are zero bytes.
     """
 
     channels: tuple[Channel, ...]
@@ -234,7 +234,7 @@ def name_and_unit(heading: str) -> tuple[str, str]:
 
 
 def is_time(name: str) -> bool:
-    """Return whether a column's name means time, in one of a dozen languages.
+    """Return whether a column's name denotes time, in one of a dozen languages.
 
     Examples
     --------
@@ -250,7 +250,7 @@ def is_time(name: str) -> bool:
 
 
 def is_uncertainty(name: str) -> bool:
-    """Return whether a column's name means the uncertainty of another column.
+    """Return whether a column's name denotes the uncertainty of another column.
 
     Examples
     --------
@@ -261,13 +261,13 @@ def is_uncertainty(name: str) -> bool:
 
 
 def candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
-    """Return the possible channels if none is named: the lengths, or else all but the auxiliary ones."""
+    """Return the possible channels if the user names none: the lengths, or else all channels but auxiliary columns."""
     fit = [each for each in channels if not each.aside] or channels
     return [each for each in fit if each.is_length] or fit
 
 
 def channel_of_name(path: str, channels: Sequence[Channel], name: str, what: Missing = Missing.CHANNEL) -> Channel:
-    """Return the channel of a name, with or without its unit.
+    """Return the channel with a given name, which may include the unit.
 
     Raises
     ------
@@ -285,14 +285,14 @@ def channel_of_name(path: str, channels: Sequence[Channel], name: str, what: Mis
 
 
 def of_run(path: str, contents: Contents, run: str | None) -> Sequence[Channel]:
-    """Return the channels of a run.
+    """Return the channels of a run, by default of the first.
 
     Raises
     ------
     NeedsAnswer
         If no run, or more than one, has this name; the question lists them.
     FormatError
-        If the file holds one run without a name.
+        If ``run`` is given, but the only run of the file has no name.
     """
     runs = contents.runs
     if run is None or run == runs[0]:
@@ -316,7 +316,7 @@ def _plain(name: str) -> str:
 
 
 def numbered_apart(names: Sequence[str]) -> list[str]:
-    """Return unique names: repeated names get a number.
+    """Return unique names: repetitions of a name get a number.
 
     Examples
     --------
@@ -328,7 +328,7 @@ def numbered_apart(names: Sequence[str]) -> list[str]:
     for name in names:
         seen[name] = seen.get(name, 0) + 1
         while (numbered := name if seen[name] == 1 else f"{name} [{seen[name]}]") in apart:
-            seen[name] += 1  # the file has a name that looks numbered
+            seen[name] += 1  # the file already contains this numbered name
         apart[numbered] = None
     return list(apart)
 
@@ -343,7 +343,9 @@ def channels_apart(channels: Sequence[Channel]) -> tuple[Channel, ...]:
 
 
 def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
-    """Split a line of headings, quoted or not; return its cells and their separator, which is detected if not given.
+    """Split a line of headings, quoted or not; return its cells and their separator.
+
+    The separator is detected if ``mark`` is empty.
 
     Examples
     --------
@@ -370,15 +372,15 @@ class Heading:
 def channels_of(sheet: Sheet, headings: Sequence[Heading], *, clock: ClockKind = "device") -> tuple[Channel, ...]:
     """Return the channels of a sheet: each has the times to its left, or the first times of its run.
 
-    If there are columns of runs, a column without a heading is ignored.
+    If any heading names a run, columns without a heading are ignored.
 
     Parameters
     ----------
     sheet : Sheet
     headings : sequence of Heading
-        One for each column.
+        One heading for each column.
     clock : {"nominal", "device", "host"}
-        Kind of the clock for times on no regular grid.
+        Kind of the clock for times that fit no regular grid.
     """
     times = [column for column, each in enumerate(headings) if is_time(each.name)]
     channels = []

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["MOST_BYTES", "read_markup", "side_by_side"]
 
 MOST_BYTES = 1 << 26
-"""Largest size of XML, more than any recording of a school program; parsing needs about twenty times the memory."""
+"""Maximum size of XML, bytes. Files of school programs are smaller; parsing takes about twenty times the memory."""
 
 
 def read_markup(path: str, data: bytes, remedy: str) -> Element:
@@ -27,7 +27,7 @@ def read_markup(path: str, data: bytes, remedy: str) -> Element:
     Raises
     ------
     FormatError
-        If it is not XML, too long, or has a document type, which may name other files or expand without limit.
+        If the file is not XML, is too long, or has a document type, which may name other files or expand without limit.
     """
     from xml.etree import ElementTree
 
@@ -45,14 +45,14 @@ def read_markup(path: str, data: bytes, remedy: str) -> Element:
 
 
 def side_by_side(columns: Sequence[tuple[str, str, F8]], times: Sequence[int], run: str = "") -> list[Channel]:
-    """Return the channels of columns that were read already: each has the times to its left, or the first times.
+    """Return the channels of columns that have been read: each gets the times to its left, or else the first times.
 
     Parameters
     ----------
     columns : sequence of (str, str, (n,) float64)
-        Name, unit and numbers of each. Their lengths may differ; shorter ones are filled with NaN.
+        Name, unit and numbers of each column. The lengths may differ; shorter ones are filled with NaN.
     times : sequence of int
-        The columns that are times.
+        Indices of the columns that are times.
     run : str
     """
     channels = []

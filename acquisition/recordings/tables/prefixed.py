@@ -1,4 +1,4 @@
-"""Remove prefixes of rows: the clock of a serial monitor, the settings of an oscilloscope."""
+"""Remove prefixes of rows: the clock times of a serial monitor, or the settings of an oscilloscope."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MONITOR = re.compile(rf"\[?{_DAY}(\d{{1,2}}:\d\d:\d\d(?:[.,]\d{{1,9}})?)(?:\s*-
 def without_prefix(text: Text) -> tuple[Text, tuple[Heading, ...]] | None:
     """Return a text with the prefix of each row removed, and the headings in the prefix; None if there is no prefix.
 
-    The clock of a serial monitor becomes the first column. Tektronix writes settings in the first rows
+    The clock time of a serial monitor becomes the first column. Tektronix writes settings in the first rows
     (``Record Length,2500,,-0.025,0.04,``); times and values are in the fourth and the fifth cell.
 
     Examples

@@ -1,7 +1,8 @@
-"""Read pages of regular lines, whose cells are all numbers, together by :func:`numpy.loadtxt`.
+"""Read pages of regular lines, whose wanted cells are all numbers, by one call of :func:`numpy.loadtxt`.
 
-This module rejects text that numpy accepts as a number but a recording must not, and counts the printed decimals of
-each cell. It refuses a page that is not regular; :mod:`acquisition.recordings.tables.table` reads its rows one by one.
+This module rejects text that numpy accepts as a number but that is not valid in a recording, and counts the printed
+decimals of each cell. It returns None for a page that is not regular; then
+:mod:`acquisition.recordings.tables.table` reads the rows one by one.
 """
 
 from __future__ import annotations
@@ -19,29 +20,30 @@ from acquisition.recordings.tables.text import parse_number, printed_decimals
 __all__ = ["EMPTY", "EXPONENT", "I1", "NAN", "UNREAD", "RegularColumn", "read_regular", "read_single", "unified"]
 
 EXPONENT = 64
-"""Added to the decimals in the form of a number with an exponent."""
+"""Constant that is added to the number of decimals in the form of a number with an exponent."""
 NAN, EMPTY, UNREAD = -1, -2, -3
 
 I1 = NDArray[np.int8]
 
-_MOST_WHOLE = 1e15  # whole numbers below this and powers of ten up to 10^22 are exact in binary, so that their
-_TENS = np.array([float(f"1e{power}") for power in range(23)])  # quotient is rounded once
+# Whole numbers below 1e15 and powers of ten up to 10^22 are exact in binary, so their quotient is rounded only once.
+_MOST_WHOLE = 1e15
+_TENS = np.array([float(f"1e{power}") for power in range(23)])
 _LONGEST_EXPONENT = len("e-99")
-_QUOTED_COMMA = re.compile(rb'"([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)"')  # a decimal comma where commas separate
+_QUOTED_COMMA = re.compile(rb'"([-+]?\d*),(\d+(?:[eE][-+]?\d+)?)"')  # decimal comma in comma-separated cells
 _NEWLINE, _BLANK, _POINT, _E, _LOWER = (*(ord(c) for c in "\n .e"), 0x20)
 
 
 class RegularColumn(NamedTuple):
-    """One column of some rows: its numbers, their forms, and the ends of its cells."""
+    """One column of a page: its numbers, their forms, and the positions of their last digits."""
 
     values: F8
     form: I1
     last: I8
-    """Position of the last digit of each number, or of its mantissa if it has an exponent, bytes."""
+    """Byte position of the last digit of each number, or of its mantissa if it has an exponent."""
 
 
 def unified(page: bytes, delimiter: str) -> bytes:
-    """Normalise a page: lines end in LF, one tab replaces white space, cells have no quotes, commas become points."""
+    """Normalise a page: LF as line end, no quotes, one tab for a run of white space, points for decimal commas."""
     if b"\r" in page:
         page = page.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if not page.endswith(b"\n"):
@@ -62,7 +64,7 @@ def unified(page: bytes, delimiter: str) -> bytes:
 def read_regular(
     lines: bytes, mark: str, columns: Sequence[int], width: int | None, shifts: Sequence[int]
 ) -> list[RegularColumn] | None:
-    """Read lines with equal numbers of cells whose wanted columns are all numbers; None for any other lines.
+    """Read lines that have equally many cells, and numbers in all wanted columns; return None for any other lines.
 
     Parameters
     ----------
@@ -82,7 +84,7 @@ def read_regular(
     ends = marks.reshape(rows, cells)
     if (raw[ends[:, -1]] != _NEWLINE).any():
         return None
-    # loadtxt strips every kind of white space. Here it is damage: a number next to it may have lost digits.
+    # loadtxt strips all white space. Here all but blanks are damage: a number next to it may have lost digits.
     if np.count_nonzero(raw < _BLANK) != (ends.size if ord(mark) < _BLANK else rows):
         return None
     if width is not None and (cells < width or (np.diff(ends[:, width - 1 :]) != 1).any()):
@@ -112,7 +114,7 @@ def read_regular(
 
 
 def read_single(cell: str, shift: int) -> tuple[float, int]:
-    """Read one cell; return its number, or NaN if it is not a number, and its form."""
+    """Read one cell; return its number (NaN if it is not a number) and its form."""
     if not cell:
         return np.nan, EMPTY
     value = parse_number(cell, shift)
@@ -124,7 +126,7 @@ def read_single(cell: str, shift: int) -> tuple[float, int]:
 
 
 def _shifted(values: F8, form: NDArray[np.int64], shift: int) -> F8:
-    """Return fixed-point numbers times a power of ten, rounded only once; NaN for other forms."""
+    """Return fixed-point numbers multiplied by a power of ten and rounded only once; NaN for other forms."""
     places = np.clip(form, 0, _TENS.size - 1)
     power = form - shift
     near = np.minimum(np.abs(power), _TENS.size - 1)
@@ -136,7 +138,7 @@ def _shifted(values: F8, form: NDArray[np.int64], shift: int) -> F8:
 
 
 def _load(lines: bytes, mark: str, columns: Sequence[int], cells: int) -> F8 | None:
-    """Read non-empty lines by numpy.loadtxt; None if a wanted cell is not a number or not ASCII."""
+    """Read lines with numpy.loadtxt; return None if all are empty or a wanted cell is not a number in ASCII."""
     some = None if list(columns) == list(range(cells)) else columns
     if not lines.strip(b"\n"):  # loadtxt warns if there are no rows
         return None
@@ -147,13 +149,13 @@ def _load(lines: bytes, mark: str, columns: Sequence[int], cells: int) -> F8 | N
 
 
 def _begins(ends: I8, column: int) -> I8:
-    """Return the first bytes of the cells of a column, from the ends of all cells."""
+    """Return the positions of the first bytes of a column's cells, given the ends of all cells."""
     return ends[:, column - 1] + 1 if column else np.concatenate(([0], ends[:-1, -1] + 1))
 
 
 def _last(places: I8, begin: I8, end: I8) -> I8:
-    """Return, for each cell, the last of the increasing ``places`` inside it; -1 for a cell without one."""
+    """Return, for each cell, the last of the increasing ``places`` that lies inside it; -1 if there is none."""
     if not places.size:
         return np.full(begin.size, -1)
-    last = places[np.searchsorted(places, end) - 1]  # index -1, the last place of all, lies after the cell
+    last = places[np.searchsorted(places, end) - 1]  # index -1 gives the last place of all, which lies after the cell
     return np.where((last >= begin) & (last < end), last, -1)

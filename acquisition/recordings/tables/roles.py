@@ -16,15 +16,15 @@ __all__ = ["are_row_numbers", "columns_of", "is_aside", "runs_forward", "times_b
 
 _NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
-_FIRST_NUMBERS = 10  # the first row numbers may be lost, in rows unlike the others
+_FIRST_NUMBERS = 10  # row numbers begin below this; the first may be missing, in rows unlike the others
 _NEUTRAL = re.compile(
     r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|(column|col|spalte|colonna|columna|var|field|unnamed:)[-_ ]?\d+",
     re.IGNORECASE,
 )
-"""Names that a column of times may have."""
+"""Names that do not prevent a column from being read as the times."""
 _SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
 """Names of durations, which are not times of samples."""
-_SPARSE = 0.2  # a column with numbers in a smaller share of its rows has no samples
+_SPARSE = 0.2  # minimum share of rows with a number in a column of samples
 _CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
 
 
@@ -35,12 +35,12 @@ def columns_of(rows: Sequence[Sequence[str]]) -> list[F8]:
 
 
 def are_row_numbers(column: F8) -> bool:
-    """Return whether a column counts up by one, from a small number."""
+    """Return whether a column starts at a small number and increases by one in every row."""
     return bool(column.size > 1 and column[0] in range(_FIRST_NUMBERS) and (np.diff(column) == 1.0).all())
 
 
 def runs_forward(column: F8) -> bool:
-    """Return whether a column rises, apart from a few rows."""
+    """Return whether a column rises in all but a few rows."""
     known = column[np.isfinite(column)]
     steps = np.diff(known)
     return bool(known.size >= 3 and known[-1] > known[0] and np.mean(steps >= 0) >= 0.95 and np.mean(steps > 0) >= 0.5)
@@ -69,9 +69,9 @@ def is_aside(heading: Heading, column: F8, others: bool) -> bool:
 
 
 def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[int]:
-    """Return the columns that rise and are named as times; the first column also if its unit is one of time.
+    """Return the rising columns that are named as times, and the first column if its even steps have a unit of time.
 
-    A capital T is not enough, because it is often a period.
+    A capital T is not accepted as a name of times, because it often denotes a period.
     """
     named = [
         column
@@ -83,9 +83,11 @@ def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[in
 
 
 def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | None:
-    """Return the column that must be the times because it is the only one that rises; None if there is no such column.
+    """Return the column that must be the times because of its steps; None if there is no such column.
 
-    A column with the name or unit of something else is not considered, nor are row numbers, whose step is unknown.
+    This is the first column if it rises in even steps, else the only column that does so, else the only column that
+    rises. Row numbers are not considered, because their step is unknown. Neither are columns whose name or unit
+    denotes something else.
     """
     fit = [
         column

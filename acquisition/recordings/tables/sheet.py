@@ -31,10 +31,10 @@ class ColumnFormat:
     name, title : str
         See :class:`acquisition.recordings.base.Format`.
     evidence : callable
-        Returns, from the head of a file, why it belongs to this family, in a few words; empty if it does not. It never
-        raises.
+        Takes the head of a file and returns a few words on why the file belongs to this family, or an empty text if it
+        does not. It never raises.
     contents : callable
-        Returns, from path and bytes, the content of the file.
+        Takes the path and the bytes of a file and returns its content.
     """
 
     name: str
@@ -88,7 +88,7 @@ class ColumnFormat:
         )
 
     def _plain(self, path: str, data: bytes) -> Contents:
-        """Return the content of a file with unique names of channels, after a check for thousands separators."""
+        """Return the content of a file with unique channel names, after a check for thousands separators."""
         contents = self.contents(path, data)
         sheets = {id(each.source): each.source for each in contents.channels if isinstance(each.source, Sheet)}
         traps = []
@@ -115,7 +115,7 @@ class ColumnFormat:
         except NeedsAnswer:
             return Survey(channel.run, channel.name, channel.unit, rows, None, ())
         except FormatError as error:
-            # A channel without numbers must not hide the others.
+            # A channel without numbers must not prevent the listing of other channels.
             none = Trap("empty_channel", str(error).removeprefix(path).lstrip(", :"))
             return Survey(channel.run, channel.name, channel.unit, 0, None, (none,))
         rate_hz, traps = column.timing.rate_hz, column.traps
@@ -130,17 +130,17 @@ def headed_format(
     why: Callable[[tuple[Heading, ...], str], str],
     example: str,
 ) -> ColumnFormat:
-    """Return a family whose files have a line of headings and rows.
+    """Return a family whose files have one line of headings above their rows.
 
     Parameters
     ----------
     name, title : str
     headings_of : callable
-        Returns the headings of the first line, none for another family, and the separator of cells.
+        Takes the first line and returns its headings (none for another family) and the separator of cells.
     why : callable
-        Returns, from headings and separator, why they belong to this family.
+        Takes the headings and the separator and returns why they belong to this family.
     example : str
-        Headings of the family.
+        An example of the family's headings, for error messages.
     """
 
     def evidence(head: bytes) -> str:

@@ -1,8 +1,8 @@
-"""Rows of numbers: the reader of cells for all text formats.
+"""Read rows of numbers from the cells of a text, for all text formats.
 
-Rows are read in pages of whole lines. :mod:`acquisition.recordings.tables.regular` reads a regular page at a time; the
-rows of other pages are read one by one. A number that lost digits is detected by the number of decimals that its
-column usually prints.
+Rows are read in pages of whole lines. :mod:`acquisition.recordings.tables.regular` reads a whole regular page at once;
+the rows of other pages are read one by one. A number that lost digits is detected by its number of decimals, which
+differs from the usual number in its column.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from acquisition.recordings.tables.text import Text, parse_number
 __all__ = ["EMPTY", "EXPONENT", "UNREAD", "Table", "read_table"]
 
 _PAGE_BYTES = 1 << 16
-_UNIFORM = 0.9  # a column that prints the same number of decimals in this share of its rows always does
+_UNIFORM = 0.9  # minimum share of numbers with the usual decimals in a column that always prints that many
 _SHORTER = 2
 _LINE_END = re.compile(rb"\r\n?|\n")
 _LF, _CR, _ZERO = (np.uint8(ord(c)) for c in "\n\r0")
@@ -47,11 +47,12 @@ class Table:
         The printed decimals of each cell, plus :data:`EXPONENT` if it has an exponent; negative if it is not a number:
         :data:`NAN`, :data:`EMPTY`, :data:`UNREAD`.
     unread : (rows,) bool
-        Rows that could not be read: too few or too many cells, a cell that is not a number, an incomplete number.
+        Mask of rows that could not be read: too few or too many cells, a cell that is not a number, an incomplete
+        number.
     text : (rows,) bool
-        Rows that begin with text.
+        Mask of rows that begin with text.
     decimals : tuple of int
-        Decimals that each column usually prints, in its mantissas if its numbers have exponents.
+        Usual number of printed decimals in each column, or in its mantissas if its numbers have exponents.
     exponents : tuple of bool
         Whether a column usually prints exponents.
     last_cell : str
@@ -60,7 +61,7 @@ class Table:
         Whether the last row is incomplete.
     first_line : int
     skipped : (lines,) int64
-        Rows before each line that makes no row.
+        For each line that is not a row, the number of rows before it.
     """
 
     values: tuple[F8, ...]
@@ -78,7 +79,7 @@ class Table:
         return int(self.unread.size)
 
     def line(self, row: int) -> int:
-        """Return the one-based line of a row in the file."""
+        """Return the one-based line number of a row in the file."""
         return self.first_line + int(row) + int(np.searchsorted(self.skipped, row, side="right"))
 
 
@@ -99,22 +100,22 @@ def read_table(
     ----------
     text : Text
     columns : sequence of int
-        Which columns, counted from 0.
+        Indices of the columns to read, counted from 0.
     delimiter : str
         The separator of cells; empty for runs of white space.
     width : int, optional
-        Number of cells of every row. By default rows may be ragged, and missing cells are empty.
+        Number of cells in every row. By default rows may be ragged, and missing cells are empty.
     start, stop : int, optional
-        Bytes where the rows begin and end.
+        Byte positions where the rows begin and end.
     first_line : int
-        One-based line of the file at ``start``.
+        One-based number of the line at ``start``.
     shifts : sequence of int
-        A power of ten for each column, by which its numbers are multiplied.
+        For each column, the exponent of the power of ten by which its numbers are multiplied.
 
     Returns
     -------
     Table
-        Empty lines make no row.
+        Empty lines are not rows.
 
     Examples
     --------
@@ -131,7 +132,7 @@ def read_table(
 
 
 def _most(data: bytes, start: int, stop: int) -> int:
-    """Return an upper limit of the number of rows; memory beyond the actual rows is never touched."""
+    """Return an upper limit of the number of rows; memory for rows beyond the actual number is never touched."""
     raw = np.frombuffer(data, np.uint8)
     pages = (raw[at : min(at + _PAGE_BYTES, stop)] for at in range(start, stop, _PAGE_BYTES))
     # bytes.count() takes six times as long; the other characters between LF and CR in ASCII are rare.
@@ -154,7 +155,7 @@ def _pages(data: bytes, start: int, stop: int) -> Iterator[bytes]:
 
 
 class _Rows:
-    """Collects rows, page by page."""
+    """A collector of rows, page by page."""
 
     def __init__(
         self, columns: tuple[int, ...], delimiter: str, width: int | None, shifts: tuple[int, ...], max_rows: int
@@ -165,7 +166,7 @@ class _Rows:
         self.form = [np.empty(max_rows, np.int8) for _ in columns]
         self.unread = np.zeros(max_rows, bool)
         self.text = np.zeros(max_rows, bool)
-        # The count of numbers of each form in a column, and whether any of them ends in a zero.
+        # For each form in a column, the count of numbers and whether any of them ends in a zero.
         self.counts = np.zeros((len(columns), 2 * EXPONENT), np.int64)
         self.padded = np.zeros((len(columns), 2 * EXPONENT), bool)
         self.rows = 0
@@ -173,7 +174,7 @@ class _Rows:
         self.last: list[str] = []
 
     def take(self, lines: bytes) -> None:
-        """Read some lines."""
+        """Read the lines of a page."""
         lines = unified(lines, self.delimiter)
         columns = read_regular(lines, self.mark, self.columns, self.width, self.shifts)
         if columns is not None:
@@ -183,7 +184,7 @@ class _Rows:
             self._take_single(line)
 
     def _add(self, columns: list[RegularColumn], lines: bytes) -> None:
-        """Append rows that are all valid; keep the cells of the last."""
+        """Append rows that are all valid, and keep the cells of the last row."""
         rows = slice(self.rows, self.rows + columns[0].values.size)
         raw = np.frombuffer(lines, np.uint8)
         for k, (values, form, last) in enumerate(columns):
@@ -256,16 +257,16 @@ class _Rows:
         counts = self.counts[k]
         numbers = int(counts[: 2 * EXPONENT if exponent else EXPONENT].sum())
         others = numbers - int(counts[usual])
-        # If trailing zeros are not printed, no number ends in zero and several are shorter; a single one may be cut.
+        # If trailing zeros are not printed, no number ends in zero and several are shorter. A single one may be cut.
         padded = usual % EXPONENT and self.padded[k, usual]
         stripped = others >= _SHORTER and not padded
         return others <= (1 - _UNIFORM) * numbers and not stripped
 
     def _cut(self, k: int, form: I1, usual: int, exponent: bool) -> B1 | None:
-        """Find numbers with too few or too many decimals; None if there are none."""
+        """Return the mask of numbers with too few or too many decimals; None if there are no such numbers."""
         if self.counts[k].sum() == self.counts[k][usual] or not self._always(k, usual, exponent):
             return None
-        # If exponents are the exception, a number with one is valid too.
+        # If numbers usually have no exponent, a number with an exponent is also valid.
         differs: B1 = (form >= 0) & (form != usual) & (exponent | (form < EXPONENT))
         # A first value of 0 may be printed without decimals.
         differs[:1] &= (form[:1] != 0) | (self.values[k][:1] != 0)
@@ -274,7 +275,7 @@ class _Rows:
         return differs if differs.any() else None
 
     def _ends_alike(self, k: int, form: I1, usual: int) -> B1:
-        """Return which numbers are in engineering notation, where mantissas of smaller numbers have fewer decimals.
+        """Return the mask of numbers in engineering notation, where mantissas of smaller numbers have fewer decimals.
 
         ``-1.00000E-03`` and ``-975.00E-06`` end at the same decimal place, and so do all numbers of the column.
         """
@@ -286,11 +287,11 @@ class _Rows:
         if not usual_places.size or usual_places.min() != usual_places.max():
             return np.zeros(self.rows, bool)
         alike = places == usual_places[0]
-        # A zero may have any number of decimals if other numbers have different ones.
+        # A zero may have any number of decimals if the number of decimals varies in the column.
         return np.asarray(alike | ((size == 0) & (alike & (form != usual)).any()))
 
     def _is_cut_last(self, k: int, form: I1, usual: int) -> bool:
-        """Return whether a last row without line end may have stopped within the cell of a column.
+        """Return whether a last row without a line end may have been cut within its cell of a column.
 
         A number is complete if something follows it, or if it has all the decimals that its column always prints. In a
         column with varying or no decimals nothing shows that the last number is complete, so it counts as cut.
@@ -309,5 +310,5 @@ def _unquoted(cell: str) -> str:
 
 
 def _most_frequent(counts: I8) -> int:
-    """Return the form that occurs most often, the longer of two equally frequent."""
+    """Return the most frequent form; of two equally frequent forms, the one with more decimals."""
     return int(counts.size - 1 - counts[::-1].argmax()) if counts.any() else 0

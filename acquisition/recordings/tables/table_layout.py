@@ -16,9 +16,9 @@ __all__ = ["TableLayout", "clock_s", "find_table", "heading_of"]
 
 _MARKS = ("\t", ";", ",", "")
 _PROBE, _FEWEST, _SOUND = 20, 3, 0.8
-_ABOVE = 6  # lines above the rows among which the names are looked for
+_ABOVE = 6  # number of lines above the rows that are searched for names
 _COMMENT = "#%*!'/ \ufeff"
-_BRACKETS = re.compile(r"[\[\];]")  # rows as MATLAB writes a matrix
+_BRACKETS = re.compile(r"[\[\];]")  # brackets and semicolons of a matrix as MATLAB writes it
 _NUMBERS = re.compile(r"[-+\d.,;eE\s\[\]]*\d[-+\d.,;eE\s\[\]]*")
 _DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}", re.ASCII)
 _CLOCK = re.compile(
@@ -28,13 +28,13 @@ _CLOCK = re.compile(
     re.ASCII,
 )
 _SETTING = re.compile(r"[=]|:(?!\s*$)")
-_LONGEST_NAME = 5  # words
+_LONGEST_NAME = 5  # maximum number of words
 _BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 _SLASH = re.compile(r"(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
 _TAIL = re.compile(r"(?P<name>.*?[^\W_])(?:[_ ](?:in )?|,\s*|:)(?P<unit>[^\W_]+(?:/s(?:ec)?(?:\^?2|²)?)?|°(?:/s)?)")
 _IN = re.compile(r"(?P<name>.*?\S)\s+in\s+(?P<unit>\S+)")
 _NO_TAIL = frozenset(("1", "in", "g", "mg"))
-"""Units that often end a name for another reason: ``V_in``, ``x_1``."""
+"""Units that often end a name without being its unit: ``V_in``, ``x_1``."""
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
 
 
@@ -47,7 +47,7 @@ class TableLayout:
     preamble : tuple of str
         Lines above the headings.
     headings : tuple of Heading
-        One for each column; with empty names if no line names them.
+        One heading for each column; the names are empty if no line names the columns.
     spare : tuple of (str, str)
         Names beyond the last column, each with the cell below it in the line of units.
     line : Line
@@ -55,9 +55,9 @@ class TableLayout:
     mark : str
         The separator of cells; empty for runs of white space.
     brackets : bool
-        Whether rows are in brackets and end in semicolons.
+        Whether rows end in semicolons and may be in brackets.
     rows : tuple of tuple of str
-        Cells of the first rows, all of one width.
+        Cells of the first rows, which all have the same number of cells.
     """
 
     preamble: tuple[str, ...]
@@ -77,8 +77,8 @@ class TableLayout:
 def find_table(lines: Sequence[Line]) -> TableLayout | None:
     """Find the first rows of numbers in a text, and the names of their columns; None if there are none.
 
-    Rows are lines of one width; every column has either numbers or words in all of them. The separator is the one with
-    the earliest rows; among several, the one that also fits a line of names.
+    Rows are lines in which each column contains either only numbers or only words, apart from empty cells. The chosen
+    separator gives the earliest rows; among several such separators, it is one that also fits a line of names.
 
     Examples
     --------
@@ -90,12 +90,12 @@ def find_table(lines: Sequence[Line]) -> TableLayout | None:
     return _find_table(tuple(lines))
 
 
-@lru_cache(maxsize=1)  # a file is first recognised by its table and then read
+@lru_cache(maxsize=1)  # the same table is needed twice: to recognise a file, and to read it
 def _find_table(lines: tuple[Line, ...]) -> TableLayout | None:
     best: tuple[tuple[int, bool, int], _Split, _Rows, TableLayout] | None = None
     for order, mark in enumerate(_MARKS):
         if order and mark and not any(mark in each.text for each in lines):
-            continue  # lines of one cell each, which the first separator has covered
+            continue  # each line would be a single cell, a case that the first separator has covered
         split = _Split(lines, mark)
         if (rows := split.first_rows()) is not None:
             table = _with_names(lines, rows.start, mark, split.brackets, rows.width)
@@ -124,7 +124,7 @@ def _kind(cell: str) -> str:
 
 
 class _Rows(NamedTuple):
-    """The first rows: line, kinds of its cells, largest number of cells in a row, and lines from there on."""
+    """The first rows: index of the first, kinds of its cells, maximum number of cells, and later non-empty lines."""
 
     start: int
     first: list[str]
@@ -138,7 +138,7 @@ class _Split:
     def __init__(self, lines: Sequence[Line], mark: str) -> None:
         self.lines, self.mark = lines, mark
         ends = 0 if mark else sum(each.text.rstrip().endswith(";") for each in lines)
-        self.brackets = ends > len(lines) / 2  # as in a matrix of MATLAB
+        self.brackets = ends > len(lines) / 2  # as in a MATLAB matrix
         self._split: dict[int, tuple[list[str], list[str]]] = {}
 
     def at(self, line: int) -> tuple[list[str], list[str]]:
@@ -164,7 +164,7 @@ class _Split:
         return None
 
     def all_rows(self, rows: _Rows) -> tuple[tuple[str, ...], ...]:
-        """Return the cells of every line like the first row."""
+        """Return the cells of every line that is like the first row."""
         split = (self.at(at) for at in rows.filled)
         like = [cells for cells, kinds in split if _alike(kinds, rows.first, rows.width, self.mark)]
         return tuple(tuple(cells + [""] * (rows.width - len(cells))) for cells in like)
@@ -200,7 +200,7 @@ def _with_names(lines: Sequence[Line], start: int, mark: str, brackets: bool, wi
         spare = tuple(zip(cells[width:], behind, strict=False))
         break
     if at_names < start and not any(names) and not any(each.startswith(("(", "[")) for each in units):
-        names, units = units, names  # a single line of words is names, even if some are also units
+        names, units = units, names  # a single line of words contains names, even if some of the words are also units
     headings = []
     for name, unit in zip(names, units, strict=True):
         plain, own = heading_of(name)
@@ -212,8 +212,8 @@ def _with_names(lines: Sequence[Line], start: int, mark: str, brackets: bool, wi
 def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[str]:
     """Split a line into one name for each column; return an empty list if that is impossible.
 
-    Most names must be words, unless channels may be ``numbered``. For a single column, a setting or a sentence is not a
-    name.
+    At least half of the names must be words, or one name if channels may be ``numbered``. For a single column, a
+    setting or a sentence is not a name.
     """
     plain = line.lstrip(_COMMENT).rstrip().removeprefix("DEF=")
     if width == 1 and (_SETTING.search(plain) or len(plain.split()) > _LONGEST_NAME):
@@ -226,7 +226,7 @@ def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[
 
 
 def _splits(line: str, mark: str, width: int) -> Iterator[list[str]]:
-    """Yield the possible splits of a line into cells, the most likely first."""
+    """Yield the possible splits of a line into cells, with the most likely split first."""
     by_mark = split_heading(line) if any(each in line for each in "\t;,") else ([line], "")
     own = [cell.strip().strip('"') for cell in line.split(mark)] if mark and '"' not in line else by_mark[0]
     if mark and mark in line:
@@ -239,14 +239,14 @@ def _splits(line: str, mark: str, width: int) -> Iterator[list[str]]:
         yield by_mark[0]
     apart = [re.split(r"\s{2,}|\t", line), [each.group() for each in _TOKEN.finditer(line)], line.split()]
     yield from (each for each in apart if len(each) == width)
-    # More names than columns are accepted only if they are short.
+    # More names than columns are accepted only if the names are short.
     tokens = line.split()
     if not mark and width < len(tokens) <= 3 * width and all(len(each) < 6 for each in tokens):
         yield tokens
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Return whether a line is units: most of its cells are units or in brackets."""
+    """Return whether a line contains units: at least half of its words are units or bracketed, and none means time."""
     filled = [cell for cell in cells if cell]
     known = [
         measure_of(plain) is not None or time_power(plain) is not None or bool(_BRACKETED.fullmatch(cell))
@@ -285,7 +285,7 @@ def _ends(name: str, unit: str) -> bool:
 
 
 def clock_s(cell: str) -> tuple[str, float, int] | None:
-    """Read a time of day: its date as printed, the second of the day, and the printed decimals; None for other text.
+    """Parse a time of day: printed date, second of the day, number of decimals; return None for any other text.
 
     Examples
     --------

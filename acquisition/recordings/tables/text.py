@@ -37,7 +37,7 @@ _ZIP = b"PK\x03\x04"
 
 
 class Line(NamedTuple):
-    """One line of a text: its one-based number, the bytes where it starts and where the next does, its content."""
+    """One line of a text: its one-based number, the byte positions of its start and of the next line, its content."""
 
     number: int
     start: int
@@ -54,9 +54,9 @@ class Text:
     data : bytes
         UTF-8 or an 8-bit code; UTF-16 has been converted to UTF-8.
     start, stop : int
-        First byte after a byte order mark, and end of the text, before zero bytes at the end.
+        Position of the first byte after a byte order mark, and of the end of the text before trailing zero bytes.
     zeros : int
-        Bytes cut off at the end.
+        Number of bytes that were cut off at the end: zero bytes and end-of-file characters.
     """
 
     data: bytes
@@ -83,7 +83,10 @@ class Text:
         return cls(data, start, stop, len(data) - stop)
 
     def lines(self, start: int | None = None, number: int = 1) -> Iterator[Line]:
-        """Yield the lines from a byte on; ``number`` is the number of the first. An empty last line does not count."""
+        """Yield the lines from byte ``start`` to the end; ``number`` is the number of the first line.
+
+        An empty last line is not yielded.
+        """
         at = self.start if start is None else start
         for match in _LINE_END.finditer(self.data, at, self.stop):
             yield Line(number, at, match.end(), decode(self.data[at : match.start()]))
@@ -92,7 +95,7 @@ class Text:
             yield Line(number, at, self.stop, decode(self.data[at : self.stop]))
 
     def head(self, limit: int = 64) -> list[Line]:
-        """Return the first lines, up to a number of lines and 64 KiB in total."""
+        """Return the first lines: at most ``limit`` lines, all of which start within 64 KiB."""
         lines: list[Line] = []
         for line in self.lines():
             if len(lines) == limit or line.start - self.start > 65536:
@@ -107,7 +110,7 @@ def text_of(path: str, data: bytes) -> Text:
     Raises
     ------
     FormatError
-        If it is binary.
+        If the file is binary.
     """
     if not is_text(data):
         raise FormatError(path, "expected rows of text, got binary data", "export the run as text again")
@@ -132,10 +135,10 @@ def is_text(data: bytes) -> bool:
 
 
 def decode(data: bytes) -> str:
-    """Decode a text in any encoding; an invalid byte becomes U+FFFD and is not a number.
+    """Decode a text of unknown encoding; an invalid byte becomes U+FFFD, which is not part of a number.
 
     Byte order marks are obeyed and removed. UTF-16 without one is recognised by its zero bytes. Text that is not UTF-8
-    is read as GB 2312 if it looks like that, else as cp1252. An incomplete character at the end is ignored.
+    is read as GB 2312 if its bytes look like that, else as cp1252. An incomplete character at the end is ignored.
 
     Examples
     --------
@@ -174,7 +177,7 @@ def _utf16(head: bytes) -> str:
 def says_simulated(text: str) -> bool:
     """Return whether a title or a name marks simulated data.
 
-    Most formats can state only there that data are simulated, and simulated data must not pass for measured data.
+    In most formats only a title or a name can mark simulated data, which must not be mistaken for measured data.
 
     Examples
     --------
@@ -208,9 +211,9 @@ def head_lines(head: bytes) -> list[str]:
 
 
 def parse_number(cell: str, shift: int = 0) -> float | None:
-    """Read one cell: a decimal number, with a point or a comma, or NaN; None for any other text.
+    """Parse one cell: a decimal number, with a point or a comma, or NaN; return None for any other text.
 
-    Stricter than ``float()``: no ``1_000``, no ``inf``, no digits of other scripts, nothing that overflows.
+    It is stricter than ``float()``: it rejects ``1_000``, ``inf``, digits of other scripts, and numbers that overflow.
 
     Parameters
     ----------
@@ -237,7 +240,7 @@ def parse_number(cell: str, shift: int = 0) -> float | None:
 
 
 def printed_decimals(cell: str) -> int:
-    """Return the number of printed decimals, of the mantissa if there is an exponent."""
+    """Return the number of printed decimals of a number, or of its mantissa if it has an exponent."""
     match = _NUMBER.fullmatch(cell.replace(",", ".", 1))
     return len(match[1] or match[2] or "") if match else 0
 
@@ -245,7 +248,7 @@ def printed_decimals(cell: str) -> int:
 def guess_delimiter(line: str) -> str:
     """Return the separator of the cells of a row; an empty string means runs of white space.
 
-    A comma separates only if nothing else does, because it may be a decimal mark.
+    A comma is the separator only if there is no other separator, because it may be a decimal mark.
 
     Examples
     --------

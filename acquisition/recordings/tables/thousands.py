@@ -1,4 +1,4 @@
-"""Refuse thousands separators (``1,234.5``, ``1.234,5``, ``1 234``): read as decimals they err by a factor 1000."""
+"""Refuse thousands separators (``1,234.5``, ``1 234``): reading them as decimal marks gives errors of a factor 1000."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DECIMAL = {
     each: re.compile(rb"[%b](?!\d{3}(?!\d))|(?<!\d)0\d*[%b]|\d{4}[%b]" % ((re.escape(each),) * 3))
     for each in (b",", b".")
 }
-"""A mark that can only be decimal: not followed by three digits, or after a zero or four digits."""
+"""Patterns of a mark that can only be decimal: not followed by exactly three digits, or after a zero or four digits."""
 _WHOLE, _LONG = re.compile(rb"[-+]?\d{1,3}"), re.compile(rb"[-+]?\d{4,}")
 _BLANKS = re.compile(rb"(?:\d[ ']|[\xa0\xaf\x99])\d{3}")
 
@@ -42,13 +42,13 @@ def refuse_thousands(path: str, rows: bytes, mark: str) -> str:
     Returns
     -------
     str
-        A number like ``1,500`` if all numbers with a comma look like it and none has a point. The comma is then read as
-        decimal, although nothing in the file confirms it. Empty otherwise.
+        A number like ``1,500`` if all numbers with a comma look like it and no number has a point. The comma is then
+        read as a decimal mark, although nothing in the file confirms this. Otherwise an empty text.
 
     Raises
     ------
     FormatError
-        If a number has thousands separators, or a comma or point may be either.
+        If a number has a thousands separator, or a comma or point may be a thousands separator or a decimal mark.
 
     Examples
     --------

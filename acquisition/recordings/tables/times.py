@@ -1,4 +1,4 @@
-"""The times of one channel: the printed ones in seconds, and the rate from them, the header or the user."""
+"""Find the times of one channel: printed times in seconds, and the rate from these times, the header or the user."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class PrintedTimes:
     t : (n,) float64, s
         NaN if unknown.
     unknown : (n,) bool
-        Rows without a time, or with one of more than three hundred years.
+        Mask of the rows without a time, or with a time of more than 1e10 s (three hundred years).
     resolution_s : float
-        Last printed digit, s.
+        Size of the last printed digit, s.
     tolerance : (n,) float64 or None
-        Half the last digit of each time, if they are to be compared with a formula in the header.
+        Half the last printed digit of each time, if the times are compared with a formula in the header.
     """
 
     t: F8
@@ -51,12 +51,12 @@ class PrintedTimes:
 
 
 def power_of_times(path: str, channel: Channel) -> int:
-    """Return the power of ten from a channel's unit of time to seconds, or to minutes or hours.
+    """Return the power of ten that converts a channel's times to seconds; 0 for minutes and hours.
 
     Raises
     ------
     FormatError
-        If the unit is not known.
+        If the unit of time is unknown.
     """
     timed = channel.source.t is not None if isinstance(channel.source, Arrays) else channel.time is not None
     if not timed or not channel.time_unit:
@@ -69,14 +69,14 @@ def power_of_times(path: str, channel: Channel) -> int:
 
 
 def last_digit(values: F8, decimals: int, exponents: bool, power: int) -> float:
-    """Return the last printed digit of a column; for numbers with exponents that of the largest number.
+    """Return the size of the last printed digit of a column; with exponents, that of the largest number.
 
     Parameters
     ----------
     values : (n,) float64
-        The numbers times ten to the power.
+        The numbers, multiplied by ``10**power``.
     decimals : int
-        Printed decimals of the numbers or their mantissas.
+        Number of printed decimals of the numbers or of their mantissas.
     exponents : bool
         Whether the numbers have exponents.
     power : int
@@ -96,7 +96,7 @@ def printed_times(
     ----------
     channel : Channel
     printed : (n,) float64
-        The numbers times ten to the power; NaN if unread. They may be overwritten later.
+        The numbers, multiplied by ``10**power``; NaN if unread. They may be overwritten later.
     form : (n,) int8
         See :class:`acquisition.recordings.tables.table.Table`.
     decimals, exponents, power : int, bool, int
@@ -114,10 +114,10 @@ def printed_times(
 
 
 def timing_of(path: str, channel: Channel, rows: Rows, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
-    """Return rate and grid of a channel's times, and remarks on them.
+    """Return the rate and grid of a channel's times, and remarks on the times.
 
-    The formula of the header is used if the column of times agrees with it or there is none; else the column; else the
-    rate that the user gives.
+    The header's formula is used if it agrees with the column of times or there is no such column. Otherwise the column
+    of times is used. Without either, the rate that the user gives is used.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def timing_of(path: str, channel: Channel, rows: Rows, rate_hz: float | None) ->
 
 
 def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) -> tuple[Timing | None, list[Trap]]:
-    """Return the timing by the formula of a header; None if the column of times contradicts it."""
+    """Return the timing by a header's formula (None if it is impossible or the column contradicts it), and remarks."""
     traps = []
     count = int(np.count_nonzero(~rows.remark))
     if formula.samples is not None and formula.samples != count:

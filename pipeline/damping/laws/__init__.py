@@ -1,9 +1,10 @@
-"""Laws of damping: how the amplitude of a free oscillation falls with time.
+"""Laws of damping: how the amplitude of a free oscillation decays with time.
 
-:mod:`pipeline.damping.laws.law` states what a law offers, :mod:`pipeline.damping.laws.drag` holds the eight laws of
-:math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, :mod:`pipeline.damping.laws.power` that of :math:`-c A^n`. A law is
-one small class and one entry of :data:`LAWS`; ``tests/conformance/test_laws.py`` compares each with its differential
-equation, its derivatives and its guess. :mod:`pipeline.damping.laws.of_function` makes a law from a function.
+:mod:`pipeline.damping.laws.law` defines the interface of a law. :mod:`pipeline.damping.laws.drag` contains the eight
+laws of :math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, and :mod:`pipeline.damping.laws.power` contains the law
+:math:`dA/dt = -c A^n`. A law is one small class and one entry in :data:`LAWS`; ``tests/conformance/test_laws.py`` tests
+its differential equation, its derivatives and its guess. :mod:`pipeline.damping.laws.of_function` makes a law from a
+function.
 """
 
 from __future__ import annotations
@@ -31,16 +32,16 @@ __all__ = [
 
 _ALL: tuple[Law, ...] = (*DRAGS, Power())
 LAWS: dict[str, Law] = {law.name: law for law in _ALL}
-"""The damping laws that ship, by name, in the order in which they are tried."""
+"""The built-in damping laws by name, in the order in which they are tried."""
 
 
 def find_law(law: str | Law) -> Law:
-    """Return a law by its name, or the law itself.
+    """Return the law with a name; a law is returned unchanged.
 
     Raises
     ------
     AnalysisError
-        If there is none of that name, or one's own has a name that is taken.
+        If no law has this name, or if a user-defined law has the name of a built-in one.
     """
     name = law if isinstance(law, str) else law.name
     if isinstance(law, str):

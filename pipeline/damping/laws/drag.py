@@ -1,7 +1,7 @@
 """Friction, linear and quadratic drag in all combinations: one closed form for all eight laws.
 
-Kept by hand: no library has it. An adaptive integrator (scipy's DOP853 at a relative 1e-10) takes ninety times as
-long for the amplitudes of 160 windows, and gives no derivatives.
+It is written by hand because no library has it. An adaptive integrator (scipy's DOP853 at a relative tolerance of
+1e-10) takes ninety times as long for the amplitudes of 160 windows, and gives no derivatives.
 
 Notes
 -----
@@ -10,16 +10,16 @@ Notes
 
 .. math:: A(t) = \\frac{N}{D} = \\frac{A_0 C - (\\mu + \\gamma A_0/2) S}{C + (\\beta A_0 + \\gamma/2) S},
 
-of determinant 1. Three things follow. The derivative by :math:`A_0` is :math:`1/D^2`. An impulse at :math:`\\tau`
-arrives at t as :math:`D(\\tau)^2/D(t)^2` of itself, so the derivatives by :math:`\\mu`, :math:`\\gamma` and
-:math:`\\beta` are :math:`-D(t)^{-2}` times the integrals of :math:`D^2`, :math:`ND` and :math:`N^2` from 0 to t, which
-are combinations of :math:`\\int C^2 = t + s^2 X`, :math:`\\int CS = S^2/2` and
-:math:`X = \\int S^2 = (SC - t)/2s^2`. And nothing but the sign of :math:`s^2` makes a case: numerator and denominator
-are divided by :math:`e^{st}` where s is real and taken with cosine and sine where it is imaginary; where :math:`s t` is
-small X is summed as a series.
+with determinant 1. Three results follow. First, the derivative by :math:`A_0` is :math:`1/D^2`. Second, a change of
+the amplitude at :math:`\\tau` becomes :math:`D(\\tau)^2/D(t)^2` times as large at t. So the derivatives by
+:math:`\\mu`, :math:`\\gamma` and :math:`\\beta` are :math:`-D(t)^{-2}` times the integrals of :math:`D^2`, :math:`ND`
+and :math:`N^2` from 0 to t. These are combinations of :math:`\\int C^2 = t + s^2 X`, :math:`\\int CS = S^2/2` and
+:math:`X = \\int S^2 = (SC - t)/2s^2`. Third, only the sign of :math:`s^2` distinguishes cases. If s is real, numerator
+and denominator are divided by :math:`e^{st}`; if it is imaginary, they contain cosine and sine. If :math:`s t` is
+small, X is summed as a series.
 
-In the real case the difference :math:`\\gamma/2 - s` would cancel, so it is taken as
-:math:`\\beta\\mu/(\\gamma/2 + s)`. Friction stops the motion: after :math:`N` reaches zero the amplitude stays zero.
+In the real case the difference :math:`\\gamma/2 - s` would suffer cancellation, so it is calculated as
+:math:`\\beta\\mu/(\\gamma/2 + s)`. Friction stops the motion: once :math:`N` reaches zero, the amplitude stays zero.
 
 References
 ----------
@@ -41,8 +41,8 @@ from pipeline.track import F8
 
 __all__ = ["COEFFICIENTS", "DRAGS", "Drag", "amplitudes"]
 
-COEFFICIENTS = ("mu", "gamma", "beta")  # of the powers 0, 1 and 2 of the amplitude
-FLOOR = 1e-3  # share of the greatest amplitude below which a start value divides by nothing smaller
+COEFFICIENTS = ("mu", "gamma", "beta")  # coefficients of the powers 0, 1 and 2 of the amplitude
+FLOOR = 1e-3  # minimum start value of A0, as a share of the maximum amplitude
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,9 @@ class Drag:
     Parameters
     ----------
     name, words : str
+        Short name, and the name in a sentence.
     powers : tuple of int
-        Of the amplitude in :math:`-dA/dt`: 0 for friction, 1 for linear, 2 for quadratic drag.
+        Powers of the amplitude in :math:`-dA/dt`: 0 for friction, 1 for linear, 2 for quadratic drag.
     """
 
     name: str
@@ -62,16 +63,16 @@ class Drag:
 
     @functools.cached_property
     def parameters(self) -> Mapping[str, Unit]:
-        """A0 and the coefficients; that of :math:`A^k` is in :math:`\\mathrm{m}^{1-k}/\\mathrm{s}`."""
+        """A0 and the coefficients; the unit for :math:`A^k` is :math:`\\mathrm{m}^{1-k}/\\mathrm{s}`."""
         return {"A0": Unit(1)} | {COEFFICIENTS[power]: Unit(1 - power, -1) for power in self.powers}
 
     @functools.cached_property
     def cases(self) -> tuple[str, ...]:
-        """Every law with fewer of the coefficients."""
+        """Names of the laws that have only some of these coefficients."""
         return tuple(law.name for law in DRAGS if set(law.powers) < set(self.powers))
 
     def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
-        """Return the closed form; 0 after friction has stopped the motion, infinite beyond a growing one's pole."""
+        """Return the closed form; 0 after friction has stopped the motion, infinite beyond a pole of a growing one."""
         full = self._full(theta)
         flow = _flow(t, *full)
         return flow.amplitude, _slopes(t, flow, self.powers, *full).T
@@ -82,12 +83,12 @@ class Drag:
         return np.asarray(np.where(amplitude > 0.0, -mu - amplitude * (gamma + beta * amplitude), 0.0))
 
     def guess(self, t: F8, amplitude: F8) -> F8:
-        """Return start values (p,) from points in the order of time, at least one.
+        """Return start values (p,) for a fit to one or more points in the order of time.
 
         Notes
         -----
-        The equation integrated once, :math:`A = A_0 - \\mu t - \\gamma\\int A - \\beta\\int A^2`, is linear in all
-        parameters; integrals of noisy points are far less noisy than their differences.
+        The integrated equation, :math:`A = A_0 - \\mu t - \\gamma\\int A - \\beta\\int A^2`, is linear in all
+        parameters, and integrals of noisy points are far less noisy than their differences.
         """
         level = float(amplitude.max())
         found = np.zeros(len(self.parameters))
@@ -98,7 +99,7 @@ class Drag:
         columns = [np.ones(t.size)]
         for power in self.powers:
             term = y**power
-            # Up to the first point the fall is taken as flat; it is a part of a period.
+            # The amplitude is taken as constant up to the first point, which is only part of a period.
             fallen = np.cumsum(0.5 * (term[1:] + term[:-1]) * np.diff(t))
             columns.append(-(term[0] * t[0] + np.concatenate([[0.0], fallen])) / span)
         values = np.linalg.lstsq(np.stack(columns, axis=1), y, rcond=1e-12)[0]
@@ -110,7 +111,7 @@ class Drag:
         return found
 
     def _full(self, theta: F8) -> tuple[float, float, float, float]:
-        """A0, mu, gamma and beta, absent ones zero."""
+        """Return A0, mu, gamma and beta; a coefficient that the law lacks is zero."""
         start, *coefficients = theta.tolist()
         full = [0.0, 0.0, 0.0]
         for power, value in zip(self.powers, coefficients, strict=True):
@@ -119,7 +120,7 @@ class Drag:
 
 
 class _Flow(NamedTuple):
-    """The parts of the closed form, all (n,): D, C and S times e^(-st), and what the derivatives need."""
+    """The parts of the closed form, (n,) each: amplitude, D, C and S times e^(-st), and terms of the derivatives."""
 
     amplitude: F8
     denominator: F8
@@ -141,7 +142,7 @@ def _flow(t: F8, start: float, mu: float, gamma: float, beta: float) -> _Flow:
         ends = _turning_ends(pace, pace * t, start, mu, gamma, beta)
     else:
         root = math.sqrt(square)
-        # The greater root of x^2 - gamma x + beta mu in size is safe, the lesser is their product over it.
+        # The root of x^2 - gamma x + beta mu with the larger modulus has no cancellation; the other follows from it.
         greater = 0.5 * gamma + math.copysign(root, gamma)
         lesser = beta * mu / greater if greater != 0.0 else 0.0
         fall = np.exp(-2.0 * root * t)
@@ -151,7 +152,7 @@ def _flow(t: F8, start: float, mu: float, gamma: float, beta: float) -> _Flow:
         denominator = (fall if gamma < 0.0 else 1.0) + (lesser + beta * start) * sinh
         if numerator.min() > 0.0 and denominator.min() > 0.0:
             return _Flow(numerator / denominator, denominator, cosh, sinh, fall, square, None)
-        # Zero is reached before a pole where beta is not negative: a pole is then on the side of negative amplitudes.
+        # If beta is not negative, the amplitude reaches zero before a pole, which lies at negative amplitudes.
         lost = (denominator <= 0.0) & (beta < 0.0)
         ends = np.where(lost, np.inf, np.where((numerator <= 0.0) | (denominator <= 0.0), 0.0, np.nan))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -162,21 +163,24 @@ def _flow(t: F8, start: float, mu: float, gamma: float, beta: float) -> _Flow:
 
 
 def _turning_ends(pace: float, angle: F8, start: float, mu: float, gamma: float, beta: float) -> F8:
-    """What becomes of amplitudes at angles |s|t (n,) where s is imaginary: mu and beta have one sign."""
+    """Return 0 after a stop, infinity beyond a pole and NaN elsewhere, at angles |s|t (n,), where s is imaginary.
+
+    The coefficients mu and beta then have the same sign.
+    """
     if beta > 0.0:
         return np.where(angle >= math.atan2(pace * start, mu + 0.5 * gamma * start), 0.0, np.nan)
     return np.where(angle >= math.atan2(pace, -beta * start - 0.5 * gamma), np.inf, np.nan)
 
 
 def _slopes(t: F8, flow: _Flow, powers: tuple[int, ...], start: float, mu: float, gamma: float, beta: float) -> F8:
-    """Derivatives (p, n) of the amplitude by A0 and by the coefficients of some powers."""
-    # Everything below carries the factor e^(-2st) that D^-2 brings along.
+    """Return the derivatives (p, n) of the amplitude by A0 and by the coefficients of some powers."""
+    # All terms below contain the factor e^(-2st), because the scaled D^-2 contains its inverse.
     elapsed = flow.fall * t
     squares = _integral_of_squares(t, flow, elapsed)
     cosines = elapsed + flow.square * squares
     mixed = 0.5 * flow.sinh * flow.sinh
     pull, push = mu + 0.5 * gamma * start, beta * start + 0.5 * gamma
-    # Of the integrals of D^2, ND and N^2: what C^2, CS and S^2 count in them.
+    # The weights of C^2, CS and S^2 in the integrals of D^2, ND and N^2.
     by_mu, by_gamma = (1.0, 2.0 * push, push * push), (start, start * push - pull, -pull * push)
     shares = by_mu, by_gamma, (start * start, -2.0 * start * pull, pull * pull)
     slopes = np.empty((1 + len(powers), t.size))
@@ -187,13 +191,13 @@ def _slopes(t: F8, flow: _Flow, powers: tuple[int, ...], start: float, mu: float
             of_cosines, of_mixed, of_squares = shares[power]
             row[:] = over * (of_cosines * cosines + of_mixed * mixed + of_squares * squares)
     if flow.ends is not None:
-        # After the stop nothing depends on anything; beyond a pole there is nothing to depend.
+        # After the stop all derivatives are zero; beyond a pole they are infinite like the amplitude.
         slopes = np.where(np.isnan(flow.ends), slopes, flow.ends)
     return slopes
 
 
 def _integral_of_squares(t: F8, flow: _Flow, elapsed: F8) -> F8:
-    """e^(-2st) times the integral of S^2 from 0 to t; a series where the closed form would cancel."""
+    """Return e^(-2st) times the integral of S^2 from 0 to t, by a series where the closed form would cancel."""
     z = flow.square * t * t
     small = np.abs(z) < 0.05
     series = elapsed * t * t
@@ -213,7 +217,7 @@ def amplitudes(t: F8, theta: F8) -> F8:
     ----------
     t : (n,) float64, s
     theta : (k, 4) float64
-        A0, mu, gamma, beta of each.
+        A0, mu, gamma and beta of each motion.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What every damping law offers, and what follows from the units of its parameters."""
+"""The interface of every damping law, and functions that use the units of its parameters."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ class Unit(NamedTuple):
     Parameters
     ----------
     metre, second : float
+        The exponents.
     less : str
-        Name of a parameter whose value is subtracted from the exponent of the metre: of a coefficient c in
-        :math:`c A^n` it is ``"n"``.
+        Name of a parameter whose value is subtracted from the exponent of the metre. It is ``"n"`` for the coefficient
+        c in :math:`c A^n`.
 
     Examples
     --------
@@ -53,17 +54,17 @@ class Law(Protocol):
 
     @property
     def name(self) -> str:
-        """Short name, the key of ``LAWS``."""
+        """Short name, the key in ``LAWS``."""
         ...
 
     @property
     def parameters(self) -> Mapping[str, Unit]:
-        """Names with units: first "A0", the amplitude at t = 0 in m, then the coefficients."""
+        """The names and units of the parameters: first "A0", the amplitude at t = 0 in m, then the coefficients."""
         ...
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Names of the laws that it contains as special cases: its best fit is never worse than theirs."""
+        """Names of the laws that are special cases of this one: its best fit is never worse than theirs."""
         ...
 
     def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
@@ -71,31 +72,31 @@ class Law(Protocol):
         ...
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
-        """Return dA/dt, (n,) float64, m/s, at amplitudes (n,) in m; it does not depend on A0."""
+        """Return dA/dt (n,) in m/s at amplitudes (n,) in m; it does not depend on A0."""
         ...
 
     def guess(self, t: F8, amplitude: F8) -> F8:
-        """Return start values (p,) from points in the order of time, at least one."""
+        """Return start values (p,) for a fit to one or more points in the order of time."""
         ...
 
 
 def units_of(law: Law) -> tuple[str, ...]:
-    """Return the units of a law's parameters, as printed."""
+    """Return the units of a law's parameters as they are printed."""
     return tuple(str(unit) for unit in law.parameters.values())
 
 
 def words_of(law: Law) -> str:
-    """Return what a sentence calls a law: its ``words`` where it has any, or its name."""
+    """Return the name of a law in a sentence: its ``words`` if it has any, or its short name."""
     return str(getattr(law, "words", law.name))
 
 
 def free_power(law: Law) -> str | None:
-    """Return the parameter on which the unit of another one depends, a power of the amplitude; None without any."""
+    """Return the name of a law's free power of the amplitude, on which another unit depends; None if it has none."""
     return next((unit.less for unit in law.parameters.values() if unit.less), None)
 
 
 def in_units(law: Law, theta: F8, *, length_m: float = 1.0, time_s: float = 1.0) -> F8:
-    """Return the parameters (p,) of the same fall with lengths and times in other units than m and s.
+    """Return the parameters (p,) of the same decay with other units of length and time than m and s.
 
     Notes
     -----

@@ -1,6 +1,6 @@
-"""A law made of a function of one's own, without a class.
+"""Damping laws from user-defined functions, without a class.
 
-Kept by hand: nothing else asks of a function whether it can be a law of damping, and in which units.
+This is written by hand because no library tests whether a function can be a damping law, and in which units.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from pipeline.track import F8
 
 __all__ = ["FunctionLaw", "make_law"]
 
-STEP_S = 1e-3  # over which the rate is a difference: its error is a third of the squared change of the amplitude
-AGREE = 1e-5  # relative; to which a law must do what is asked of it
+STEP_S = 1e-3  # time step of the difference for the rate; the relative error is a third of the squared relative change
+AGREE = 1e-5  # relative tolerance of the tests that a law must pass
 PROBE_S = np.linspace(0.0, 10.0, 21)
 
 
@@ -36,30 +36,30 @@ def make_law(
     words: str = "",
     cases: tuple[str, ...] = ("none",),
 ) -> FunctionLaw:
-    """Make a damping law of a function, to be tried with the others.
+    """Make a damping law from a function, to be tried with the other laws.
 
     Parameters
     ----------
     name : str
-        Short, none of those in :data:`pipeline.damping.laws.LAWS`.
+        Short name that is not in :data:`pipeline.damping.laws.LAWS`.
     amplitude : callable
-        ``amplitude(t, A0, *coefficients)`` gives the amplitude (n,) at times t (n,), s, that was A0 at t = 0. It must
-        take any unit of length, and be a function of the amplitude alone: wherever it has got to, it goes on as if
-        it had started there.
+        ``amplitude(t, A0, *coefficients)`` returns the amplitudes (n,) at times t (n,) in s, for the amplitude A0 at
+        t = 0. It must work in any unit of length. Its rate must depend only on the amplitude: from any later
+        amplitude, the motion must continue as if it had started there.
     parameters : mapping of str to (float, float)
         Coefficients with the exponents of metre and second in their units: ``{"d": (-1 / 2, -1)}`` for
         :math:`1/(\\mathrm{m}^{1/2}\\,\\mathrm{s})`.
     guess : callable
-        ``guess(t, amplitude)`` gives start values of A0 and the coefficients from points.
+        ``guess(t, amplitude)`` returns start values of A0 and the coefficients for a fit to points.
     words : str
-        What findings call it; left out, its name.
+        The name of the law in findings; by default its short name.
     cases : tuple of str
-        Names of the laws that it becomes for some value of its coefficients.
+        Names of the laws that are special cases of this law, for some values of its coefficients.
 
     Raises
     ------
     AnalysisError
-        If the function is no law of damping, does not have the units stated, or has a coefficient with the name of an
+        If the function is no damping law, if it does not have the stated units, or if a coefficient has the name of an
         estimate.
 
     Examples
@@ -92,16 +92,16 @@ def make_law(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FunctionLaw:
-    """A damping law whose rate depends only on the amplitude; :func:`make_law` makes one.
+    """A damping law from a user-defined function; :func:`make_law` makes one.
 
     Parameters
     ----------
     name, parameters, cases
         As in :class:`pipeline.damping.laws.law.Law`.
     words : str
-        What findings call it.
+        The name of the law in findings.
     function, start : callable
-        As ``amplitude`` and ``guess`` of :func:`make_law`.
+        The parameters ``amplitude`` and ``guess`` of :func:`make_law`.
     """
 
     name: str
@@ -112,22 +112,22 @@ class FunctionLaw:
     start: Callable[[F8, F8], ArrayLike] = field(repr=False)
 
     def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
-        """Return what the function gives, and its derivatives by central differences."""
+        """Return the values of the function and their derivatives by central differences."""
         return self._amplitude(t, theta), central_differences(lambda at: self._amplitude(t, at), theta)
 
     def rate(self, amplitude: F8, theta: F8) -> F8:
-        """Return the slope at t = 0 of a fall that starts at each amplitude: one-sided, of second order."""
+        """Return the slope at t = 0 of a decay from each amplitude, by a one-sided difference of second order."""
         t = STEP_S * np.arange(3.0)
         each = [self._amplitude(t, np.append(start, theta[1:])) @ (-3.0, 4.0, -1.0) for start in amplitude.tolist()]
         return np.array(each) / (2.0 * STEP_S)
 
     def guess(self, t: F8, amplitude: F8) -> F8:
-        """Return what ``start`` gives.
+        """Return the start values (p,) that ``start`` gives for points.
 
         Raises
         ------
         AnalysisError
-            If that is not a finite number for each parameter.
+            If they are not one finite number for each parameter.
         """
         with np.errstate(all="ignore"):
             found = np.array(self.start(t, amplitude), np.float64)
@@ -137,12 +137,12 @@ class FunctionLaw:
         return found
 
     def _amplitude(self, t: F8, theta: F8) -> F8:
-        with np.errstate(all="ignore"):  # a fit may step where it has no value
+        with np.errstate(all="ignore"):  # a fit may try parameters for which the function has no value
             return np.broadcast_to(np.asarray(self.function(t, *theta.tolist()), np.float64), np.shape(t)).copy()
 
 
 def _demand_law(law: FunctionLaw) -> None:
-    """Try the function on a typical fall: what it must do whatever its coefficients are."""
+    """Test on a typical decay that the function is a damping law with the stated units."""
 
     def amplitude(t: F8, theta: F8) -> F8:
         return law.curve(t, theta)[0]

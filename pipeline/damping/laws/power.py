@@ -1,4 +1,4 @@
-"""A free power of the amplitude: the honest alternative where the drag coefficient varies with amplitude."""
+"""Drag by a free power of the amplitude: the alternative if the drag coefficient varies with the amplitude."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _MIXED = Drag("guess", "", (1, 2))
 
 
 class Power:
-    """Drag that goes as a power of the amplitude: :math:`dA/dt = -c A^n`.
+    """Drag proportional to a power of the amplitude: :math:`dA/dt = -c A^n`.
 
     Notes
     -----
-    With :math:`m = 1 - n`, the starting rate :math:`k = c A_0^{-m}` and :math:`x = k t`,
-    :math:`A = A_0 (1 - m x)^{1/m}`, which goes over into :math:`A_0 e^{-x}`. n = 0 is friction, which stops the motion,
-    1 linear and 2 quadratic drag; vortices shed by an edge give 5/3.
+    With :math:`m = 1 - n`, the rate at the start :math:`k = c A_0^{-m}` and :math:`x = k t`, the amplitude is
+    :math:`A = A_0 (1 - m x)^{1/m}`, which tends to :math:`A_0 e^{-x}` as m tends to 0. n = 0 is friction, which stops
+    the motion, n = 1 linear and n = 2 quadratic drag; vortices shed by an edge give n = 5/3.
     """
 
     name = "power"
@@ -32,7 +32,7 @@ class Power:
     cases: tuple[str, ...] = ("none", "linear", "quadratic", "friction")
 
     def curve(self, t: F8, theta: F8) -> tuple[F8, F8]:
-        """Return the closed form; 0 after the motion has stopped, infinite beyond a growing one's pole."""
+        """Return the closed form; 0 after the motion has stopped, infinite beyond a pole of a growing one."""
         at = np.asarray(t, np.float64)
         start, c, n = theta.tolist()
         found = _solution(at, theta)
@@ -55,7 +55,7 @@ class Power:
             return np.asarray(np.where(left, -theta[1] * np.where(left, amplitude, 1.0) ** theta[2], 0.0))
 
     def guess(self, t: F8, amplitude: F8) -> F8:
-        """Return the power that linear and quadratic drag together have in the middle of the points."""
+        """Return start values: the local power of linear and quadratic drag together at the mean amplitude."""
         level = max(float(amplitude.mean()), 1e-3 * float(amplitude.max()), 1e-300)
         start, gamma, beta = _MIXED.guess(t, amplitude).tolist()
         rate = gamma + beta * level
@@ -66,7 +66,7 @@ class Power:
 
 
 class _Solution(NamedTuple):
-    """A, x = k t, z = m x, 1 - z (zero at the end of the motion or at a pole) and ln(1 - z)."""
+    """The parts of the closed form: A, x = k t, z = m x, 1 - z (zero at the stop or at a pole) and ln(1 - z)."""
 
     amplitude: F8
     x: F8
@@ -78,11 +78,11 @@ class _Solution(NamedTuple):
 def _solution(t: F8, theta: F8) -> _Solution:
     start, c, n = theta.tolist()
     with np.errstate(all="ignore"):
-        # Not a number where A0 is not positive, through which a fit may step.
+        # NaN where A0 is not positive: a fit may pass through such values.
         x = (c * np.float64(start) ** (n - 1.0)) * t if start > 0.0 else np.full(t.size, np.nan)
         z = (1.0 - n) * x
         rest = 1.0 - z
-        # Not a number beyond the end, which is put right below.
+        # NaN beyond the stop or the pole, which is replaced below.
         logarithm = np.log1p(-z)
         exponent = logarithm / (1.0 - n) if abs(1.0 - n) > 1e-300 else -x
         near = np.abs(z) < 1e-8
@@ -96,7 +96,7 @@ def _solution(t: F8, theta: F8) -> _Solution:
 
 
 def _logarithm_slope(found: _Solution) -> F8:
-    """Derivative of -ln(1 - z)/z, a series where it would cancel."""
+    """Return the derivative of -ln(1 - z)/z by z, by a series where the closed form would cancel."""
     z = found.z
     with np.errstate(all="ignore"):
         closed = (found.logarithm + z / found.rest) / (z * z)

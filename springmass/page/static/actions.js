@@ -1,10 +1,10 @@
 "use strict";
-// Each action has a key and a button. What the recorder is asked for is shown once it has acknowledged it, in show_state.
+// Each action has a key and a button. show_state shows the result of a request once the recorder has acknowledged it.
 function press(button, on) { $(button).setAttribute("aria-pressed", String(on)); }
 function label(button, text) { $(button).firstChild.textContent = `${text} `; }
 function show_window() { const s = WINDOWS[window_index]; label("window", s === Infinity ? "all" : `${s} s`); }
 
-// What the controller can ask for in each phase of the recorder; viewers can ask for nothing.
+// Requests that the controller can make in each phase of the recorder; viewers can make none.
 const ALLOWED = { ready: ["zero", "ruler", "arm", "record", "close"], armed: ["arm", "record", "close"], recording: ["mark", "note", "stop"], built: ["report", "note", "discard", "close"], replay: ["report", "note"] };
 
 function show_actions() {
@@ -18,7 +18,7 @@ function show_actions() {
   if (bench().report === "ready" && report_asked) { report_asked = false; location.assign("/v1/report"); }
 }
 
-// Between a question and its answer the recorder may have gone on; what it does not take any more is named.
+// The recorder may change its phase while a dialog is open; a request that it no longer accepts is reported.
 let refused = "", refused_until = 0;
 function request(id, message) {
   if ((ALLOWED[bench().phase] || []).includes(id)) { ask_server(message); return; }
@@ -28,7 +28,8 @@ function request(id, message) {
 }
 
 let answered = null, checks = {};
-// A field has a name, its text, its value, and where it is a quantity a check, which returns its number or throws what is wrong.
+// A field has a name, a label and a value. The field of a quantity also has a check, which returns the number or throws
+// an error.
 function question(title, fields, ok) {
   $("ask-title").textContent = title;
   $("ask-ok").textContent = ok || "OK";
@@ -48,7 +49,7 @@ function question(title, fields, ok) {
 }
 
 const IN_METRES = { m: 1, cm: 1e-2, mm: 1e-3 };
-// A length in m, with its unit or in mm, from ``least`` to ``most`` metres.
+// Returns a parser of lengths with a unit, or else in mm; the result is in m, from ``least`` to ``most``.
 function length_between(least, most, example) {
   return (text) => {
     const read = /^\s*(\d+(?:[.,]\d+)?|[.,]\d+)\s*(mm|cm|m)?\s*$/i.exec(text);
@@ -187,7 +188,8 @@ $("unfold").addEventListener("click", () => {
 });
 for (const button of document.querySelectorAll("#actions button")) button.addEventListener("click", () => ACTIONS[button.id]());
 
-// The element with the focus keeps its own keys: a field or a list all of them, a slider those that move it, a box the space.
+// The focused element keeps its own keys: a field or a list keeps all keys, a slider the keys that move it, a checkbox
+// the space bar.
 function takes(target, key) {
   if (target.type === "range") return /^(Arrow|Page|Home|End)/.test(key);
   if (target.type === "checkbox") return key === " ";

@@ -1,5 +1,5 @@
 "use strict";
-// The four charts. Lines differ by dashes as well as by colour; every colour has a contrast of at least 4.5 to 1.
+// Charts. Lines differ by dashes as well as by colour; every colour has a contrast of at least 4.5 to 1.
 const DASHES = [[8, 4], [2, 3], [10, 3, 2, 3], [4, 2, 4, 6]];
 const COLOURS = {}, OTHERS = ["other-1", "other-2", "other-3", "other-4"];
 
@@ -8,7 +8,7 @@ function take_colours() {
   for (const name of ["ink", "line", "data", "fit", "rest", ...OTHERS]) COLOURS[name] = of(name);
 }
 
-// Of a logarithmic axis the powers of ten, with numbers that are never a rounded 0.
+// A logarithmic axis is labelled only at powers of ten, with numbers that are never rounded to 0.
 const powers = (_, splits) => splits.map((v) => (v !== null && Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-9 ? v : null));
 const plain = (_, splits) => splits.map((v) => (v === null ? "" : v > 9e-4 && v < 1e4 ? String(v) : v.toExponential(0).replace("-", "−")));
 
@@ -37,7 +37,7 @@ class Chart {
     this.media.addEventListener("change", this.scheme);
   }
 
-  // A chart that is replaced follows neither size nor colours any more.
+  // Stop a replaced chart from following changes of size and colour scheme.
   destroy() {
     this.sizes.disconnect();
     this.media.removeEventListener("change", this.scheme);
@@ -74,7 +74,8 @@ const colour = (name) => () => COLOURS[name];
 function points(label, size) { return { label, key: "dot", stroke: colour("data"), points: { show: true, size: size || 5, stroke: colour("data"), fill: colour("data") }, paths: () => null }; }
 function line(label, name, dash, width) { return { label, stroke: colour(name), dash, width: width || 2, points: { show: false } }; }
 
-// Samples that lie far enough apart are dots, so that the fit beneath is seen; denser ones are a line.
+// Samples that are far enough apart are drawn as dots, so that the fit below is visible; denser ones are drawn as a
+// line.
 const joined = uPlot.paths.linear();
 const dense = (plot, first, last) => (last - first) * devicePixelRatio > 1.5 * plot.bbox.width;
 function samples_series() {

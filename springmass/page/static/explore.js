@@ -3,7 +3,7 @@
 
 const ZOOM = 0.5, PAN = 0.25;
 
-// The range of an axis of time that a press on a button gives, within the data.
+// The range of the time axis after a button is pressed, limited to the range of the data.
 function shifted([low, high], [first, last], action) {
   const wide = high - low, middle = (low + high) / 2;
   if (action === "all") return [first, last];
@@ -13,7 +13,7 @@ function shifted([low, high], [first, last], action) {
   return [low + by, high + by];
 }
 
-// Give charts that share their axis of x the same range, and the buttons that change it.
+// Gives charts with a common x axis the same range, and buttons that change it.
 class Explorer {
   constructor(bar, charts, span) {
     this.charts = charts;
@@ -29,10 +29,10 @@ class Explorer {
     for (const chart of charts) this.follow(chart);
   }
 
-  // A chart that was built again, for another colour scheme, has a new canvas.
+  // The listeners are on the box, because a chart that is rebuilt for another colour scheme has a new canvas.
   follow(chart) {
     chart.box.addEventListener("wheel", (event) => {
-      if (!event.ctrlKey && !event.metaKey) return;  // else the page scrolls
+      if (!event.ctrlKey && !event.metaKey) return;  // otherwise the page scrolls
       event.preventDefault();
       this.act(event.deltaY < 0 ? "in" : "out");
     }, { passive: false });
@@ -56,7 +56,7 @@ class Explorer {
 
   show([min, max]) { for (const chart of this.charts) chart.plot.setScale("x", { min, max }); }
 
-  // Options of a chart that belongs here: its selection by the mouse sets the range of all.
+  // Options of a chart in this group: a selection with the mouse sets the range of all its charts.
   static options(explorer, key) {
     return {
       cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, setScale: false } },
@@ -72,7 +72,7 @@ class Explorer {
   }
 }
 
-// Draw error bars of one standard uncertainty about the points of a series.
+// Draw error bars of one standard uncertainty around the points of a series.
 function errorBars(series, u) {
   return (plot) => {
     const { ctx } = plot, x = plot.data[0], y = plot.data[series];
@@ -94,10 +94,10 @@ function errorBars(series, u) {
   };
 }
 
-// A text to the clipboard, also of a file that was opened from the disk.
+// Copy a text to the clipboard, even from a page that was opened from the disk.
 async function copyText(text) {
   if (navigator.clipboard && isSecureContext) {
-    try { await navigator.clipboard.writeText(text); return true; } catch { /* not allowed: the old way */ }
+    try { await navigator.clipboard.writeText(text); return true; } catch { /* not allowed: use execCommand below */ }
   }
   const area = document.createElement("textarea");
   area.value = text;

@@ -1,4 +1,4 @@
-// The chart in a notebook: a module made of uPlot, samples.js and this; springmass/api/live.py puts them together.
+// The chart in a notebook: springmass/api/live.py builds its module from uPlot, samples.js and this file.
 function render({ model, el }) {
   const all = new Samples(), box = document.createElement("div"), said = document.createElement("div");
   let chart = null, scale = 1, dirty = false, over = false;
@@ -30,7 +30,7 @@ function render({ model, el }) {
     if (message.type !== "samples" || !buffers.length) return;
     const view = buffers[0], bytes = view.buffer ? view.buffer.slice(view.byteOffset, view.byteOffset + view.byteLength) : view;
     const [, sensor, first, count] = new Uint32Array(bytes, 0, 4);
-    const known = all.count - first;  // another view of the widget may have had all sent again
+    const known = all.count - first;  // all samples may have been sent again for another view of the widget
     if (sensor !== 0 || known < 0 || known >= count) return;
     const t = new Float64Array(bytes, 16, count), y = new Float64Array(bytes, 16 + 8 * count, count);
     all.take(all.count, t.subarray(known), y.subarray(known));

@@ -1,14 +1,14 @@
 "use strict";
-// The page shows only samples that the recording's log holds, and only what the recorder has acknowledged.
+// The page shows only samples in the recording's log, and only states that the recorder has acknowledged.
 const $ = (id) => document.getElementById(id);
 let run = null, samples = [], state = null, socket = null, wait_ms = 250, dirty = true, came_at = 0;
-// The last messages on all samples, on the last seconds, and on the moment that is played.
+// The last messages about all samples, about the last seconds, and about the moment that is played.
 let motion = null, now = null, moment = null;
 
 const scale = () => (run.unit === "m" ? 1e3 : 1);
 const unit = () => (run.unit === "m" ? "mm" : run.unit);
 const bench = () => (state && state.bench) || { phase: "waiting" };
-// Where the rest position was measured, positions are counted from there.
+// If the rest position was measured, positions are relative to it.
 const zero = () => bench().rest_m || 0;
 
 function say(text) { $("said").textContent = text; }
@@ -49,7 +49,7 @@ function receive(message) {
 
 function hello(message) {
   if (message.version !== 1) { trouble(`This page reads version 1 of the messages and its server sends version ${message.version}; reload the page.`); return; }
-  // The same run sends all samples again from the first; another run begins anew.
+  // After a reconnection, all samples are sent again from the first; only another run resets the page.
   samples = message.sensors.map(() => new Samples());
   const other = !run || run.session !== message.session;
   run = message;
@@ -94,7 +94,8 @@ function show_state() {
   if (at.rest_m !== shown_zero) begin_anew();
 }
 
-// By the samples' own times over the last two seconds: right whatever comes in one piece after a reload.
+// The rate is calculated from the samples' own times over the last two seconds, so it is correct even if many samples
+// arrive at once after a reload.
 function rate_hz() {
   const all = samples[0];
   if (!all || all.count < 3) return null;
@@ -130,7 +131,7 @@ function item(text, kind) {
   return found;
 }
 
-// Phones turn their screens off otherwise; browsers allow this over HTTPS and on this computer alone.
+// Prevents a phone from turning its screen off; browsers allow this only over HTTPS and on this computer.
 let awake = null;
 async function keep_awake() {
   if (run.source === "REPLAY" || awake) return;

@@ -15,7 +15,7 @@ function begin_anew() {
   if (run.source === "REPLAY") window_index = WINDOWS.length - 1, show_window();
   const what = `${shown_zero === undefined ? KINDS[run.quantity] || run.quantity : "displacement"} / ${unit()}`;
   if (position) for (const chart of [position, amplitude, phase, spectrum]) chart.destroy();
-  // Our own cursor stays at its sample; uPlot's stays at a place of the screen.
+  // The page's own cursor stays at its sample; uPlot's cursor stays at its place on the screen, so it is turned off.
   const select = { cursor: { x: false, y: false, points: { show: false }, drag: { x: true, y: false, setScale: false } }, hooks: { setSelect: [selected], drawAxes: [draw_selection, draw_fits], draw: [draw_marks, draw_cursors] } };
   const still = { cursor: { show: false } };
   position = new Chart("position", [samples_series(), line("fit", "fit", null, 1), line("rest", "rest", [6, 4], 1)], ["time / s", what], select);
@@ -29,7 +29,7 @@ function begin_anew() {
 
 const signed = (text) => text.replaceAll("-", "−");
 
-// Value and uncertainty as people write them: two digits of the uncertainty in brackets.
+// Value and uncertainty in the usual notation, with two digits of the uncertainty in brackets.
 function short(estimate) {
   let { value, u, unit: name } = estimate, factor = 1;
   const prefixes = { m: [1e3, "mm"], s: [1, "s"] };
@@ -45,7 +45,7 @@ function short(estimate) {
   return signed(`${value.toFixed(digits)}(${bracket}) ${name}`);
 }
 
-// A run that is recorded goes on between messages; one that is over does not, and a replay is at the moment that is played.
+// Time advances between messages during a recording, but not after it; a replay is at the moment that is played.
 const is_over = () => run.source === "REPLAY" || state.ended;
 const is_played = () => run.source === "REPLAY" && play_time !== null && play_time < last_time() - 1e-9;
 function last_time() { const all = samples[0]; return all && all.count ? all.t[all.count - 1] : 0; }
@@ -53,7 +53,7 @@ function now_s() {
   if (is_played()) return play_time;
   return last_time() + (!state || is_over() ? 0 : (performance.now() - came_at) / 1e3);
 }
-// The message whose numbers are shown: of the moment that is played, else of all samples.
+// The message whose numbers are shown: that about the moment that is played, or else that about all samples.
 const shown_message = () => (is_played() && moment ? moment : motion);
 
 function show_motion() {
@@ -86,7 +86,7 @@ function show_motion() {
   if (selection) show_region_fits();
 }
 
-// Twice as often as a number can become too old: what is older than two seconds is grey and says how old it is.
+// Numbers older than two seconds are grey and show their age; this is updated four times a second.
 function show_ages() {
   const message = shown_message(), at = run && state && message ? now_s() : null;
   if (at === null) return;
@@ -116,7 +116,7 @@ function stopping(stop, age_s) {
   return left > 0 ? `${interval} About ${seconds(left)} s more for ${wanted}.` : interval;
 }
 
-// The highest lines lie at the low end of the spectrum; frequencies far above them are cut off.
+// The highest peaks are at the low end of the spectrum; frequencies far above them are cut off.
 function show_spectrum({ f, value, peaks: found }) {
   peaks = found || [];
   const highest = Math.max(...peaks.map((peak) => peak.f), 0), end = Math.max(10, 4 * highest);
@@ -140,14 +140,15 @@ function draw_peaks(plot) {
   ctx.restore();
 }
 
-// Velocity divided by the angular frequency has the unit of the position: a swing is drawn as the circle that it is.
+// Velocity divided by angular frequency has the unit of position; with equal scales for both, a swing is drawn as a
+// circle.
 function phase_range(axis, min, max) {
   if (!phase_span || !phase || !(phase_span.reach > 0)) return min === null ? [-1, 1] : uPlot.rangeNum(min, max, 0.1, true);
   const { width, height } = phase.plot.bbox, { middle, reach, omega } = phase_span, wider = Math.max(1, width / height), higher = Math.max(1, height / width);
   return axis === "x" ? [middle - reach * wider, middle + reach * wider] : [-reach * omega * higher, reach * omega * higher];
 }
 
-// A mark is a dashed line with its text.
+// Draw each mark as a dashed line with its text.
 function draw_marks(plot) {
   if (!state) return;
   const { ctx, bbox } = plot, { min, max } = plot.scales.x;
@@ -169,7 +170,7 @@ function draw_marks(plot) {
   ctx.restore();
 }
 
-// The fits lie beneath the samples, thin, with two points a pixel.
+// The fits are thin lines below the samples, with two points per pixel.
 const LEAST_SWING_PX = 6;
 function draw_fits(plot) {
   const message = shown_message(), { min, max } = plot.scales.x;
@@ -199,7 +200,7 @@ function in_view() {
   return [span === Infinity ? (all.count ? all.t[0] : 0) : end - span, end];
 }
 
-// The amplitude by the damping law, divided by that of the last window, so many seconds from it.
+// The amplitude of the damping law, ``after`` seconds from the last window, divided by its amplitude at that window.
 function decay({ from, step, value }, after) {
   const at = Math.min(Math.max((after - from) / step, 0), value.length - 1), low = Math.min(Math.floor(at), value.length - 2);
   return value[low] + (at - low) * (value[low + 1] - value[low]);
@@ -215,7 +216,7 @@ function step_play() {
   $("time").value = (play_time - all.t[0]) / (last - all.t[0]);
 }
 
-// The numbers of the moment that is played: asked for again once the last answer is there and the moment another one.
+// Request the numbers of the moment that is played, after the last answer has arrived and if the moment has changed.
 let moment_asked = null;
 function ask_moment() {
   if (!is_played()) { if (moment) { moment = null; show_motion(); } return; }

@@ -1,11 +1,12 @@
 "use strict";
-// The charts of a report. Its numbers are in the page; without this script, and in print, the figures show instead.
+// The charts of a report. Their numbers are in the page; without this script, and in print, the figures are shown
+// instead.
 
 const REPORT = JSON.parse(document.getElementById("report-data").textContent);
 
 function timesOf(t) { return Array.isArray(t) ? t : Array.from({ length: t.count }, (_, i) => t.start + t.step * i); }
 
-// Put a chart before the card of its figure, which from then on is for print.
+// Put a chart before the card of its figure; from then on, the card is shown only in print.
 function placeIn(figure, heights) {
   const holder = document.createElement("div");
   holder.className = "charts";
@@ -95,7 +96,7 @@ function amplitudeChart(figure, run) {
     }];
     return common;
   };
-  // One name stands for all other laws, and none for points that are not there.
+  // The legend has one entry for all other laws, and none for points that do not exist.
   const brief = (plot) => plot.root.querySelectorAll(".u-legend .u-series").forEach((row, i) => { row.hidden = (i > 0 && i < others.length) || (i === series.length - 1 && out.size === 0); });
   const low = Math.min(...a.y), high = Math.max(...a.y), margin = 0.1 * (high - low) || 1;
   const above = more(), below = more();
@@ -149,7 +150,7 @@ function overlayChart(figure, runs) {
   explorer = new Explorer(bar, [chart], [data[0][0], data[0][data[0].length - 1]]);
 }
 
-// Charts need the width of their place: those in a folded part are made when it is first opened.
+// A chart needs the width of its container, so charts in a folded part are made when it is first opened.
 function whenSeen(figure, make) {
   const folds = [];
   for (let fold = figure.closest("details"); fold; fold = fold.parentElement.closest("details")) folds.push(fold);
@@ -197,7 +198,7 @@ function begin() {
       copies.append(button(words, async (made) => confirmed(made, await copyText(REPORT.table[name]))));
     }
   }
-  // A link into a folded part opens it; for paper everything is opened, and closed again after.
+  // A link into a folded part opens it; for printing, everything is opened and closed again afterwards.
   const reveal = () => {
     const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
     for (let fold = target && target.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;

@@ -1,5 +1,6 @@
 "use strict";
-// One sensor's samples as they come: typed arrays that grow by doubling, and what a chart as wide as a screen needs.
+// One sensor's samples as they arrive, in typed arrays that grow by doubling, and a reduction of them to the width of a
+// chart.
 class Samples {
   constructor() {
     this.count = 0;
@@ -7,7 +8,7 @@ class Samples {
     this.y = new Float64Array(4096);
   }
 
-  // Take a message: four 32-bit integers (1, sensor, first, count), then times and values.
+  // Store the times and values of a message, whose head is four 32-bit integers (1, sensor, first, count).
   take(first, t, y) {
     const stop = first + t.length;
     if (first > this.count) throw new Error(`sample ${this.count} was expected, got ${first}`);
@@ -24,7 +25,7 @@ class Samples {
     this.count = stop;
   }
 
-  // The number of the first sample at or after a time.
+  // The index of the first sample at or after a time.
   at(time) {
     let low = 0, high = this.count;
     while (low < high) {
@@ -34,7 +35,8 @@ class Samples {
     return low;
   }
 
-  // Times and values between two times, of many samples the least and greatest of each pixel; null where one is missing.
+  // Times and values between two times, or the minimum and maximum of each pixel if there are many samples; null marks
+  // missing ones.
   between(from, to, pixels) {
     const start = this.at(from), stop = Math.min(this.count, this.at(to) + 1);
     const group = Math.max(1, Math.floor((stop - start) / (2 * pixels)));
@@ -56,7 +58,7 @@ class Samples {
     return [t, y];
   }
 
-  // Positions and central slopes of the latest swings: none at the edges, for a derivative has none there.
+  // Positions and central differences of the latest swings, without the edges, where a central difference is undefined.
   orbit(from, to, reach) {
     const start = this.at(from), stop = Math.min(this.count, this.at(to));
     const found = [];

@@ -2,7 +2,7 @@
 // The cursor, the pin and the selection belong to samples: they keep their times while the chart moves on.
 let pinned = null, cursor = null, cursor_on = false, selection = null, region = null, dragged = false;
 
-// Draw again what lies over the samples, also while they are frozen; a chart without samples has no axes to draw yet.
+// Redraw the layers above the samples, even while the samples are frozen; a chart without samples has no axes yet.
 function redraw() { if (position && position.plot.data[0].length) position.plot.redraw(false); }
 
 function forget_selection() {
@@ -11,7 +11,7 @@ function forget_selection() {
   show_selection();
 }
 
-// The sample nearest to a time, as [time, value shown]; null where none was measured.
+// The sample nearest to a time as [time, shown value]; null if its value is missing.
 function sample_at(time) {
   const all = samples[0];
   if (!all || !all.count) return null;
@@ -35,7 +35,7 @@ function set_cursor(sample) { cursor = sample || cursor; show_cursor(); redraw()
 
 function pin() { pinned = cursor || pinned; show_cursor(); redraw(); }
 
-// A step is a sample, or a pixel where samples are denser.
+// A step is one sample, or one pixel if samples are denser than pixels.
 function move_cursor(steps) {
   const all = samples[0];
   if (!all || !all.count) return;
@@ -53,7 +53,7 @@ function select_between(from, to) {
   ask_server({ type: "region", ...selection });
 }
 
-// What users of plotting tools ask for first, of the samples as they were measured; the slope is that of a least-squares line.
+// The usual statistics of the measured samples in a selection; the slope is that of a least-squares line.
 function statistics({ from, to }) {
   const all = samples[0];
   let n = 0, sum = 0, sum_t = 0, least = Infinity, most = -Infinity;
@@ -86,7 +86,7 @@ function show_selection() {
   show_region_fits();
 }
 
-// Both fits side by side: of the selection and of all samples.
+// Show the fits of the selection and of all samples side by side.
 function show_region_fits() {
   const part = (region && region.estimates) || {}, whole = (motion && motion.estimates) || {};
   $("region-why").textContent = region ? region.why || "" : "Fitting the selection ...";
@@ -112,7 +112,7 @@ function show_region(found) {
   say(`${$("region-title").textContent}: ${found.estimates && found.estimates.period ? `period ${short(found.estimates.period)}` : found.why}`);
 }
 
-// uPlot's own box lasts as long as the drag; the selection is drawn at its times.
+// uPlot's own box is removed after the drag; the selection is then drawn at its times.
 function selected(plot) {
   const { left, width } = plot.select;
   if (width < 8) return;
@@ -154,7 +154,8 @@ function draw_cursors(plot) {
   ctx.restore();
 }
 
-// The mouse points, a click pins, a drag selects; a finger taps to point and pin, and drags to the side to select.
+// The mouse moves the cursor, a click pins it, and a drag selects; on a touch screen, a tap moves and pins the cursor,
+// and a sideways drag selects.
 let touch_from = null;
 const over_chart = (event) => event.target.classList.contains("u-over");
 const along = (event) => event.clientX - event.target.getBoundingClientRect().left;

@@ -1,1 +1,1 @@
-"""The page on the network: its server, who may look and who may act, what a client may take, and what is logged."""
+"""The page on the network: its server, the rights to view and to act, limits for clients, and logging."""

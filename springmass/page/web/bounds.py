@@ -1,7 +1,7 @@
-"""What a client may take: a connection among a bounded number, and seconds for a request.
+"""Limits for clients: a maximum number of connections, and a maximum time for a request.
 
-uvicorn bounds neither: it waits for the end of a request for as long as the client likes, and accepts connections until
-the process has no file left to open.
+uvicorn limits neither: it waits for the end of a request without a time limit, and accepts connections until the
+process runs out of file descriptors.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ __all__ = ["bounded_protocol", "most_connections"]
 
 LOG = logging.getLogger("springmass.page")
 REQUEST_WITHIN_S = 10.0
-"""A request is whole within this time of its first byte, the first one of the connection."""
+"""Time within which a request must be complete after its first byte; the first request counts from the connection."""
 MOST_CONNECTIONS = 256
-"""More than the 32 viewers need that may look, with six connections each, as browsers open them."""
+"""More than the maximum of 32 viewers need, if each browser opens its usual six connections."""
 
 
 def most_connections() -> int:
-    """Return how many connections there may be: a third of the files that this process may open, or 256.
+    """Return the maximum number of connections: a third of the files that this process may open, but at most 256.
 
-    A request for a file opens it, so that each connection may need two files; the last third is for all the others.
+    A request for a file opens that file, so each connection may need two descriptors; the last third is for other uses.
     """
     if sys.platform == "win32":
         return MOST_CONNECTIONS
@@ -38,7 +38,7 @@ def most_connections() -> int:
 
 
 def bounded_protocol(most: int) -> type[H11Protocol]:
-    """Return uvicorn's protocol of HTTP/1.1, with at most so many connections and a time limit for each request."""
+    """Return uvicorn's HTTP/1.1 protocol with a maximum number of connections and a time limit for each request."""
     import h11
     from uvicorn.protocols.http.h11_impl import H11Protocol
 

@@ -1,4 +1,4 @@
-"""What the page's process logs, in lines on stderr: one a minute for each kind of event and client."""
+"""The log of the page's process on stderr: at most one line per minute for each kind of event and client."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ __all__ = ["LogLines", "log_to_stderr"]
 
 PERIOD_S = 60.0
 MOST_LINES = 20
-"""In a period, of all kinds and clients: what a person can read meanwhile."""
+"""Maximum number of lines per period over all kinds and clients: as many as a person can read in that time."""
 LONGEST_LINE = 300
 
 
 class LogLines(logging.Handler):
-    """Writes each record as one line, never a traceback, and leaves out what it has written within the last minute.
+    """Writes each record as one line without a traceback, and omits kinds that it has already written in this minute.
 
-    Records of the same logger, message before its arguments are put in, type of exception and ``client`` (an attribute
-    of the record) are of one kind. The next line that is written says how many were left out.
+    Records are of one kind if they have the same logger, message (before its arguments are inserted), type of exception
+    and ``client`` (an attribute of the record). The next line that is written states how many records were omitted.
 
     Parameters
     ----------
     write : callable
-        Takes a line.
+        Receives a line.
     clock : callable
         Returns seconds.
     """
@@ -60,7 +60,7 @@ class LogLines(logging.Handler):
 
 
 def one_line_of(record: logging.LogRecord, client: str, error: BaseException | None) -> str:
-    """Return a record in one line: who, what, and of an exception its type, its text and where it was raised."""
+    """Return a record as one line: client, message and, for an exception, its type, text and origin."""
     text = " ".join(record.getMessage().split())
     if error is not None:
         text = f"{text}: {type(error).__name__} at {raised_at(error)}: {one_line(error)}"
@@ -69,7 +69,7 @@ def one_line_of(record: logging.LogRecord, client: str, error: BaseException | N
 
 @contextlib.contextmanager
 def log_to_stderr() -> Iterator[None]:
-    """Write what is logged in this process, and Python's warnings, by :class:`LogLines` until the ``with`` ends."""
+    """Write this process's log and Python's warnings with :class:`LogLines` until the ``with`` block ends."""
     handler, root = LogLines(), logging.getLogger()
     root.addHandler(handler)
     logging.captureWarnings(True)

@@ -1,8 +1,8 @@
-"""Who may look and who may act: the person who started the page, viewers where they are let in, and nobody else.
+"""Rights to view and to act: for the person who started the page, for viewers if admitted, and for nobody else.
 
-As with notebooks, the page listens on the loopback alone. A token in the first address is exchanged for a cookie. Hosts
-and origins must be the page's own, so that no page of somebody else's can reach this one through the browser. On a
-local network, where that was asked for, another token lets in everybody who has it, to look and not to act.
+As with notebooks, the page by default listens only on the loopback interface. A token in the first address is exchanged
+for a cookie. Host and origin must be the page's own, so that no foreign page can reach this one through the browser. If
+the user opens the page to the local network, another token lets everybody who has it view the page, but not act.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from springmass.report.script import script_sha256
 __all__ = ["ACT", "LOOK", "Access", "guarded"]
 
 LOOK, ACT = "look", "act"
-"""What a request may do; the controller may do both."""
+"""Rights of a request; the controller has both."""
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 PAGE_POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 REPORT_POLICY = (
     f"default-src 'none'; script-src 'sha256-{script_sha256()}'; style-src 'unsafe-inline'; img-src data:; "
     "frame-ancestors 'none'; base-uri 'none'"
 )
-"""A report is one file with its styles and pictures in it, and runs the script of its charts and no other."""
+"""The policy for a report: a single file with inline styles and pictures, which runs only the script of its charts."""
 HEADERS = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer", "Cache-Control": "no-store"}
 
 
 def guarded(app: ASGIApp, access: Access, hosts: Iterable[str] = ()) -> ASGIApp:
-    """Return an application behind the checks of host, origin and cookie, with the headers of security.
+    """Return an application protected by checks of host, origin and cookie, with security headers.
 
     Parameters
     ----------
     app : ASGI application
-        ``auth.scopes`` of its requests holds :data:`LOOK` and, of the controller's, :data:`ACT`.
+        ``auth.scopes`` of its requests contains :data:`LOOK` and, for the controller, :data:`ACT`.
     access : Access
     hosts : iterable of str
-        Addresses, besides the loopback's names, that the page answers to.
+        Hosts, besides the names of the loopback, under which the page answers.
     """
     known = AuthenticationMiddleware(app, access, access.answer)
     return _Headers(TrustedHostMiddleware(known, [*LOOPBACK, *hosts], www_redirect=False))
@@ -58,21 +58,21 @@ class Access(AuthenticationBackend):
     Parameters
     ----------
     port : int
-        Names the cookie, so that two pages on one machine keep apart.
+        Part of the cookie's name, so that two pages on one machine have different cookies.
     secret : str
-        From which cookies and tokens are made: with the same one, a page that was started again knows its browsers.
-        Empty: a new one.
+        Secret from which cookies and tokens are derived. A restarted page with the same secret recognises its browsers.
+        If empty, a new secret is made.
     viewers : bool
-        Whether viewers are let in.
+        Whether viewers are admitted.
     used : bool
         Whether the controller's link has been used before.
 
     Attributes
     ----------
     token : str or None
-        Lets in one browser, to act; None once it was used.
+        Token that lets one browser act; None once it has been used.
     viewers_token : str
-        Lets in any, to look.
+        Token that lets any browser view the page.
     """
 
     def __init__(self, port: int, secret: str = "", *, viewers: bool = False, used: bool = False) -> None:
@@ -87,15 +87,15 @@ class Access(AuthenticationBackend):
         return hmac.new(self._secret, what.encode(), hashlib.sha256).hexdigest()[:32]
 
     async def authenticate(self, conn: HTTPConnection) -> tuple[AuthCredentials, BaseUser]:
-        """Return what a request may do.
+        """Return the rights of a request.
 
         Raises
         ------
         AuthenticationError
-            If it comes from another page, or has no cookie of this one.
+            If the request comes from another page, or has no cookie of this page.
         """
         origin = conn.headers.get("origin")
-        # Browsers send cookies along whatever page asks, and name that page; a socket is asked for by a page always.
+        # Browsers send cookies with the requests of any page, and state its origin; only a page opens a socket.
         if (origin is not None or conn.scope["type"] == "websocket") and _host(origin or "") != conn.headers["host"]:
             raise _ForeignOrigin("this page answers to its own address alone")
         given = conn.cookies.get(self._cookie, "")
@@ -106,7 +106,7 @@ class Access(AuthenticationBackend):
         raise AuthenticationError("open the address that springmass printed: it works once, in one browser")
 
     def answer(self, conn: HTTPConnection, error: AuthenticationError) -> Response:
-        """Exchange a token for its cookie, or refuse."""
+        """Exchange a token for its cookie, or refuse the request."""
         cookie = None if isinstance(error, _ForeignOrigin) else self._exchanged(conn.query_params.get("token", ""))
         if cookie is None:
             return PlainTextResponse(f"springmass: {error}\n", 403)
@@ -126,7 +126,7 @@ class _ForeignOrigin(AuthenticationError):
 
 
 class _Headers:
-    """Adds the headers of security to every answer, and closes sockets that are refused (ASGI middleware)."""
+    """ASGI middleware that adds security headers to every answer and closes refused sockets."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -137,7 +137,7 @@ class _Headers:
         async def sending(message: Message) -> None:
             if message["type"] == "http.response.start":
                 MutableHeaders(scope=message).update({**HEADERS, "Content-Security-Policy": policy})
-            # A socket that gets an answer in place of its handshake is an error in uvicorn's log, a closed one is none.
+            # uvicorn logs an error if a socket gets an answer instead of its handshake, but not if it is closed.
             if message["type"] == "websocket.http.response.start":
                 message = {"type": "websocket.close", "code": 1008}
             if message["type"] != "websocket.http.response.body":
@@ -151,7 +151,7 @@ def _same(given: str, wanted: str) -> bool:
 
 
 def _host(address: str) -> str:
-    """Return host and port of an address; empty where it is none."""
+    """Return host and port of an address; empty if the address is invalid."""
     try:
         return urlsplit(address).netloc
     except ValueError:

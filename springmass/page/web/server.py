@@ -1,4 +1,4 @@
-"""The page's server: its files, the messages to viewers, and the few that come back."""
+"""The page's server: its files, the messages to viewers, and the few messages that they send."""
 
 from __future__ import annotations
 
@@ -28,38 +28,39 @@ __all__ = ["Opening", "application", "serve"]
 LOG = logging.getLogger("springmass.page")
 STATIC = Path(__file__).parents[1] / "static"
 TURN_S = 0.0225
-"""Time between two looks at the log: little longer than a frame of the screen; samples reach it within 40 ms."""
+"""Time between two reads of the log: little longer than a screen frame; samples reach the screen within 40 ms."""
 MANY, EVERY = 4, 4
-"""With more viewers than MANY, samples are sent at every fourth look, eleven times a second."""
+"""With more viewers than MANY, samples are sent after every fourth read of the log, eleven times a second."""
 STATE_S = 0.5
 LAST_S = 1.5
-"""Time that it continues to serve at the end, so that viewers see that the run has ended."""
+"""Time for which the page is still served after the end, so that viewers see that the run has ended."""
 ALONE_S = 30.0
-"""Time that a page of a saved run waits for a viewer."""
+"""Time after which a page without viewers ends, once the run that it recorded is saved."""
 MOST_VIEWERS = 32
 LONGEST_MESSAGE = 4096
-"""Bytes that a browser may send at a time."""
+"""Maximum size of a browser's message in bytes."""
 LONGEST_TEXT = 500
 LIMITS = {"known_m": (0.01, 20.0), "threshold_m": (1e-4, 1.0), "keep_s": (0.0, 60.0)}
-"""Of the numbers that may be asked with, m and s."""
+"""Minimum and maximum of the numbers in requests, in m and s."""
 
 
 @dataclass
 class Opening:
-    """Where and to whom the page opens.
+    """The address of the page and its audience.
 
     Parameters
     ----------
     port : int
-        0 for any that is free.
+        TCP port; 0 for any free one.
     network : str
-        This computer's address in the local network, for viewers; empty: for nobody but this computer.
+        This computer's address in the local network, for viewers; empty if only this computer may open the page.
     secret, used
-        As of :class:`springmass.page.web.security.Access`.
+        As in :class:`springmass.page.web.security.Access`.
     opened : callable
-        Takes the port, the address to open (None where it was used before), and that for viewers: the page answers.
+        Called once the page answers, with the port, the address to open (None if it has been used) and the viewers'
+        address.
     was_used : callable
-        Called when the controller's link is.
+        Called when the controller's link has been used.
     """
 
     port: int = 0
@@ -73,15 +74,15 @@ class Opening:
 def application(
     page_state: PageState, share: Callable[[], str] = lambda: "", polled: Callable[[int], None] = print
 ) -> Starlette:
-    """Return the page as an ASGI application, open to everybody.
+    """Return the page as an ASGI application without access control.
 
     Parameters
     ----------
     page_state : PageState
     share : callable
-        Returns the address for viewers; empty where there is none.
+        Returns the address for viewers; empty if viewers are not admitted.
     polled : callable
-        Called after every look at the log, with how many look at the page.
+        Called after every read of the log, with the number of viewers.
     """
     from collections.abc import AsyncIterator
 
@@ -136,15 +137,15 @@ class _Server:
         self._next: asyncio.TimerHandle | None = None
 
     def look(self) -> None:
-        """Update the view, now and as long as the page is served.
+        """Update the view now, and repeatedly as long as the page is served.
 
-        Texts and frames are made once for all viewers. This is a timer's callback because a task that sleeps would wake
-        twice a turn.
+        Texts and frames are encoded once for all viewers. This is a timer's callback because a sleeping task would wake
+        twice per turn.
         """
         self._next = asyncio.get_running_loop().call_later(TURN_S, self.look)
         try:
             self._update()
-        except Exception:  # a defect: the next turn may be without it
+        except Exception:  # a defect; the next turn may succeed
             LOG.exception("the page could not be brought up to date")
         self._polled(self._viewers)
 
@@ -164,15 +165,15 @@ class _Server:
             turned.set()
 
     def close(self) -> None:
-        """Stop looking at the log."""
+        """Stop reading the log."""
         if self._next is not None:
             self._next.cancel()
 
     async def attend(self, socket_: WebSocket) -> None:
         """Serve one browser until it leaves, or close its connection with a code.
 
-        What it has not seen yet is taken from the view whenever it has taken the last. The codes: 1003 for a message
-        that it may not send, 1011 for a defect of the page, 1013 where too many look.
+        New data are taken from the view whenever the browser has received the previous data. The codes are 1003 for a
+        forbidden message, 1011 for a defect of the page, and 1013 for too many viewers.
         """
         from starlette.websockets import WebSocketDisconnect
 
@@ -191,7 +192,7 @@ class _Server:
                 await socket_.close(1011)
 
     async def _converse(self, socket_: WebSocket) -> Exception | None:
-        """Send and receive until the browser leaves; return what else ended it. Raises WebSocketDisconnect."""
+        """Send and receive until an error, which is returned; raise WebSocketDisconnect when the browser leaves."""
         from starlette.websockets import WebSocketDisconnect
 
         self._viewers += 1
@@ -237,7 +238,8 @@ class _Server:
                     message = self._frame(view, number, sent[number])
                     sent[number] += (len(message) - 16) // 16
                     await socket_.send_bytes(message)
-            # A view that was replaced while its samples were sent gets nothing of the next one.
+            # If the view was replaced while its samples were sent, data of the next view must wait for its hello
+            # message.
             if state != self._state_text and view is not None and view is self._page_state.view:
                 state = self._state_text
                 await socket_.send_text(state)
@@ -261,12 +263,12 @@ class _Server:
         return {**view.hello(controls=controls), "role": role, "share": self._share()}
 
     async def _take(self, socket_: WebSocket, text: str) -> None:
-        """Do what a browser asks for.
+        """Carry out a browser's request.
 
         Raises
         ------
         _Refused
-            If it may not ask for it.
+            If the browser may not make this request.
         """
         try:
             request = json.loads(text)
@@ -274,7 +276,7 @@ class _Server:
             low = _number(request, "from") if kind == "region" else -math.inf
             high = _number(request, "to") if kind in ANALYSES else math.inf
             checked = {} if kind in ANALYSES else _checked(kind, request)
-        # Also an integer of thousands of digits, and lists in lists in lists.
+        # These include the errors for integers of thousands of digits and for deeply nested lists.
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise _Refused("a message that is none of the page's") from error
         if kind in ANALYSES:
@@ -291,7 +293,7 @@ class _Server:
             raise _Refused("a command of a viewer")
 
     def _act(self, kind: str, checked: Mapping[str, Any]) -> None:
-        """Pass on a request that is possible now, and ignore others: the page shows the state."""
+        """Carry out a request that is possible now and ignore others; the page shows the state."""
         page_state = self._page_state
         if not page_state.may(kind):
             return
@@ -321,9 +323,9 @@ KINDS: dict[str, tuple[str, ...]] = {
     "discard": (),
     "close": (),
 }
-"""Requests of the controller, and their values."""
+"""Requests of the controller, with the names of their values."""
 ANALYSES = frozenset({"region", "moment"})
-"""Requests of anybody: they change nothing."""
+"""Requests that any viewer may make, because they change nothing."""
 
 
 class _Refused(Exception):
@@ -331,13 +333,13 @@ class _Refused(Exception):
 
 
 def _log(socket_: WebSocket, message: str, *values: object, error: Exception | None = None) -> None:
-    """Log what a browser did, or what failed while it was served."""
+    """Log an action of a browser, or a failure while it was served."""
     client = socket_.client.host if socket_.client else ""
     LOG.warning(message, *values, exc_info=error, extra={"client": client})
 
 
 def _checked(kind: str, request: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a command with what belongs to it and nothing else. Raises ValueError or what a wrong value raises."""
+    """Return a command with only its own values; raise ValueError, or the error of a wrong value."""
     if kind not in KINDS:
         raise ValueError(kind)
     return {"type": kind} | {name: _text(request) if name == "text" else _number(request, name) for name in KINDS[kind]}
@@ -363,7 +365,7 @@ def serve(page_state: PageState, opening: Opening, *, until: Callable[[], bool])
     page_state : PageState
     opening : Opening
     until : callable
-        Whether it shall end; asked at every look at the log.
+        Returns whether the page should end; called after every read of the log.
 
     Raises
     ------
@@ -397,13 +399,13 @@ def serve(page_state: PageState, opening: Opening, *, until: Callable[[], bool])
         config = uvicorn.Config(
             guarded(page, access, [opening.network] if opening.network else []),
             http=bounded_protocol(most),
-            backlog=most // 2,  # so many are accepted in one turn, before they can be counted
-            log_config=None,  # whoever owns the process says where its log goes
+            backlog=most // 2,  # maximum number accepted in one turn, before they can be counted
+            log_config=None,  # the caller decides where the log of its process goes
             log_level="error",
             access_log=False,
             ws_max_size=LONGEST_MESSAGE,
             ws_ping_interval=20,
-            ws_per_message_deflate=False,  # a few samples are no shorter for it, and it costs more than all the rest
+            ws_per_message_deflate=False,  # it does not shorten a few samples, and costs more time than everything else
             timeout_graceful_shutdown=2,
         )
         server = uvicorn.Server(config)

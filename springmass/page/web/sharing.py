@@ -1,4 +1,4 @@
-"""The page on the local network: by which address others reach this computer, and that address as a QR code."""
+"""The page on the local network: this computer's address there, and that address as a QR code."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from springmass.errors import SENSOR, ProgramError
 __all__ = ["address_in_network", "code_for_terminal", "code_svg"]
 
 ELSEWHERE = ("192.0.2.1", 9)
-"""An address for documentation (RFC 5737): nothing is sent there, the system only says by which way it would go."""
+"""An address for documentation (RFC 5737): nothing is sent to it; the system only chooses the route to it."""
 
 
 def address_in_network() -> str:
-    """Return this computer's address in the network that it would send by.
+    """Return this computer's address in the network through which it would send.
 
     Raises
     ------
     ProgramError
-        If it is in none.
+        If the computer is in no network.
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
@@ -30,7 +30,7 @@ def address_in_network() -> str:
 
 
 def code_svg(address: str) -> bytes:
-    """Return an address as a QR code, dark on light with its quiet zone, SVG."""
+    """Return an address as a QR code in SVG format, dark on light and with a quiet zone."""
     import segno
 
     made = io.BytesIO()

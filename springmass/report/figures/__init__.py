@@ -1,8 +1,8 @@
 """Figures of a report: position and residuals, amplitude and laws, velocity and acceleration, drag, energy, phase plot.
 
-Every maker takes an analysis and returns a matplotlib ``Figure`` that belongs to no window, or None where the record
-or its scene give nothing to draw. Long series are thinned to what the eye can see or drawn as pixels inside the vector
-file, so that the page stays small. A further figure is a maker and a line in :data:`MAKERS`.
+Every maker takes an analysis and returns a matplotlib ``Figure`` that belongs to no window, or None if the record or
+its scene lacks the data to draw. To keep the page small, long series are thinned to what the eye can see, or rasterized
+inside the vector file. A further figure needs a maker and a line in :data:`MAKERS`.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ MAKERS: dict[str, Callable[[Analysis], Figure | None]] = {
 
 
 NAMES = (*MAKERS, "classic")
-"""Of every figure that a run's report may hold."""
+"""Names of all figures that a run's report may contain."""
 
 
 def draw(
@@ -74,17 +74,17 @@ def draw(
     notes: Sequence[Note] = (),
     classic: Classic | None = None,
 ) -> dict[str, Figure]:
-    """Return every figure of a run by name, in the report's order; the position alone of one at rest.
+    """Return all figures of a run by name, in the report's order; only the position if nothing oscillates.
 
     Parameters
     ----------
     analysis : Analysis
     smoothed : Smoothed or str, optional
-        The run's ``smoothed()``, where it is at hand, or why there is none; left out, it is worked out.
+        The run's ``smoothed()``, or why there is none; calculated if omitted.
     notes : sequence of Note
         Marks and events of the recording, for the position.
     classic : Classic, optional
-        The lab report's own method on the same record, which then has its figure.
+        The lab report's own method on the same record; if given, its figure is included.
     """
     if not isinstance(analysis.motion, Oscillation):
         return {"position": position_figure(analysis, notes)}

@@ -36,19 +36,19 @@ if TYPE_CHECKING:
 __all__ = ["amplitude_figure", "amplitude_log_figure", "amplitude_panel"]
 
 MOST_NAMED = 4
-MANY_WINDOWS = 60  # smaller points leave gaps through which the fit is seen
+MANY_WINDOWS = 60  # with more windows, points are smaller, so that the fit is visible between them
 EXPONENTIAL = "linear"
-"""The law that a reader compares with: linear drag."""
+"""The law for comparison: linear drag."""
 _DASHES = ((0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
 
 
 def amplitude_figure(analysis: Analysis) -> Figure:
-    """Draw the amplitudes with every law, and beneath them the selected law's residuals over their u.
+    """Draw the amplitudes with every law, and below them the selected law's residuals divided by u.
 
     Parameters
     ----------
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     """
     motion, factor = moving(analysis), SHOWN[analysis.track.unit].factor
     damping, t, amplitude = motion.damping, motion.demodulated.t, motion.demodulated.amplitude * factor
@@ -60,7 +60,7 @@ def amplitude_figure(analysis: Analysis) -> Figure:
         residual = (amplitude - damping.best.amplitude(t - damping.t0) * factor) / np.where(u > 0, u, 1.0)
         below.plot(t[kept], residual[kept], "o", ms=2.6, mew=0, color=BLUE)
         finish_residual(below, residual[kept], "residual / u")
-        # What was left out lies far off; at the edge it is seen and flattens nothing.
+        # Omitted windows are far off the curve; drawn at the edge of the panel, they do not change its range.
         if not kept.all():
             at_most = np.clip(residual[~kept], *below.get_ylim())
             below.plot(t[~kept], at_most, "o", mfc="none", color=ORANGE, ms=4, clip_on=False, zorder=4)
@@ -76,7 +76,7 @@ def amplitude_log_figure(analysis: Analysis) -> Figure:
     Parameters
     ----------
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     """
     from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -110,10 +110,10 @@ def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None 
     ----------
     panel : Axes
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     laws : sequence of str, optional
-        Names of the laws to draw; left out, all that were fitted. Named are the selected law, the exponential, and the
-        best of those that cannot be ruled out.
+        Names of the laws to draw; default: all fitted laws. By default the legend names the selected law, the
+        exponential and the best of the laws that cannot be ruled out.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def amplitude_panel(panel: Axes, analysis: Analysis, laws: Sequence[str] | None 
         drawn: dict[str, Any] = (
             {"color": "#000000", "lw": 1.5} if chosen else {"color": colour, "ls": dashes, "lw": 1.2}
         )
-        # Beneath the points: a fit must not hide what it was fitted to.
+        # Below the points, because a fit must not hide its data.
         panel.plot(grid, curve, label=label, zorder=1.9 if chosen else 1.7, **drawn)
     margin = 0.12 * max(shown[1] - shown[0], 1e-9 * abs(shown[1])) or 1.0
     panel.set_ylim(shown[0] - margin, shown[1] + margin)

@@ -1,4 +1,4 @@
-"""What all figures share: style, panels, legends, and the bytes of a file.
+"""Common parts of all figures: style, panels, legends, and the bytes of a file.
 
 Colours are those of Okabe and Ito. Line style or marker differ as well, so that no figure depends on colour alone.
 """
@@ -59,18 +59,18 @@ BLUE, SKY, ORANGE, GREEN = "#0072B2", "#56B4E9", "#E69F00", "#009E73"
 VERMILLION, PURPLE, GREY = "#D55E00", "#CC79A7", "#7f7f7f"
 STYLE = Path(__file__).with_name("report.mplstyle")
 WIDTH = 7.2
-"""Inches, as all lengths here: the width of text on A4."""
+"""Width of a figure, which is the text width on A4, in inches like all lengths in this module."""
 DENSE_POINTS = 2500
-"""Of samples: more are drawn as a line between the least and the greatest of every bin."""
+"""Maximum number of samples drawn as points; more become a line through the minimum and maximum of each bin."""
 RASTER_POINTS = 300
-"""Of markers: more are pixels in the file, which take fewer bytes than as many shapes."""
+"""Maximum number of markers drawn as shapes; more are rasterized, which takes fewer bytes."""
 LONG_LABEL = 30
-"""Characters: three columns of such labels fill the width of a page."""
+"""Length of a legend label in characters; three columns of such labels fill the width of a page."""
 KINDS: tuple[Literal["svg"], Literal["pdf"]] = ("svg", "pdf")
 
 
 def style() -> AbstractContextManager[None]:
-    """Draw or save in the report's style, whatever the reader's own settings."""
+    """Return a context that draws and saves in the report's style, regardless of the user's settings."""
     from matplotlib import rc_context
 
     return rc_context(fname=STYLE)
@@ -87,7 +87,8 @@ def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
     out = io.BytesIO()
     with style():
         _lay_out(figure)
-        # Without the date equal runs give equal files, and a course does not depend on who drew its reports.
+        # Without a date, equal runs give identical files, so that a course does not depend on which process drew its
+        # reports.
         figure.savefig(out, format=kind, metadata={"Date" if kind == "svg" else "CreationDate": None})
     return (
         _COORDINATES.sub(lambda found: _DIGITS.sub(rb"\1", found[0]), out.getvalue())
@@ -97,26 +98,26 @@ def render(figure: Figure, kind: Literal["svg", "pdf"]) -> bytes:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Lay a figure out once; saving it else draws it a second time to do so, which takes as long as the rest."""
+    """Lay out a figure once; otherwise saving draws it a second time for the layout, which doubles the time."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     engine = figure.get_layout_engine()
     if engine is None:
         return
-    FigureCanvasAgg(figure)  # measures text much faster than a vector file does
+    FigureCanvasAgg(figure)  # measures text much faster than the canvas of a vector file
     engine.execute(figure)
     with rc_context({"figure.constrained_layout.use": False, "figure.autolayout": False}):
-        figure.set_layout_engine(None)  # as these settings have it: none
+        figure.set_layout_engine(None)  # with these settings, None removes the layout engine
 
 
-# A hundredth of a point is finer than any printer; matplotlib writes six digits, most of the bytes of a figure.
+# A hundredth of a point is finer than any printer resolves; matplotlib's six digits are most of a figure's bytes.
 _COORDINATES = re.compile(rb'\s(?:d|x|y)="[^"]*"')
 _DIGITS = re.compile(rb"(\.\d\d)\d+")
 
 
 def save(figure: Figure, folder: Path, name: str) -> None:
-    """Write a figure as SVG and as PDF, each file whole or not at all."""
+    """Write a figure as SVG and as PDF, each file completely or not at all."""
     for kind in KINDS:
         write_whole(folder / f"{name}.{kind}", render(figure, kind))
 
@@ -127,9 +128,9 @@ def panels(heights: Sequence[float], *, width: float = WIDTH, columns: int = 1) 
     Parameters
     ----------
     heights : sequence of float
-        Of each row, inches, with its share of the labels and legends.
+        Height of each row in inches, including its labels and legends.
     width : float
-        Of the figure, inches.
+        Width of the figure, inches.
     columns : int
     """
     from matplotlib.figure import Figure
@@ -146,11 +147,11 @@ def legend_above(panel: Axes, columns: int | None = None, **options: Any) -> Non
     Parameters
     ----------
     panel : Axes
-        As wide as the figure, where the columns are left out.
+        The panel; it must be as wide as the figure if ``columns`` is omitted.
     columns : int, optional
-        Left out, three, or two where a label is long.
+        Number of columns; default: three, or two if a label is long.
     **options
-        Of :meth:`matplotlib.axes.Axes.legend`.
+        Keyword arguments of :meth:`matplotlib.axes.Axes.legend`.
     """
     if columns is None:
         columns = 2 if any(len(label) > LONG_LABEL for label in panel.get_legend_handles_labels()[1]) else 3
@@ -173,7 +174,7 @@ def finish_residual(panel: Axes, residual: F8, label: str) -> None:
 
 
 def share(above: Axes, below: Axes, start: float, end: float) -> None:
-    """Let two panels share their axis of time, numbered beneath the lower one."""
+    """Let two panels share their time axis, with numbers only below the lower panel."""
     below.sharex(above)
     above.tick_params(labelbottom=False)
     above.set_xlim(start, end)
@@ -188,12 +189,12 @@ def error_bars(
 
 
 def escaped(text: str) -> str:
-    """Return a text from outside, its control characters visible, for matplotlib to set as it stands."""
-    return visible(text).replace("$", r"\$")  # else what stands between two is set as mathematics
+    """Return a text of foreign origin with visible control characters, escaped so that matplotlib sets it literally."""
+    return visible(text).replace("$", r"\$")  # matplotlib sets text between two dollar signs as mathematics
 
 
 def value_label(what: str, unit: str) -> str:
-    """Return the label of an axis in the unit that values of a record are shown in.
+    """Return the label of an axis with the unit in which values of a record are shown.
 
     Examples
     --------
@@ -205,7 +206,9 @@ def value_label(what: str, unit: str) -> str:
 
 
 def derivative_label(what: tuple[str, str], form: str, unit: str) -> str:
-    """Return the label of an axis of a derivative: its name for a length and otherwise, its unit for a length.
+    """Return the label of an axis of a derivative.
+
+    ``what`` is its name for a length and for another quantity, and ``form`` is its unit for a length.
 
     Examples
     --------
@@ -221,7 +224,7 @@ def _in_brackets(unit: str) -> str:
 
 
 def model_phase(motion: Oscillation, t: F8) -> tuple[F8, F8]:
-    """Fitted displacement and velocity at times t, in the record's unit and in that over s."""
+    """Return fitted displacement and velocity at times t, in the record's unit and in that unit per second."""
     law, angle = motion.damping.best, motion.phase.total(t)
     amplitude = law.amplitude(t - motion.phase.t0)
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -230,7 +233,7 @@ def model_phase(motion: Oscillation, t: F8) -> tuple[F8, F8]:
 
 
 def thinned(y: F8, bins: int) -> NDArray[np.int64]:
-    """Return the rows of the least and the greatest of every bin: on paper of that many pixels nothing is lost."""
+    """Return the rows of each bin's minimum and maximum; at one pixel per bin, a plot of them loses nothing."""
     if y.size <= 2 * bins:
         return np.arange(y.size)
     edges = np.linspace(0, y.size, bins + 1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The lab report's own method on the same axes as this analysis: what it picks, and why it differs."""
+"""The lab report's own method on the same axes as this analysis: the values it picks, and why it differs."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ BINS = 300
 
 
 def classic_figure(analysis: Analysis, classic: Classic) -> Figure:
-    """Draw what the lab report picks over this analysis: two maxima, two extremes, windows and their exponential.
+    """Draw the lab report's choices over this analysis: two maxima, two extremes, windows and their exponential.
 
     Parameters
     ----------
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     classic : Classic
-        Of the same record.
+        The lab report's method on the same record.
     """
     motion, factor = moving(analysis), SHOWN[analysis.track.unit].factor
     with style():

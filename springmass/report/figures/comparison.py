@@ -1,4 +1,4 @@
-"""Spring constants of several runs with their intervals, and what each differs from the mean."""
+"""Spring constants of several runs with their intervals, and the deviation of each from the mean."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 __all__ = ["comparison_figure"]
 
 ROW, AROUND = 0.34, 1.1
-"""Heights of a run's row and of all that stands around the rows, inches."""
+"""Heights of a run's row, and of everything above and below the rows, inches."""
 LONGEST_NAME = 30
-"""Characters: about a third of the figure."""
+"""Maximum length of a name in characters, about a third of the figure's width."""
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
-    """Draw the spring constant of every run with its interval, and beside it the pulls.
+    """Draw the spring constant of every run with its interval, and beside it the pull of every run.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
 
     Notes
     -----
-    The thin bar is the whole standard uncertainty, the thick one what the run does not share with others. Runs that
-    were found exchanged stand out.
+    The thin bar is the whole standard uncertainty; the thick bar is the part that the run does not share with others.
+    Runs that seem to have been exchanged have a different colour.
     """
     count = len(comparison.names)
     rows = np.arange(count)[::-1].astype(float)
@@ -48,7 +48,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     colours = [VERMILLION if name in comparison.exchanged else BLUE for name in comparison.names]
     with style():
         figure, (left, right) = panels([ROW * count + AROUND], columns=2)
-        if comparison.agree:  # of constants that disagree there is no mean to draw
+        if comparison.agree:  # constants that disagree have no meaningful mean
             left.axvspan(mean.value - mean.u, mean.value + mean.u, color=SKY, alpha=0.45, lw=0, label="mean ± u")
             left.axvline(mean.value, color="#000000", lw=0.8)
         left.hlines(rows, k - u, k + u, colors=colours, lw=0.9, label="u of the run")

@@ -34,9 +34,9 @@ __all__ = ["DragRun", "drag_map_figure", "drag_of_disc_at_rest", "drag_of_plate"
 
 COLOURS = ((BLUE, "-"), (VERMILLION, "--"), (GREEN, "-."), (PURPLE, ":"), (ORANGE, "-"), (SKY, "--"))
 HEIGHT = 3.6
-"""Of a row of panels, inches."""
+"""Height of a row of panels, inches."""
 NARROW = 5.0
-"""Inches, below which the panels stand under each other."""
+"""Width in inches below which the panels are placed one above the other."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,9 +46,9 @@ class DragRun:
     Parameters
     ----------
     disc : str
-        Label.
+        Label of the disc.
     points : (n, 4) float64
-        Re, KC, drag coefficient, its standard uncertainty.
+        Columns: Re, KC, drag coefficient and its standard uncertainty.
     """
 
     disc: str
@@ -56,12 +56,12 @@ class DragRun:
 
 
 def drag_of_disc_at_rest(reynolds: F8) -> F8:
-    """Return the drag coefficient of a disc at right angles to a steady stream, at Reynolds numbers (n,).
+    """Return the drag coefficient of a disc perpendicular to a steady stream, at Reynolds numbers (n,).
 
     Notes
     -----
-    :math:`64/(\\pi Re)` of creeping flow [1]_ up to where it meets 1.17 of high Reynolds numbers [2]_: the two limits,
-    not what lies between them.
+    :math:`64/(\\pi Re)` for creeping flow [1]_, up to the intersection with the constant 1.17 for high Reynolds numbers
+    [2]_. These are the two limits; the transition between them is not modelled.
 
     References
     ----------
@@ -88,14 +88,14 @@ def drag_of_plate(keulegan_carpenter: F8) -> F8:
 
 
 def drag_map_figure(runs: Sequence[DragRun], *, width: float = WIDTH) -> Figure:
-    """Draw the map: a line a run with a band of one standard uncertainty, a colour and a dash a disc.
+    """Draw the map: one line per run with a band of one standard uncertainty, one colour and line style per disc.
 
     Parameters
     ----------
     runs : sequence of DragRun
-        One at least.
+        At least one run.
     width : float
-        Inches; narrow ones have the panels under each other.
+        Width in inches; in a narrow figure, the panels are placed one above the other.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def _draw(panel: Axes, runs: Sequence[DragRun], discs: Sequence[str], column: in
 
     panel.set_xscale("log")
     panel.set_yscale("log")
-    flat = len(runs) * 8 > 8 * RASTER_POINTS  # thousands of lines are pixels
+    flat = len(runs) * 8 > 8 * RASTER_POINTS  # rasterize more than RASTER_POINTS runs
     seen: set[str] = set()
     ends, heights = [], []
     for run in runs:

@@ -1,4 +1,4 @@
-"""Energy against time and drag coefficient against amplitude, each with its band."""
+"""Energy against time and drag coefficient against amplitude, each with its uncertainty band."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ if TYPE_CHECKING:
 
 __all__ = ["drag_figure", "drag_panel", "energy_figure", "energy_panel"]
 
-MOST_MEANS = 120  # of each part; of more periods several share one
+MOST_MEANS = 120  # of each part; with more periods, one mean covers several
 
 
 def energy_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figure | None:
-    """Draw the mechanical energy with its band, its kinetic and its potential part, and what deviates from the law.
+    """Draw the mechanical energy with its band, its kinetic and potential parts, and the deviation from the law.
 
-    None where the record tells no displacement.
+    Return None if the record determines no displacement.
 
     Parameters
     ----------
     analysis : Analysis
-        Of a record that oscillates. Without a mass in its scene the energy is that of one kilogram.
+        Analysis of a record that oscillates. Without a mass in its scene, the energy of one kilogram is drawn.
     smoothed : Smoothed, optional
-        Its motion, which tells the two parts apart; left out, they are not drawn.
+        Smoothed motion, which separates the two parts; without it they are not drawn.
     """
     motion = moving(analysis)
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
@@ -67,7 +67,7 @@ def energy_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
             _draw_parts(axes[2], analysis, *parts)
             axes[2].set_ylabel(above.get_ylabel())
         law = np.interp(curve.x_points, curve.x, curve.y)
-        # Where friction has stopped the motion, the law leaves no energy to compare with.
+        # Where friction has stopped the motion, the law predicts no energy for comparison.
         drawn, moves = law > 0.0, curve.y > 0.0
         deviation = 100.0 * (curve.y_points[drawn] / law[drawn] - 1.0)
         scatter = 100.0 * curve.u_points[drawn] / law[drawn]
@@ -85,26 +85,26 @@ def energy_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
 
 
 def _parts(motion: Oscillation, smoothed: Smoothed) -> tuple[F8, F8, F8]:
-    """Return times in order, and the kinetic and the potential energy at each, J, or J/kg without a mass."""
+    """Return sorted times with the kinetic and the potential energy at each, in J, or in J/kg without a mass."""
     rows = np.flatnonzero(np.isfinite(smoothed.position))
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
     stiffness = motion.derived.half_stiffness
-    assert stiffness is not None  # there is an energy
+    assert stiffness is not None  # otherwise there is no energy curve
     t, half = smoothed.t[rows], stiffness.value
     displacement = smoothed.position[rows] - motion.rest.at(t)
-    # Both from one constant: m v^2 / 2 is k (v/omega)^2 / 2.
+    # Both energies use the same constant, because m v^2 / 2 = k (v/omega)^2 / 2.
     quadrature = smoothed.velocity[rows] / motion.phase.angular_frequency.value
     return t, half * quadrature**2, half * displacement**2
 
 
 def _draw_means(panel: Axes, motion: Oscillation, t: F8, kinetic: F8, potential: F8) -> None:
-    """Set each part's mean over every whole period, of many periods over several."""
+    """Draw each part's mean over every whole period, or over several periods if there are many."""
     together = max(1, math.ceil(motion.cycles.count / MOST_MEANS))
     turn = np.floor((t - t[0]) * motion.cycles.frequency_hz / together).astype(np.intp)
     counts = np.bincount(turn)
-    whole = counts >= np.median(counts) - 1  # a period is no whole number of samples
+    whole = counts >= np.median(counts) - 1  # a period is not a whole number of samples
     times = np.bincount(turn, t)[whole] / counts[whole]
-    # Both are half of the whole and lie on one line: they take turns along it, so that neither covers the other.
+    # Both means are half the energy and lie on one line, so their markers alternate and neither covers the other.
     for first, (part, marker, colour, label) in enumerate(
         ((kinetic, "o", VERMILLION, "kinetic"), (potential, "^", GREEN, "potential"))
     ):
@@ -120,7 +120,7 @@ def _draw_means(panel: Axes, motion: Oscillation, t: F8, kinetic: F8, potential:
 
 
 def _draw_parts(panel: Axes, analysis: Analysis, t: F8, kinetic: F8, potential: F8) -> None:
-    """Draw how both parts change into each other in the first periods, and their sum."""
+    """Draw the exchange between both parts in the first periods, and their sum."""
     motion = moving(analysis)
     end = min(float(t[0]) + ZOOM_PERIODS / motion.cycles.frequency_hz, float(t[-1]))
     rows = np.flatnonzero(t <= end)
@@ -134,12 +134,12 @@ def _draw_parts(panel: Axes, analysis: Analysis, t: F8, kinetic: F8, potential: 
 
 
 def energy_panel(panel: Axes, analysis: Analysis) -> None:
-    """Draw the mechanical energy against time with its band, as :func:`energy_figure` does.
+    """Draw the mechanical energy against time with its uncertainty band, as :func:`energy_figure` does.
 
     Raises
     ------
     AnalysisError
-        If the record tells no displacement.
+        If the record determines no displacement.
     """
     motion = moving(analysis)
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
@@ -154,30 +154,30 @@ def energy_panel(panel: Axes, analysis: Analysis) -> None:
 
 
 def drag_figure(analysis: Analysis) -> Figure | None:
-    """Draw the drag coefficient against amplitude with its band; None where scene or record give none.
+    """Draw the drag coefficient against amplitude with its band; return None if it cannot be determined.
 
     Parameters
     ----------
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     """
     with style():
         figure, (panel,) = panels([3.7])
         if not drag_panel(panel, analysis):
             return None
-        # The axis begins at 0, the coefficient falls as the amplitude grows: the lower left is free.
+        # The axis begins at 0 and the coefficient falls with growing amplitude, so the lower left corner is free.
         panel.legend(loc="lower left")
         return figure
 
 
 def drag_panel(panel: Axes, analysis: Analysis) -> bool:
-    """Draw the drag coefficient against amplitude, and say whether scene and record give one.
+    """Draw the drag coefficient against amplitude; return whether scene and record determine one.
 
     Parameters
     ----------
     panel : Axes
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     """
     motion = moving(analysis)
     curve = motion.derived.drag_curve(motion.damping, motion.demodulated)
@@ -189,7 +189,7 @@ def drag_panel(panel: Axes, analysis: Analysis) -> bool:
     _draw(panel, curve, factor, 1.0, "from a stretch of the record", f"from the law {motion.damping.selected}")
     points = [curve.y_points + curve.u_points, curve.y_points - curve.u_points]
     shown = np.concatenate([curve.y + curve.u, curve.y - curve.u, *points])
-    # A stretch with hardly any damping has a bar that would flatten all else.
+    # The long error bar of a stretch with hardly any damping would compress everything else.
     most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
     low, high = min(0.0, max(float(np.min(shown)), -most)), min(float(np.max(shown)), most)
     panel.set_ylim(low - 0.05 * (high - low) if low < 0 else 0.0, high + 0.08 * (high - low))
@@ -208,7 +208,7 @@ def _times(factor: float) -> Callable[[ArrayLike], F8]:
 
 
 def _draw(panel: Axes, curve: Curve, x: float, y: float, points: str, law: str) -> None:
-    """Draw band, points and curve, in units x and y."""
+    """Draw band, points and curve, multiplied by the factors x and y."""
     label = "± one standard uncertainty"
     low, high = y * (curve.y - curve.u), y * (curve.y + curve.u)
     panel.fill_between(x * curve.x, low, high, color=SKY, alpha=0.45, lw=0, label=label)

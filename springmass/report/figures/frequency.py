@@ -29,11 +29,11 @@ __all__ = ["FrequencyPoints", "frequency_figure", "frequency_points", "spectrum"
 
 MOST_POINTS = 24
 LEAST_WINDOWS = 6  # three stretches of two
-SHOWN_MULTIPLES = 8.0  # of the frequency of the oscillation
+SHOWN_MULTIPLES = 8.0  # range of the spectrum in multiples of the oscillation's frequency
 LEAST_ROWS = 8
-PEAKS = 5  # that are labelled
+PEAKS = 5  # maximum number of labelled peaks
 FALSE_ALARM = 1e-3  # probability that white noise has a labelled peak
-SURROUNDINGS = 101  # rows whose median is the noise about a peak
+SURROUNDINGS = 101  # rows whose median is the noise level around a peak
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +43,9 @@ class FrequencyPoints:
     Parameters
     ----------
     amplitude : (m,) float64
-        Mean of the stretch, in the recording's unit.
+        Mean amplitude of each stretch, in the recording's unit.
     frequency_hz, u_hz : (m,) float64, Hz
-        Slope of the windows' phases through the stretch, and its standard uncertainty.
+        Slope of the windows' phases in each stretch, and its standard uncertainty.
     """
 
     amplitude: F8
@@ -54,7 +54,7 @@ class FrequencyPoints:
 
 
 def frequency_points(motion: Oscillation) -> FrequencyPoints | None:
-    """Return the frequency in stretches of a run; None where it has too few windows.
+    """Return the frequency in stretches of a run, or None if it has too few windows.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ def frequency_points(motion: Oscillation) -> FrequencyPoints | None:
 
     Notes
     -----
-    In each stretch a straight line is fitted to the phases of its windows, weighted by their variances. The variances
-    are multiplied by the reduced chi-square of the whole run's phases where that exceeds one.
+    In each stretch, a straight line is fitted to the phases of its windows, weighted by their inverse variances. The
+    variances are multiplied by the reduced chi-square of the whole run's phases if that exceeds one.
     """
     windows = motion.demodulated
     order = np.argsort(windows.t, kind="stable")
@@ -87,7 +87,7 @@ def frequency_figure(analysis: Analysis) -> Figure | None:
     Parameters
     ----------
     analysis : Analysis
-        Of a run that oscillates.
+        Analysis of a run that oscillates.
     """
     motion = moving(analysis)
     points = frequency_points(motion)
@@ -114,12 +114,12 @@ def frequency_figure(analysis: Analysis) -> Figure | None:
 
 
 def spectrum(analysis: Analysis, motion: Oscillation) -> tuple[F8, F8, F8]:
-    """Return frequencies, Hz, and the amplitudes of the recording and of its residuals, in the recording's unit.
+    """Return frequencies in Hz, and the amplitudes of recording and residuals in the recording's unit.
 
     Notes
     -----
-    A discrete Fourier transform with a Hann window, scaled so that a steady sinusoid shows its amplitude. Samples that
-    were left out, and gaps, are filled with the fit, for the recording, and with zero, for the residuals.
+    The discrete Fourier transform with a Hann window is scaled so that a steady sinusoid shows its amplitude. Omitted
+    samples and gaps are filled with the fit in the recording, and with zero in the residuals.
     """
     track, waveform = analysis.track, motion.waveform
     used = ((analysis.flags & UNUSABLE) == 0) & np.isfinite(track.y) & np.isfinite(waveform.residual)
@@ -140,7 +140,7 @@ def spectrum(analysis: Analysis, motion: Oscillation) -> tuple[F8, F8, F8]:
 
 
 def _peaks(amplitude: F8) -> NDArray[np.intp]:
-    """Return the rows that stand out of their surroundings, the highest first.
+    """Return the rows of peaks that exceed the noise around them, the highest first.
 
     Notes
     -----
@@ -159,12 +159,12 @@ def _peaks(amplitude: F8) -> NDArray[np.intp]:
 
 
 def spectrum_figure(analysis: Analysis) -> Figure | None:
-    """Draw the spectra of the recording and of its residuals, the highest peaks labelled with their frequencies.
+    """Draw the spectra of the recording and its residuals, with the frequencies of the highest peaks.
 
     Parameters
     ----------
     analysis : Analysis
-        Of a run that oscillates.
+        Analysis of a run that oscillates.
     """
     motion, factor = moving(analysis), SHOWN[analysis.track.unit].factor
     frequency, whole, left = spectrum(analysis, motion)

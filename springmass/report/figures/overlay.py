@@ -1,4 +1,4 @@
-"""The positions of several runs over each other."""
+"""The positions of several runs in one plot."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ BINS = 700
 
 
 def overlay_figure(names: Sequence[str], analyses: Sequence[Analysis]) -> Figure | None:
-    """Draw the displacement of every run against the time since its first sample, and the first periods beneath.
+    """Draw the displacement of every run against the time since its first used sample, and the first periods below.
 
-    None where the runs are of different units.
+    Return None if the runs have different units.
 
     Parameters
     ----------

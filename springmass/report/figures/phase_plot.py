@@ -28,25 +28,25 @@ if TYPE_CHECKING:
 
 __all__ = ["measured_phase", "phase_figure", "phase_panel", "turn_step"]
 
-LEAST_TURNS, MOST_TURNS = 4, 24  # drawn in a phase plot
+LEAST_TURNS, MOST_TURNS = 4, 24  # minimum and maximum number of turns in a phase plot
 
 
 def turn_step(motion: Oscillation) -> int:
-    """Return one turn in how many the phase plot draws: the less the amplitude falls, the fewer turns."""
+    """Return n if the phase plot draws every n-th turn; it draws fewer turns if the amplitude falls less."""
     amplitude = motion.demodulated.amplitude
     wanted = 32.0 * float(np.ptp(amplitude) / np.max(amplitude))
     return max(1, int(np.ceil(motion.cycles.count / min(max(wanted, LEAST_TURNS), MOST_TURNS))))
 
 
 def phase_figure(analysis: Analysis) -> Figure:
-    """Draw the fitted velocity against the fitted displacement, and faintly what the samples say.
+    """Draw the fitted velocity against the fitted displacement, and in grey the values from the samples.
 
-    Of many turns evenly spaced ones are drawn: see :func:`turn_step`.
+    If there are many turns, evenly spaced ones are drawn; see :func:`turn_step`.
 
     Parameters
     ----------
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     """
     with style():
         figure, (panel,) = panels([4.6], width=5.6)
@@ -58,13 +58,13 @@ def phase_figure(analysis: Analysis) -> Figure:
 
 
 def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
-    """Draw the turns of :func:`phase_figure`; return what a bar of their colours, in s, is made of.
+    """Draw the turns of :func:`phase_figure`; return the colour scale of their times in s, for a colour bar.
 
     Parameters
     ----------
     panel : Axes
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -75,7 +75,7 @@ def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
     period = 2.0 * np.pi / motion.phase.angular_frequency.value
     inside = (analysis.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
-    # The map's pale end would drown in the paper.
+    # The pale end of the colour map would be invisible on paper.
     colours = ListedColormap(colormaps["cividis"](np.linspace(0.0, 0.88, 64)))
     scale = Normalize(first, end)
     displacement, velocity, label = measured_phase(analysis, motion)
@@ -102,13 +102,13 @@ def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
 
 
 def measured_phase(analysis: Analysis, motion: Oscillation) -> tuple[F8, F8, str]:
-    """Return displacement and velocity of the samples used, NaN elsewhere, and in words where the velocity is from."""
+    """Return displacement and velocity of used samples, NaN elsewhere, and the source of the velocity in words."""
     track = analysis.track
     used: NDArray[np.bool_] = (analysis.flags & UNUSABLE) == 0
     displacement = np.where(used, track.y - motion.rest.at(track.t), np.nan)
     if track.velocity is not None and np.isfinite(track.velocity).any():
         return displacement, np.where(used, track.velocity, np.nan), "samples, velocity as recorded"
-    # Wider differences carry less noise; what they take from a sine is known and put back.
+    # Wider differences have less noise; their known attenuation of a sinusoid is corrected.
     omega = motion.phase.angular_frequency.value
     apart = max(1, round(2.0 * np.pi / omega * track.rate_hz / 16.0))
     velocity = np.full(track.t.size, np.nan)

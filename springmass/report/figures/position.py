@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ZOOM_PERIODS", "has_error_bars", "is_long", "position_figure", "position_panel"]
 
-# Bits of a sample, the most serious first; what they are called, and marker and colour.
+# Flag bits of a sample, the most serious first, with name, marker and colour.
 _FLAGGED: tuple[tuple[int, str, str, str], ...] = (
     (int(Quality.CLIPPED), "clipped", "s", ORANGE),
     (int(Quality.FALSE_ECHO), "false echo", "x", VERMILLION),
@@ -46,29 +46,29 @@ _FLAGGED: tuple[tuple[int, str, str, str], ...] = (
     (int(UNUSABLE), "otherwise unusable", "+", GREEN),
 )
 ZOOM_PERIODS = 8
-LONG_PERIODS = 14  # more than these are drawn whole and as a detail
-DENSE_PERIODS = 40  # more than these are a band to the eye
-MOST_WORDS = 12  # marks whose words have room
-VISIBLE_NOISE = 0.005  # of the panel's height; error bars of less vanish in the points
+LONG_PERIODS = 14  # with more periods, a detail is drawn in addition to the whole
+DENSE_PERIODS = 40  # with more periods, the motion looks like a band
+MOST_WORDS = 12  # maximum number of marks with room for their words
+VISIBLE_NOISE = 0.005  # of the panel's height; smaller error bars are hidden by the points
 
 
 def is_long(analysis: Analysis) -> bool:
-    """Return whether the position is drawn twice, whole and as a detail of the first periods."""
+    """Return whether a detail of the first periods is drawn in addition to the whole position."""
     return isinstance(analysis.motion, Oscillation) and analysis.motion.cycles.count > LONG_PERIODS
 
 
 def has_error_bars(analysis: Analysis) -> bool:
-    """Return whether the samples' error bars are large enough to be seen, and drawn."""
+    """Return whether the samples' error bars are large enough to be visible and are therefore drawn."""
     y = analysis.track.y[(analysis.flags & UNUSABLE) == 0]
     return isinstance(analysis.motion, Oscillation) and bool(analysis.conditioned.noise_m > VISIBLE_NOISE * np.ptp(y))
 
 
 def position_figure(analysis: Analysis, notes: Sequence[Note] = ()) -> Figure:
-    """Draw the distance with its fit, and beneath it the residual over the noise of one sample.
+    """Draw the distance with its fit, and below it the residuals divided by the noise of one sample.
 
-    Flagged samples have other markers; those off the axis stand at its edge. A long record is followed
-    by a detail of its first periods, a rest position that moves stands at the end. Where nothing oscillates the
-    distance stands alone.
+    Flagged samples have other markers; those outside the axis range are drawn at its edge. A long record is followed by
+    a detail of its first periods, and a moving rest position by a panel at the end. If nothing oscillates, only the
+    distance is drawn.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def position_figure(analysis: Analysis, notes: Sequence[Note] = ()) -> Figure:
 
 
 def position_panel(panel: Axes, analysis: Analysis, start: float, end: float) -> None:
-    """Draw the distance between two times, s, with its fit where there is one.
+    """Draw the distance between two times, with its fit if there is one.
 
     Parameters
     ----------
@@ -130,12 +130,12 @@ def position_panel(panel: Axes, analysis: Analysis, start: float, end: float) ->
     else:
         grid = np.linspace(start, end, int(50 * (end - start) * motion.cycles.frequency_hz) + 2)
         position = rest.at(grid) + model_phase(motion, grid)[0]
-        # Beneath the samples: a fit must not hide what it was fitted to.
+        # Below the samples, because a fit must not hide its data.
         panel.plot(grid, position * factor, color="#000000", lw=1.4, alpha=0.8, label="fit", zorder=1.8)
 
 
 def _relaxing(analysis: Analysis, motion: Overdamped) -> tuple[F8, F8]:
-    """Return times and distances of the relaxation with the rates found; its two amplitudes and rest are linear."""
+    """Return times and distances of the relaxation: a linear fit of amplitudes and rest at the fitted rates."""
     track, x = analysis.track, motion.estimates
     used = ((analysis.flags & UNUSABLE) == 0) & (track.t >= motion.start_s)
 
@@ -156,14 +156,14 @@ def _relaxing(analysis: Analysis, motion: Overdamped) -> tuple[F8, F8]:
 
 
 def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Oscillation, start: float, end: float) -> None:
-    """Draw distance and fit above, residual over noise beneath, between two times."""
+    """Draw distance and fit above, and below them residuals divided by noise, between two times."""
     above, below = axes
     t = analysis.track.t
     position_panel(above, analysis, start, end)
     noise = analysis.estimates["noise"].value or 1.0
     inside = ((analysis.flags & UNUSABLE) == 0) & (t >= start) & (t <= end)
     residual = motion.waveform.residual[inside] / noise
-    # Thousands of points are pixels, which take a third of the bytes of round ones.
+    # Thousands of points are drawn as pixels, which take a third of the bytes of round points.
     look: dict[str, Any] = {"marker": ",", "alpha": 0.7} if residual.size > DENSE_POINTS else {"marker": ".", "ms": 2.6}
     dense = residual.size > RASTER_POINTS
     below.plot(t[inside], residual, ls="", mew=0, color=BLUE, rasterized=dense, **look)
@@ -172,7 +172,7 @@ def _draw_pair(axes: Sequence[Axes], analysis: Analysis, motion: Oscillation, st
 
 
 def _draw_notes(panel: Axes, notes: Sequence[Note]) -> None:
-    """Draw a line at every mark, at the trigger and at losses; few marks bear their words."""
+    """Draw a line at every mark, at the trigger and at losses; if there are few marks, draw their words too."""
     marks = [note for note in notes if note.kind == "mark"]
     for kind, colour in (("mark", PURPLE), ("trigger", GREEN), ("lost", VERMILLION), ("reopened", VERMILLION)):
         times = [note.t_s for note in notes if note.kind == kind]
@@ -189,7 +189,7 @@ def _draw_notes(panel: Axes, notes: Sequence[Note]) -> None:
 
 
 def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) -> None:
-    """Draw the samples between two times, the flagged ones on top with other markers."""
+    """Draw the samples between two times, with other markers on top for the flagged ones."""
     track, flags = analysis.track, analysis.flags
     inside = (track.t >= start) & (track.t <= end)
     factor = SHOWN[track.unit].factor
@@ -204,7 +204,7 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
         if has_error_bars(analysis):
             u = analysis.conditioned.noise_m * factor
             panel.vlines(track.t[used], y[used] - u, y[used] + u, color=SKY, lw=0.6, alpha=0.6)
-    # What was clipped off is part of the motion: the axis holds the fit as well as the samples.
+    # Clipped crests are part of the motion, so the axis includes the fit as well as the samples.
     fit = analysis.motion.waveform.position[inside] * factor if isinstance(analysis.motion, Oscillation) else y[used]
     shown = np.concatenate([y[used], fit[np.isfinite(fit)]])
     low, high = (float(np.min(shown)), float(np.max(shown))) if shown.size else (0.0, 1.0)
@@ -228,7 +228,7 @@ def _draw_distance(panel: Axes, analysis: Analysis, start: float, end: float) ->
 
 
 def _mark(panel: Axes, t: F8, y: F8, marker: str, colour: str, label: str) -> None:
-    """Set markers on top of everything, whole also at the edge."""
+    """Draw markers on top of everything, and uncut at the edge."""
     dense = t.size > RASTER_POINTS
     look: dict[str, Any] = {
         "rasterized": dense,

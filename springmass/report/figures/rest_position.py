@@ -1,4 +1,4 @@
-"""The rest position window by window, where it moves: a tenth of a millimetre does not show in the whole position."""
+"""A moving rest position, window by window; a tenth of a millimetre is invisible in the plot of the position."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ __all__ = ["draw_rest", "rest_moves"]
 
 
 def rest_moves(analysis: Analysis) -> bool:
-    """Return whether the rest position drifts or steps, so that it is drawn by itself."""
+    """Return whether the rest position drifts or steps, and therefore has its own panel."""
     return isinstance(analysis.motion, Oscillation) and analysis.motion.rest.moves
 
 
 def draw_rest(panel: Axes, motion: Oscillation, unit: str, start: float, end: float) -> None:
-    """Draw the windows' rest positions less their mean, with u, and the curve that was fitted to them.
+    """Draw the windows' rest positions minus their mean, with u, and the curve that was fitted to them.
 
     Parameters
     ----------
     panel : Axes
     motion : Oscillation
     unit : str
-        Of the record's values.
+        Unit of the record's values.
     start, end : float, s
     """
     factor, rest, windows = SHOWN[unit].factor, motion.rest, motion.demodulated

@@ -1,7 +1,7 @@
-"""Figures of a simulation: what the lab report draws of forward and symplectic Euler, beside the exact answer.
+"""Figures of a simulation: forward and symplectic Euler as in the lab report, with the exact solution.
 
-Position, velocity, energy and phase plot of both methods at the step of the run, the error of each against time, and a
-measured run under its prediction.
+Position, velocity, energy and phase plot of both methods with the step of the run, the error of each against time, and
+a measured run with its prediction.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 __all__ = ["EULERS", "against_figure", "band_figure", "draw_simulation"]
 
 EULERS = (("forward-euler", "forward Euler", VERMILLION), ("symplectic-euler", "symplectic Euler", BLUE))
-PERIODS, TURNS = 14, 6  # of a long run drawn against time once more, and in a phase plot
+PERIODS, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
 POINTS = 1500
-GROWN = 1e6  # times the starting amplitude: beyond it a curve says nothing more
-DASHED: dict[str, Any] = {"color": "#000000", "lw": 0.9, "ls": (0, (2, 1.5))}  # what is exact, or expected
+GROWN = 1e6  # multiple of the starting amplitude above which curves are cut off
+DASHED: dict[str, Any] = {"color": "#000000", "lw": 0.9, "ls": (0, (2, 1.5))}  # for exact and predicted curves
 _EXACT: dict[str, Any] = {**DASHED, "lw": 0.6}
-ROUGH, EXACT = 1e-3, 1e-9  # errors over the amplitude: a curve that shows, and one that nobody sees
-BINS = 250  # of a dense series: each gives the least and the greatest of what it holds
+ROUGH, EXACT = 1e-3, 1e-9  # errors over the amplitude: one that is visible, and one that is called exact
+BINS = 250  # of a dense series; the minimum and maximum of each bin are drawn
 
 
 def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, Figure]:
@@ -44,7 +44,7 @@ def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, 
     ----------
     simulation : Simulation
     mass_kg : float or None
-        For the energy; without it that of one kilogram is drawn.
+        Mass for the energy; without it, the energy of one kilogram is drawn.
     """
     beside = _beside(simulation)
     runs = [_euler(simulation, beside, name) for name, *_ in EULERS]
@@ -59,7 +59,7 @@ def draw_simulation(simulation: Simulation, mass_kg: float | None) -> dict[str, 
 
 
 def against_figure(against: Against) -> Figure:
-    """Draw a measured run with the prediction and its band over it, and beneath it what is left.
+    """Draw a measured run with the prediction and its band, and below it the residuals.
 
     Parameters
     ----------
@@ -88,16 +88,16 @@ def against_figure(against: Against) -> Figure:
 
 
 def band_figure(simulation: Simulation, band: Band) -> Figure:
-    """Draw motion, amplitude and phase with the band of the scene's uncertainties, and beneath them the band alone.
+    """Draw motion, amplitude and phase with the band from the scene's uncertainties, and below them only the band.
 
     Parameters
     ----------
     simulation : Simulation
     band : Band
-        At least as long.
+        Band that covers at least the simulated time.
     """
     end = float(simulation.trajectory.t[-1])
-    # Fine enough for a curve through the last periods; amplitude and band over the whole run.
+    # The motion is drawn for the last periods, where the grid is fine enough; amplitude and band for the whole run.
     last: F8 = np.linspace(max(0.0, end - PERIODS * _periods(simulation)), end, POINTS)
     whole = band.t[band.t <= end]
     amplitude, of_amplitude = band.amplitude_at(whole)
@@ -122,7 +122,7 @@ def band_figure(simulation: Simulation, band: Band) -> Figure:
 
 
 def _shade(panel: Axes, t: F8, levels: F8, factor: float = 1e3) -> None:
-    """Fill between the quantiles (4, n) of 95 and of 68 %: of lengths, m, in millimetres."""
+    """Fill between the quantiles (4, n) of the 95 % and 68 % bands, converted from m to mm by default."""
     for low, high, share, alpha in ((0, 3, 95, 0.25), (1, 2, 68, 0.45)):
         look: dict[str, Any] = {"color": ORANGE, "alpha": alpha, "lw": 0.0, "rasterized": t.size > POINTS}
         panel.fill_between(t, levels[low] * factor, levels[high] * factor, label=f"{share} %", **look)
@@ -130,14 +130,14 @@ def _shade(panel: Axes, t: F8, levels: F8, factor: float = 1e3) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Beside:
-    """What both Euler methods are drawn beside: a trajectory, its name in a legend, its look."""
+    """The trajectory with which both Euler methods are compared, and its name in a legend."""
 
     run: Trajectory
     words: str
 
 
 def _beside(simulation: Simulation) -> _Beside:
-    """The reference, where the error was measured; else the run, or where that is rough what auto makes of it."""
+    """Return the reference if the error was measured, else the run, or auto's solution if the run is inaccurate."""
     if simulation.check is not None:
         return _Beside(simulation.check.reference, "exact")
     run, error = simulation.trajectory, simulation.solution.error
@@ -149,7 +149,7 @@ def _beside(simulation: Simulation) -> _Beside:
 
 
 def _euler(simulation: Simulation, beside: _Beside, name: str) -> Trajectory:
-    """Run a method at the run's spacing, and if it runs away, as far as numbers go."""
+    """Run a method with the run's spacing; if it diverges, halve the duration until it can be solved."""
     spacing, count = beside.run.spacing_s, len(beside.run.y) - 1
     while True:
         try:
@@ -165,12 +165,12 @@ def _periods(simulation: Simulation) -> float:
 
 
 def _shown(simulation: Simulation, run: Trajectory, periods: int) -> slice:
-    """Return the rows of the first periods, two at least."""
+    """Return the rows of the first periods, at least two rows."""
     return slice(0, min(len(run.y), max(2, int(periods * _periods(simulation) / run.spacing_s) + 1)))
 
 
 def _pair(height: float, labels: tuple[str, str], rows: int = 1) -> tuple[Figure, list[Axes]]:
-    """Make two panels side by side, one for each method, in so many rows."""
+    """Make rows of two panels side by side, one for each method."""
     figure, axes = panels([height] * rows, columns=len(EULERS))
     for panel in axes[:: len(EULERS)]:
         panel.set_ylabel(labels[1])
@@ -182,7 +182,7 @@ def _pair(height: float, labels: tuple[str, str], rows: int = 1) -> tuple[Figure
 def _against_time(
     simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory], what: str, factor: float, label: str
 ) -> Figure:
-    """The whole run, and of a long one its first periods beneath."""
+    """Draw the whole run and, if it is long, its first periods below."""
     long = any(len(run.y) > _shown(simulation, run, PERIODS).stop for run in runs)
     figure, axes = _pair(2.3 if long else 3.1, ("time / s", label), 2 if long else 1)
     for panel, run, (_, words, colour) in zip(axes[:2], runs, EULERS, strict=True):
@@ -224,7 +224,7 @@ def _energy(beside: _Beside, runs: Sequence[Trajectory], mass_kg: float | None) 
 
 
 def _energies(of: Trajectory, run: Trajectory, mass_kg: float | None) -> tuple[F8, F8]:
-    """Times and energies, mJ, as far as a run went and before it grew beyond what can be drawn."""
+    """Return times and energies in mJ, up to the end of a run or until its amplitude exceeds ``GROWN``."""
     relative = of.relative_energy()[: len(run.y)]
     limit = np.flatnonzero(run.relative_energy() > GROWN**2)
     end = max(2, int(limit[0])) if limit.size else len(run.y)
@@ -246,7 +246,7 @@ def _phase(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) 
 
 
 def _error(simulation: Simulation, beside: _Beside, runs: Sequence[Trajectory]) -> Figure:
-    """Running maxima: an error crosses zero twice a period."""
+    """Draw running maxima of the errors, because an error crosses zero twice per period."""
     figure, (panel,) = panels([3.2])
     start = simulation.problem.amplitude_m() or 1.0
     solution = simulation.solution

@@ -1,4 +1,4 @@
-"""Velocity and acceleration at every sample, with their bands."""
+"""Velocity and acceleration at every sample, with their uncertainty bands."""
 
 from __future__ import annotations
 
@@ -33,20 +33,21 @@ if TYPE_CHECKING:
 
 __all__ = ["motion_figure"]
 
-BINS = 250  # of a dense series: each gives the least and the greatest of what it holds
+BINS = 250  # of a dense series; the minimum and maximum of each bin are drawn
 
 
 def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figure:
     """Draw the smoother's velocity and acceleration, the difference from the fitted law, and the uncertainties.
 
-    Of a long record the velocity stands above as a whole, then the first periods, and beneath them the whole again.
+    For a long record, the whole velocity is at the top, then the first periods, and below them the lower panels again
+    show the whole record.
 
     Parameters
     ----------
     analysis : Analysis
-        Of a record that oscillates.
+        Analysis of a record that oscillates.
     smoothed : Smoothed, optional
-        Its motion; left out, it is worked out.
+        Smoothed motion; calculated if omitted.
     """
     motion, unit = moving(analysis), analysis.track.unit
     factor = SHOWN[unit].factor
@@ -90,7 +91,7 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
 
 
 def _draw_samples(panel: Axes, analysis: Analysis, motion: Oscillation, start: float, end: float) -> None:
-    """Set beneath the velocity what samples alone say of it."""
+    """Draw, behind the velocity, its values from single samples."""
     t = analysis.track.t
     _, velocity, label = measured_phase(analysis, motion)
     drawn = np.isfinite(velocity) & (t >= start) & (t <= end)
@@ -110,7 +111,7 @@ def _draw_value(panel: Axes, t: F8, value: F8, u: F8, *, labelled: bool = False)
 
 
 def _draw_difference(panel: Axes, t: F8, difference: F8, u: F8) -> None:
-    """Draw the band about zero and the difference in it."""
+    """Draw the band around zero, and the difference."""
     keep = thinned(u, BINS)
     panel.fill_between(t[keep], -u[keep], u[keep], color=SKY, alpha=0.45, lw=0)
     keep = thinned(difference, BINS)
@@ -120,7 +121,7 @@ def _draw_difference(panel: Axes, t: F8, difference: F8, u: F8) -> None:
 
 
 def _draw_uncertainties(panel: Axes, t: F8, u_velocity: F8, u_acceleration: F8, unit: str) -> None:
-    """Draw both standard uncertainties, the acceleration's on an axis at the right."""
+    """Draw both standard uncertainties, that of the acceleration on an axis on the right."""
     beside = panel.twinx()
     beside.grid(visible=False)
     labels = ("u(v) / (mm/s)", "u(a) / (mm/s²)")

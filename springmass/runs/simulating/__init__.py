@@ -1,5 +1,5 @@
-"""Simulations: what is made of a scene, how it is solved and checked, and how a measured run compares.
+"""Simulations: preparing a scene, solving and checking its motion, and comparing it with a measured run.
 
-In come a scene and what was asked for; out go a trajectory with its errors, the effects, the band, and a run beneath a
-prediction. A newcomer's effect is one row of ``pipeline.results.simulated_effects``.
+In: a scene and options. Out: a trajectory with its errors, the effects, the uncertainty band, and a comparison of a
+measured run with the prediction. To add an effect, add one row to ``pipeline.results.simulated_effects``.
 """

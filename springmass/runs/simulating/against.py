@@ -1,4 +1,4 @@
-"""A measured run under the prediction of its scene: what the scene leaves out, how sure that is, what is left."""
+"""Compare a measured run with the prediction of its scene: missing values, uncertainty and residuals."""
 
 from __future__ import annotations
 
@@ -22,38 +22,39 @@ from springmass.runs.simulating.simulation import FINE, Against, Move, count_of,
 
 __all__ = ["completed", "deviation_text", "duration_s", "lay_over"]
 
-WIDER = 1.96  # noise of a sample by which the band is widened: 95 % of it
+WIDER = 1.96  # standard deviations of the noise by which the band is widened, for 95 %
 HALF = 0.5
-FURTHEST_U = 20.0  # standard uncertainties by which an input is moved
-FARTHEST = 1e300  # m: what a shift without a number leaves
+FURTHEST_U = 20.0  # maximum change of an input, in standard uncertainties
+FARTHEST = 1e300  # m; residual assigned to a change that gives no finite residual
 COEFFICIENTS = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
 
 
 def completed(scene: Scene, analysis: Analysis, *, damping: bool = True) -> tuple[Scene, Joint]:
-    """Return a scene in which a run's analysis stands for what is left out, and what it stands for.
+    """Return a scene completed with values from a run's analysis, and the joint distribution of those values.
 
-    The start is always the run's: nobody releases a bob at the first sample. The damping is only where it is asked for.
+    The start is always taken from the run, because nobody releases a bob exactly at the first sample. The damping is
+    taken from the run only if ``damping`` is true.
 
     Returns
     -------
     Scene
     Joint
-        Of the scene's attributes that are the run's: amplitude, phase, frequency and damping with their covariance.
+        Values and covariance of the scene's attributes taken from the run: start, spring constant and damping.
 
     Raises
     ------
     ProgramError
         With exit code 3 if the run does not oscillate.
     TrackError
-        If it is no length.
+        If the measured quantity is not a length.
 
     Notes
     -----
-    With :math:`y_0 = A\\cos\\varphi` and :math:`v_0 = -\\omega A\\sin\\varphi` the start takes its uncertainty from
-    amplitude and phase, a spring constant :math:`k = \\omega^2 m` that of the frequency, as the masses' is the scene's.
-    The phase at the first sample comes from the straight line through all phases, so its covariance with the frequency
-    is :math:`-\\tau u_\\omega^2`, where the line's middle is :math:`\\tau` later. Amplitude and coefficients have the
-    covariance of the damping law.
+    With :math:`y_0 = A\\cos\\varphi` and :math:`v_0 = -\\omega A\\sin\\varphi`, the start takes its uncertainty from
+    amplitude and phase. A spring constant :math:`k = \\omega^2 m` takes only the uncertainty of the frequency, because
+    that of the masses is part of the scene. The phase at the first sample comes from the straight line through all
+    phases. Its covariance with the frequency is therefore :math:`-\\tau u_\\omega^2`, where :math:`\\tau` is the time
+    from the first sample to the middle of the line. Amplitude and coefficients have the covariance of the damping law.
     """
     analysis.track.demand_length("a prediction laid over a run")
     motion = _oscillation(analysis)
@@ -99,26 +100,26 @@ def lay_over(
     band: Band | None,
     values: Mapping[str, Estimate] | None = None,
 ) -> Against:
-    """Lay a prediction over a measured run, from the run's first sample on.
+    """Overlay a prediction on a measured run, starting at the run's first used sample.
 
     Parameters
     ----------
     analysis : Analysis
-        Of the run.
+        Analysis of the run.
     problem : Problem
-        As the scene that :func:`completed` returned states it.
+        Problem of the scene that :func:`completed` returned.
     method, step_s, tolerance
-        As in :func:`springmass.runs.simulating.simulation.solve`; the step of ``auto`` is one that can be interpolated
-        between.
+        As in :func:`springmass.runs.simulating.simulation.solve`; the step of ``auto`` is short enough for
+        interpolation.
     band : Band or None
-        Around the prediction.
+        Uncertainty band of the prediction.
     values : mapping, optional
-        The inputs of the band by name, for what each would have to be.
+        The inputs of the band by name, for which the best-fitting values are sought.
 
     Raises
     ------
     DynamicsError
-        If the method cannot solve this, or the numbers ran away.
+        If the method cannot solve the problem, or the numbers diverge.
     """
     motion = _oscillation(analysis)
     used = analysis.conditioned.used
@@ -141,9 +142,9 @@ def lay_over(
 
 
 def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None:
-    """Return when more than half the samples of a period begin to lie outside; None where they never do."""
+    """Return the time from which more than half the samples of a period lie outside the band; None if they never do."""
     period_s = 2.0 * math.pi / problem.equation.angular_frequency_per_s
-    # Samples outside within a period from each on; the record may have gaps.
+    # Number of samples outside the band in the period that starts at each sample; the record may have gaps.
     total = np.concatenate([[0], np.cumsum(outside)])
     ends = np.searchsorted(t, t + period_s, side="right")
     share = (total[ends] - total[:-1]) / (ends - np.arange(t.size))
@@ -153,11 +154,11 @@ def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None
 
 
 def _moves(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> tuple[Move, ...]:
-    """What each input alone would have to be for the prediction to come nearest to the record: least squares."""
+    """Return the least-squares change of each input alone that brings the prediction closest to the record."""
     from scipy.optimize import minimize_scalar
 
     found, sensitivity = [], band.sensitivity
-    # At the sensitivities' own times: their states are a fifth of a radian apart.
+    # Evaluated at the times of the sensitivities, whose states are a fifth of a radian apart.
     rows = np.unique(np.searchsorted(sensitivity.t, since).clip(max=sensitivity.t.size - 1))
     at = np.interp(sensitivity.t[rows], since, left)
     middle = sensitivity.middle[rows]
@@ -181,7 +182,7 @@ def _moves(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> t
 
 
 def deviation_text(against: Against) -> list[str]:
-    """Return in words where the record leaves the band, and which input would have to move by how much."""
+    """Return lines that state where the record leaves the band, and which changes of an input would explain it."""
     if against.inside is None:
         return []
     lines = [f"in the band      {against.inside:.1%} of the samples lie within 95 % and the noise"]
@@ -199,7 +200,7 @@ def deviation_text(against: Against) -> list[str]:
 
 
 def duration_s(analysis: Analysis) -> float:
-    """Return the time from the first sample used to the last, s."""
+    """Return the time from the first to the last used sample, s."""
     t = analysis.track.t[analysis.conditioned.used]
     return float(t[-1] - t[0])
 
@@ -213,7 +214,7 @@ def _oscillation(analysis: Analysis) -> Oscillation:
 
 
 def _covariance(motion: Oscillation) -> F8:
-    """Covariance of frequency, phase, and the damping law's amplitude and coefficients."""
+    """Return the covariance of frequency, phase, and the damping law's amplitude and coefficients."""
     phase, law = motion.phase, motion.damping.best.joint
     found = np.zeros((2 + len(law.names), 2 + len(law.names)))
     found[2:, 2:] = law.covariance

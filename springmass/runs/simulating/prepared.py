@@ -1,4 +1,4 @@
-"""A scene made ready to be solved: what a run stands for, what drag disc and air imply, what the user leaves out."""
+"""Prepare a scene for solving: values taken from a run, drag derived from disc and air, omissions by the user."""
 
 from __future__ import annotations
 
@@ -17,25 +17,26 @@ from springmass.runs.simulating.against import completed
 __all__ = ["WITHOUT", "Prepared", "prepare"]
 
 WITHOUT = ("drag", "disc", "spring-mass")
-"""What a user may leave out."""
+"""Parts of the scene that a user may leave out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """A scene that can be solved.
+    """A scene that is ready to be solved.
 
     Parameters
     ----------
     stated : Scene
-        As it was given, with what a run stands for.
+        The given scene, completed with values from a run.
     solved : Scene
-        The same with the drag that was derived, and without what is left out.
+        The stated scene with the derived drag, and without the parts that are left out.
     drag : DerivedDrag or None
-        What disc, bob and air imply; None where the scene states its damping, names no air, or it is left out.
+        Drag implied by disc, bob and air; None if the scene states its damping or names no air, or if the drag is left
+        out.
     measured : Joint or None
-        Of attributes that are known together: the run's, and the derived drag's.
+        Joint distribution of the attributes taken from the run and of the derived drag.
     from_run : tuple of str
-        The attributes that are the run's.
+        Names of the attributes taken from the run.
     problem : Problem
     """
 
@@ -47,7 +48,7 @@ class Prepared:
     problem: Problem
 
     def values(self) -> dict[str, Estimate]:
-        """Return every uncertain attribute with its uncertainty, by name."""
+        """Return a mapping from the name of each uncertain attribute to its estimate."""
         from pipeline.dynamics.band import uncertain
 
         joint = uncertain(self.solved, self.measured)
@@ -57,25 +58,25 @@ class Prepared:
 def prepare(
     scene: Scene, seconds: float, *, analysis: Analysis | None = None, without: Sequence[str] = (), where: str = "scene"
 ) -> Prepared:
-    """Return a scene made ready.
+    """Return a scene prepared for solving.
 
     Parameters
     ----------
     scene : Scene
     seconds : float
-        How long it is to be solved, s.
+        Duration of the solution, s.
     analysis : Analysis, optional
-        Of a measured run that stands for start, spring constant and damping where the scene is silent; not for a
-        damping that disc and air imply, which would be no prediction.
+        Analysis of a measured run. It supplies the start, and the spring constant and damping if the scene does not
+        state them. A damping implied by disc and air is not taken from the run, for that would be no prediction.
     without : sequence of str
-        Of :data:`WITHOUT`.
+        Parts to leave out, from :data:`WITHOUT`.
     where : str
-        Named in errors.
+        Name of the scene in errors.
 
     Raises
     ------
     SceneError, DynamicsError
-        If the scene lacks what a motion needs, or states what has none.
+        If the scene lacks a value that a motion needs, or states values for which no motion exists.
     """
     derived = needs_drag(scene)
     measured: Joint | None = None
@@ -101,7 +102,7 @@ def prepare(
 
 
 def _together(one: Joint | None, other: Joint) -> Joint:
-    """Return both as one joint, independent of each other."""
+    """Return both joint distributions as one, with no correlation between the two."""
     if one is None:
         return other
     size = len(one.names)

@@ -1,4 +1,4 @@
-"""What a rangefinder would have read of a simulated motion: a block of samples, with noise and echoes by choice."""
+"""Simulate a rangefinder's readings of a motion: a block of samples, with optional noise and false echoes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["plain_block", "readings", "rest_m"]
 
 
 def rest_m(trajectory: Trajectory) -> float:
-    """Return a distance at which the bob never touches the sensor, m."""
+    """Return a rest distance in m at which the bob never touches the sensor."""
     return max(REST_M, 2.0 * float(np.max(np.abs(trajectory.y))))
 
 
@@ -30,24 +30,24 @@ def plain_block(trajectory: Trajectory, name: str) -> tuple[Block, SourceInfo]:
 def readings(
     trajectory: Trajectory, seconds: float, sensor: VirtualSensor, name: str, seed: int
 ) -> tuple[Block, SourceInfo]:
-    """Return what a rangefinder reads of a motion.
+    """Return a rangefinder's readings of a motion.
 
     Parameters
     ----------
     trajectory : Trajectory
-        In states fine enough to interpolate between, to some readings after the end: the sound of the last reading
-        meets the bob later than it was sent.
+        Motion with states close enough for interpolation. It must extend a few readings beyond the end, because the
+        sound of the last reading meets the bob after it is sent.
     seconds : float
-        Until when it reads, s.
+        Time at which the readings end, s.
     sensor : VirtualSensor
-        Its rate, resolution, noise and false echoes.
+        Rate, resolution, noise and false echoes of the rangefinder.
     name : str
     seed : int
-        Of its chance.
+        Seed of the random numbers.
     """
     rest = rest_m(trajectory)
-    # All moments at which it may look, interpolated together: its own, the ones beside them, and after the end; and
-    # those at which the sound of each meets the bob.
+    # All times at which the sensor may measure are interpolated together: the reading times, their neighbours, times
+    # after the end, and the times at which the sound of each reading meets the bob.
     grid = np.arange(math.ceil(seconds * sensor.rate_hz) + 3) / sensor.rate_hz
     distances = rest + trajectory.at(grid)
     met = grid + distances / sensor.speed_of_sound_m_per_s

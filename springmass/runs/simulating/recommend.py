@@ -1,4 +1,4 @@
-"""What error a user of a simulation wants: the one asked for, else what sensor or scene cannot tell from none."""
+"""Recommend the error of a simulation: the given tolerance, or else an error that scene or sensor cannot resolve."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from springmass.runs.simulating.simulation import DEFAULT_TOLERANCE, default_tol
 
 __all__ = ["wanted_error"]
 
-UNSEEN = 0.1  # of a sample's noise: an error that no record shows
+UNSEEN = 0.1  # error as a fraction of a sample's noise that no record can reveal
 
 
 def wanted_error(ready: Prepared, seconds: float, tolerance: float | None) -> tuple[float, str]:
-    """Return the largest error over the amplitude that serves, and where it comes from.
+    """Return the largest acceptable error relative to the amplitude, and the source of this value.
 
     Parameters
     ----------
     ready : Prepared
     seconds : float
-        Of the run, s.
+        Duration of the run, s.
     tolerance : float or None
-        Asked for; then that.
+        Tolerance that the user gave; it is returned unchanged.
     """
     if tolerance is not None:
         return tolerance, "the tolerance asked for"
@@ -30,7 +30,7 @@ def wanted_error(ready: Prepared, seconds: float, tolerance: float | None) -> tu
         try:
             band = spread(ready.solved, seconds, ready.measured)
         except DynamicsError:
-            pass  # too vague or too long for a band: the noise decides
+            pass  # the values are too uncertain or the run is too long for a band, so the noise decides
         else:
             found = default_tolerance(band)
             return (

@@ -1,4 +1,4 @@
-"""A simulation: what is solved, by which integrator, what error is stated of it and what error it has."""
+"""A simulation: the problem, the integrator, the error estimate and the measured error."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 DEFAULT_TOLERANCE = 1e-6
-FINE = 24.0  # states a radian between which an interpolation errs by 1e-8 of the amplitude
+FINE = 24.0  # states per radian; interpolation between them has an error of 1e-8 of the amplitude
 BAND_SHARE, LARGEST_DEFAULT = 0.01, 1e-3
 MOST_SAMPLES = 20_000_000
 REFERENCE_RTOL = 1e-13
@@ -42,19 +42,19 @@ REFERENCE_RTOL = 1e-13
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
-    """The error of a trajectory, against another method.
+    """The error of a trajectory, measured against another method.
 
     Parameters
     ----------
     reference : Trajectory
-        At the same times.
+        Reference solution at the times of the trajectory.
     words : str
-        How it was made.
+        How the reference was made.
     error, velocity_error : float
-        Largest differences of displacement and velocity, over the starting amplitude and over that times the angular
-        frequency; at least what the reference resolves.
+        Maximum differences of displacement and velocity, relative to the starting amplitude and to its product with the
+        angular frequency; never below the resolution.
     resolution : float
-        What the reference may err by itself, over the amplitude.
+        Possible error of the reference itself, relative to the starting amplitude.
     """
 
     reference: Trajectory
@@ -66,18 +66,18 @@ class Check:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """A trajectory with what is known of its error.
+    """A trajectory with its error.
 
     Parameters
     ----------
     problem : Problem
-        All that the scene states.
+        The problem with everything that the scene states.
     solution : Solution
         Trajectory, integrator, step, stated error, and the terms that were solved.
     check : Check or None
-        The error, where it was asked for.
+        The measured error, if it was requested.
     choosing_s : float
-        What choosing took, s: all runs but the one that is returned.
+        Time spent on choosing method and step, s; it covers all runs except the one that is returned.
     """
 
     problem: Problem
@@ -93,24 +93,24 @@ class Simulation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Against:
-    """A measured run with the prediction laid over it.
+    """A measured run with a prediction overlaid.
 
     Parameters
     ----------
     t, measured, predicted : (n,) float64
-        Of the samples used: s, m, m.
+        Time in s, measured and predicted distance in m, of the samples used.
     rms_m : float
-        Root mean square of measured less predicted, m.
+        Root mean square of measured minus predicted, m.
     noise_m : float
-        Of one sample, m, as the analysis has it.
+        Noise of one sample from the analysis, m.
     band : (4, n) float64 or None
-        Quantiles of the prediction less the prediction, m, as in :class:`pipeline.dynamics.band.Band`.
+        Quantiles of the predicted distance relative to ``predicted``, m, as in :class:`pipeline.dynamics.band.Band`.
     inside : float or None
-        Share of the samples within the 95 % of the band, widened by the noise; None without a band.
+        Fraction of the samples within the 95 % band widened by the noise; None without a band.
     leaves_s : float or None
-        When the record leaves it, s.
+        Time at which the record leaves the widened band, s; None if it never does.
     moves : tuple of Move
-        What each input alone would have to be, the one that explains most first.
+        The change in each input alone that fits the record best, with the input that explains the most first.
     """
 
     t: F8
@@ -126,17 +126,17 @@ class Against:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """An input moved so that the prediction comes nearest to the record.
+    """The change of one input that brings the prediction closest to the record.
 
     Parameters
     ----------
     name : str
     given, value : float
-        The scene's value, and the one that it would have to be.
+        The scene's value, and the value that fits the record best.
     in_u : float
-        By how many standard uncertainties.
+        The change in standard uncertainties.
     rms_m : float
-        What is left then, m.
+        Root mean square of the remaining residuals, m.
     """
 
     name: str
@@ -152,7 +152,7 @@ def count_of(seconds: float, spacing_s: float) -> int:
     Raises
     ------
     ProgramError
-        With exit code 2 if there are none, or more than a machine holds.
+        With exit code 2 if the number is zero, or too large for the memory of a machine.
     """
     count = round(seconds / spacing_s) if spacing_s > 0 else 0
     if not 1 <= count <= MOST_SAMPLES:
@@ -170,7 +170,7 @@ def solve(
     tolerance: float | None,
     timer: Callable[[], float] = lambda: 0.0,
 ) -> Solution:
-    """Solve a motion by ``auto`` or by a method that was named.
+    """Solve a motion with ``auto`` or with a named method.
 
     Parameters
     ----------
@@ -178,18 +178,19 @@ def solve(
     method : str
         "auto" or a name of :data:`pipeline.dynamics.INTEGRATORS`.
     spacing_s : float
-        Time between samples, s; the step of a method by name without a tolerance.
+        Time between samples, s. It is also the step if a method is named without a tolerance.
     count : int
         Number of spacings.
     tolerance : float or None
-        Largest error over the amplitude; None: 1e-6 for methods without a step, no limit for those with one.
+        Maximum error relative to the amplitude; None: 1e-6 for "auto" and for methods without a step, and no limit for
+        methods with a step.
     timer : callable
-        To seconds.
+        Returns a time in seconds.
 
     Raises
     ------
     DynamicsError
-        For an unknown method, a tolerance below what can be reached, or a method that cannot keep it.
+        If the method is unknown, or the tolerance cannot be reached at all or not by this method.
     """
     if method == "auto":
         return auto(problem, spacing_s, count, DEFAULT_TOLERANCE if tolerance is None else tolerance, timer)
@@ -202,28 +203,28 @@ def solve(
 
 
 def default_tolerance(band: Band | None) -> float:
-    """Return a hundredth of what is uncertain anyway, from 1e-6 to 1e-3, in one digit; 1e-6 without a band."""
+    """Return 1 % of the band's relative uncertainty, limited to 1e-6 to 1e-3, in one digit; 1e-6 without a band."""
     if band is None:
         return DEFAULT_TOLERANCE
     return float(f"{min(max(BAND_SHARE * band.relative_u, DEFAULT_TOLERANCE), LARGEST_DEFAULT):.1g}")
 
 
 def demand_stable(problem: Problem, method: str, step_s: float | None, *, where: str) -> None:
-    """Refuse a step beyond the limit of its method.
+    """Refuse a step beyond the stability limit of its method.
 
     Parameters
     ----------
     problem : Problem
     method : str
     step_s : float or None
-        None where the method may take any step that is short enough.
+        None: the method may take any sufficiently short step.
     where : str
-        Named in the error.
+        Name of the scene in the error.
 
     Raises
     ------
     ProgramError
-        With exit code 2; the line names the limit and the remedy.
+        With exit code 2 if the step is unstable; the message names the limit and the remedy.
     """
     if method == "auto":
         return
@@ -256,21 +257,21 @@ def simulate(
     check: bool,
     timer: Callable[[], float],
 ) -> Simulation:
-    """Solve a motion, and where it is asked for measure the error.
+    """Solve a motion, and optionally measure the error.
 
     Parameters
     ----------
     problem, method, spacing_s, count, tolerance
         As in :func:`solve`.
     check : bool
-        Whether to measure the error, which costs more than the run.
+        Whether to measure the error, which takes longer than the run.
     timer : callable
-        To seconds; the difference of two calls is a time.
+        Returns seconds; the difference between two calls is the time elapsed.
 
     Raises
     ------
     DynamicsError
-        If nothing keeps the tolerance, or the numbers ran away.
+        If no method keeps the tolerance, or the numbers diverge.
     """
     started = timer()
     solution = solve(problem, method, spacing_s, count, tolerance, timer)
@@ -280,7 +281,7 @@ def simulate(
 
 
 def checked(problem: Problem, solution: Solution, spacing_s: float, count: int) -> Check:
-    """Return the error of a solution against the reference."""
+    """Return the error of a solution relative to the reference."""
     trajectory = solution.trajectory
     parts = solution.parts if solution.integrator is STRANG else None
     other, words, resolution = reference(problem, spacing_s, count, parts)
@@ -296,17 +297,17 @@ def checked(problem: Problem, solution: Solution, spacing_s: float, count: int) 
 def reference(
     problem: Problem, spacing_s: float, count: int, strang_parts: int | None = None
 ) -> tuple[Trajectory, str, float]:
-    """Return a motion solved far better than to a tolerance, how it was made, and what it may err by.
+    """Return a highly accurate reference solution, how it was made, and its possible error.
 
-    By DOP853 at a relative tolerance of 1e-13. With friction, or where DOP853 gives up, by Strang splitting in a
-    quarter of the step.
+    The method is DOP853 with a relative tolerance of 1e-13. With friction, or if DOP853 fails, it is Strang splitting
+    with a quarter of the step.
 
     Parameters
     ----------
     problem, spacing_s, count
         As in :func:`solve`.
     strang_parts : int or None
-        Steps a spacing of the run that is checked; None where it is not of Strang splitting.
+        Steps per spacing of the run to check; None if that run does not use Strang splitting.
 
     Raises
     ------
@@ -320,22 +321,22 @@ def reference(
             run = finest.run(problem, spacing_s, count)
             apart = _apart(run, next_finest.run(problem, spacing_s, count))
         except DynamicsError:
-            pass  # too long, or too stiff
+            pass  # the run is too long or too stiff for DOP853
         else:
             return run, f"DOP853 at {REFERENCE_RTOL:g}", apart + rounding
     parts = 4 * (strang_parts or halved(problem, STRANG, spacing_s, count, DEFAULT_TOLERANCE).parts)
     run, coarse = (STRANG.run(problem, spacing_s / each, count * each, every=each) for each in (parts, parts // 2))
-    # Of second order: the difference to twice the step is three times the error of the finer run.
+    # For a second-order method, the difference from a run with twice the step is three times the finer run's error.
     return run, f"Strang splitting in {parts} steps a sample", _apart(run, coarse) / 3.0 + rounding
 
 
 def _apart(one: Trajectory, other: Trajectory) -> float:
-    """Return the largest difference of two motions over the starting amplitude."""
+    """Return the maximum difference between two motions relative to the starting amplitude."""
     start = one.problem.amplitude_m()
     return float(np.max(np.abs(one.y - other.y))) / start if start else 0.0
 
 
 def _rounded_down(limit: float) -> str:
-    """A limit in three digits, never above itself."""
+    """Return a limit rounded down to three digits."""
     power = 10.0 ** (math.floor(math.log10(limit)) - 2)
     return f"{math.floor(limit / power) * power:.3g}"

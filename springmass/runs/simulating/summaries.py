@@ -1,4 +1,4 @@
-"""A simulation as the JSON of ``springmass simulate``, and its band as columns of a table."""
+"""Return a simulation as the JSON of ``springmass simulate``, and its band as table columns."""
 
 from __future__ import annotations
 
@@ -76,14 +76,15 @@ def _against_summary(against: Against) -> dict[str, Any]:
 
 
 def band_columns(band: Band, t: F8, predicted: F8) -> dict[str, F8]:
-    """Return quantiles of displacement and amplitude as columns (n,), m, by name.
+    """Return quantiles of displacement, amplitude and phase as columns (n,) by name, in the unit that ends the name.
 
     Parameters
     ----------
     band : Band
-    t : (n,) float64, s
-    predicted : (n,) float64, m
-        The displacement, or the distance, of the scene's values.
+    t : (n,) float64
+        Times, s.
+    predicted : (n,) float64
+        Displacement or distance predicted from the scene's values, m.
     """
     amplitude, of_amplitude = band.amplitude_at(t)
     around = predicted + band.displacement_at(t)
@@ -96,7 +97,7 @@ def band_columns(band: Band, t: F8, predicted: F8) -> dict[str, F8]:
 
 
 def _band_summary(band: Band, t: F8) -> dict[str, Any]:
-    """Half widths are the largest over the run."""
+    """Return the band as JSON; each half-width is the maximum over the run."""
     around, (_, of_amplitude) = band.displacement_at(t), band.amplitude_at(t)
     widths = {
         f"{name}_half_width_{share}_m": float(0.5 * np.max(found[high] - found[low]))

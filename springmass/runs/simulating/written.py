@@ -1,4 +1,4 @@
-"""What a simulation writes: its folder of run file, figures, tables and JSON, and a recording of it."""
+"""Write a simulation: a folder with run file, figures, tables and JSON, and a simulated recording."""
 
 from __future__ import annotations
 
@@ -90,21 +90,23 @@ def write_readings(
     where: str,
     results: Mapping[str, Any],
 ) -> None:
-    """Write what a sensor would have read of a scene's motion, at one reading a spacing, as a run of kind simulated.
+    """Write a sensor's readings of a scene's motion, one for each spacing, as a run of the kind "simulated".
 
     Parameters
     ----------
     path : Path
     ready : Prepared
     method : str
-        As in :func:`springmass.runs.simulating.simulation.solve`, with the spacing as its step but for "auto".
+        As in :func:`springmass.runs.simulating.simulation.solve`; the spacing is its step, except for "auto".
     seconds, spacing_s : float
+        Duration of the run and time between readings, s.
     sensor : {"ideal", "rangefinder"}
     noise_m, echoes_hz : float or None
-        None for the scene's noise, or that of the simulated bench, and its false echoes.
+        Noise in m and rate of false echoes in Hz. None: the noise of the scene, or else that of the simulated bench,
+        and the false-echo rate of the bench.
     seed : int
     where : str
-        The scene file's name.
+        Name of the scene file.
     results : mapping
         The summary of the simulation, stored in the run file.
     """
@@ -122,7 +124,7 @@ def write_readings(
         virtual = VirtualSensor(
             rate_hz=1.0 / spacing_s, **{key: value for key, value in chosen.items() if value is not None}
         )
-        # The last reading's sound is on its way to the bob when the time is up.
+        # The sound of the last reading is still on its way to the bob at the end of the run.
         way_s = max(REST_M, 3.0 * ready.problem.amplitude_m()) / virtual.speed_of_sound_m_per_s
         longer = seconds + (2 + math.ceil(way_s / spacing_s)) * spacing_s
         motion = _fine(ready.problem, method, longer, spacing_s, parts)
@@ -153,7 +155,7 @@ def _write_run(
 
 
 def _table(columns: Mapping[str, F8]) -> str:
-    """Columns of equal length as text, their names above."""
+    """Return columns of equal length as CSV text with a header of their names."""
     text = io.StringIO()
     np.savetxt(
         text, np.stack(list(columns.values()), axis=1), "%.9g", delimiter=",", header=",".join(columns), comments=""

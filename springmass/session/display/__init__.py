@@ -1,5 +1,5 @@
-"""What a recording shows while it runs, where it can neither delay nor end it.
+"""Show a recording while it runs, without being able to delay or end it.
 
-In: blocks of samples and the recorder's status. Out: about once a second a Progress, given to whoever shows it.
-Free to change: what is shown. Whatever fails here is counted and written into the run, and the recording goes on.
+In: blocks of samples and the recorder's status. Out: about once a second, a Progress for the terminal or the page.
+Free to change: what is shown. Failures in this package are counted and written into the run; the recording continues.
 """

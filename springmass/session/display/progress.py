@@ -1,4 +1,4 @@
-"""What a recording shows while it runs: counts, rate and the first sensor's motion."""
+"""The state of a recording shown while it runs: counts, rate and the first sensor's motion."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ __all__ = ["LiveState", "Progress", "Trouble", "TroubleKind", "progress_of"]
 
 SECOND_NS = 1_000_000_000
 USELESS_S = 0.8
-"""So long nothing but no-target codes, or one distance, is a trouble: said at the display's first turn."""
+"""Time in s after which a lack of targets or of changes is a trouble; the display's first turn can report it."""
 RECENT_S = 10.0
 FIRST_SAMPLES = 1000
-"""Whose stamps state when t = 0 was, as in the run file; later ones would bring in the difference of the clocks."""
+"""Number of samples whose timestamps define t = 0, as in the run file; later ones would add the clocks' difference."""
 MOTION_EVERY_NS = 1_900_000_000
-"""Every second line of progress: a swing lasts about as long, and an analysis costs some milliseconds."""
+"""Interval between analyses of the motion, about two progress lines or one swing; each takes a few milliseconds."""
 
 
 class TroubleKind(enum.Enum):
-    """Why readings are useless."""
+    """The kind of fault that makes readings useless."""
 
     NO_TARGET = enum.auto()
     """The sensor hears no echo."""
@@ -48,15 +48,15 @@ class TroubleKind(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """What makes a sensor's readings useless.
+    """The reason why a sensor's readings are useless.
 
     Parameters
     ----------
     kind : TroubleKind
     text : str
-        For people: what is wrong, and what to check.
+        Message for the user: what is wrong, and what to check.
     channel : int or None
-        Of the sensor, where there are several.
+        Channel of the sensor if there are several.
     """
 
     kind: TroubleKind
@@ -66,40 +66,40 @@ class Trouble:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """One line of progress.
+    """The state of a recording for one line of progress.
 
     Parameters
     ----------
     seconds : float
-        Since the recording began.
+        Time since the recording began, s.
     samples, missing, gaps : int
-        Of all sensors.
+        Numbers of samples, missing values and gaps of all sensors.
     rate_hz : float
-        Samples per second over the last second, of the first sensor.
+        Number of samples from the first sensor in the last second.
     motion : callable
-        Returns the first sensor's motion, LiveMotion or NotYet; costs milliseconds, so it is asked only to be shown,
-        and is the one before for two seconds.
+        Returns the first sensor's motion, LiveMotion or NotYet. A call takes milliseconds, so it is made only for
+        display, and its result is reused for about two seconds.
     status : RecorderStatus
     disk_free_bytes : int or None
-        Left on the disk that the log lies on; None before there is a log.
+        Free space on the disk with the log; None before there is a log.
     waiting : bool
-        Whether the trigger has not come yet.
+        Whether the recording is still waiting for its trigger.
     unshown : int
-        Samples that came faster than they were shown; the run file holds them.
+        Number of samples that arrived too fast to be shown; they are in the run file.
     gone : sequence of str
-        Why ports are lost that have not come back.
+        Reasons for lost ports that have not come back.
     silent_s : float
-        How long no reading of the first sensor came, s.
+        Time since the first sensor's last reading, s.
     missing_share : float
-        Of the first sensor's readings of the last turn.
+        Fraction of missing values in the first sensor's latest block.
     trouble : Trouble or None
-        What makes the readings useless, of the first sensor where something does.
+        Trouble of the first sensor in channel order that has one.
     latest : callable
-        Returns times (n,), s, and distances (n,), m, of the first sensor's last ten seconds.
+        Returns times in s and distances in m, each (n,), of the first sensor's last ten seconds.
     marks : sequence of (float, str)
-        The run's times, s, and texts of the marks so far: those that the run file and the page state.
+        Times of the marks so far, in s on the run's time scale, and their texts, as in the run file and on the page.
     tick : bool
-        Whether a second has gone by; else it is a mark that is to be shown.
+        Whether this is the regular update once a second; otherwise it shows the start or a new mark.
     """
 
     seconds: float
@@ -122,7 +122,7 @@ class Progress:
 
 
 class Usefulness:
-    """Whether a sensor's readings can be of any use: the first things that are wrong at a bench."""
+    """Checks whether a sensor's readings are usable, for the most common faults at a bench."""
 
     def __init__(self) -> None:
         self.usable = 0
@@ -148,7 +148,7 @@ class Usefulness:
             self._missing_since = float(block.t[0])
 
     def trouble(self, family: Family) -> Trouble | None:
-        """Return what is wrong and what to check; None where nothing is."""
+        """Return the trouble and what to check; None if there is no trouble."""
         near, far = family.range_m
         if self._end - self._missing_since >= USELESS_S:
             return Trouble(
@@ -166,17 +166,17 @@ class Usefulness:
 
 
 class LiveState:
-    """What the samples so far amount to.
+    """The state derived from the samples so far.
 
     Parameters
     ----------
     rate_hz : float
-        Nominal, of the first sensor.
+        Nominal rate of the first sensor.
 
     Attributes
     ----------
     zero_ns : int or None
-        The host's clock at the run's time 0, ns; None before the first sample.
+        Host time at the run's t = 0, ns; None before the first sample.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -190,7 +190,7 @@ class LiveState:
 
     def _begin(self, channel: int) -> None:
         self._channel = channel
-        # A third of the time of the standard tier, which the run itself is analysed with; period and amplitude agree.
+        # The fast tier takes a third of the time of the standard tier used for the run; period and amplitude agree.
         self._motion = MotionAccumulator(self._rate_hz, params=params_for("fast"))
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
         self._found_ns = 0
@@ -200,7 +200,7 @@ class LiveState:
         self._last_ns: int | None = None
 
     def follow(self, channel: int) -> None:
-        """Show from here on the motion of the sensor in a channel: the one that came back on the first port."""
+        """Show the motion of a different channel from now on: that of the sensor that came back on the first port."""
         if channel != self._channel:
             self.useful.pop(self._channel, None)
             self._begin(channel)
@@ -220,7 +220,7 @@ class LiveState:
                 self._motion.push(block.t, block.distance, block.flags)
                 if block.host_ns is not None and len(block):
                     if channel == 0 and self._early < FIRST_SAMPLES:
-                        # A stamp may come late, never early.
+                        # A timestamp may be late but never early.
                         zero_ns = int((block.host_ns - 1e9 * block.t)[: FIRST_SAMPLES - self._early].min())
                         self.zero_ns = zero_ns if self.zero_ns is None else min(zero_ns, self.zero_ns)
                         self._early += len(block)
@@ -228,7 +228,7 @@ class LiveState:
                     self._last_ns = int(block.host_ns[-1])
 
     def motion(self, now_ns: int) -> LiveMotion | NotYet:
-        """Return the first sensor's motion, found anew where the last is old enough."""
+        """Return the first sensor's motion, calculated again if the last result is old enough."""
         if not self._has_room:
             demand_room()
             self._has_room = True
@@ -238,22 +238,22 @@ class LiveState:
 
     @property
     def missing_share(self) -> float:
-        """Share of the first sensor's latest readings that measured nothing."""
+        """Fraction of missing values in the first sensor's latest block."""
         return self._missing_share
 
     def latest(self) -> tuple[F8, F8]:
-        """Return times (n,), s, and distances (n,), m, of the first sensor's last seconds."""
+        """Return times in s and distances in m, each (n,), of the first sensor's last ten seconds."""
         if not self._recent:
             return np.empty(0), np.empty(0)
         t, distance = zip(*self._recent, strict=True)
         return np.concatenate(t), np.concatenate(distance)
 
     def silent_s(self, now_ns: int) -> float:
-        """Return how long ago the first sensor's last reading came; 0 before there was one."""
+        """Return the time since the first sensor's last reading, s; 0 before the first reading."""
         return 0.0 if self._last_ns is None else (now_ns - self._last_ns) * 1e-9
 
     def rate_hz(self, now_ns: int) -> int:
-        """Return how many samples of the first sensor came within the last second."""
+        """Return the number of samples received from the first sensor in the last second."""
         since = now_ns - SECOND_NS
         while self._stamps and self._stamps[0][-1] < since:
             self._stamps.popleft()
@@ -272,10 +272,10 @@ def progress_of(
     *,
     tick: bool = True,
 ) -> Progress:
-    """Return where a recording stands, that began at a moment; without a recorder, one that waits for its trigger."""
+    """Return the progress of a recording; without a recorder, the recording is waiting for its trigger."""
 
     def motion() -> LiveMotion | NotYet:
-        """Where working it out fails, say why there is none: the rest of the line stands."""
+        """Return the motion, or the reason why its calculation failed; the rest of the line is not affected."""
         try:
             return shown.motion(now_ns)
         except BaseException as error:
@@ -305,12 +305,12 @@ def progress_of(
 
 
 def _trouble(shown: LiveState, chains: Sequence[SensorChain], *, waiting: bool) -> Trouble | None:
-    """Return what is wrong with the first sensor that something is wrong with."""
+    """Return the trouble of the first sensor in channel order that has one."""
     for channel, useful in sorted(shown.useful.items()):
         trouble = useful.trouble(chains[channel].family)
         if trouble is not None and (complaint := chains[channel].status.complaint):
             trouble = Trouble(TroubleKind.SENSOR_FAULT, complaint)
-        # A bob that the trigger waits for hangs still.
+        # While the trigger waits, the bob is expected to hang still.
         if trouble is not None and not (waiting and trouble.kind is TroubleKind.UNCHANGED):
             return trouble if len(chains) == 1 else replace(trouble, channel=channel)
     return None
@@ -319,5 +319,5 @@ def _trouble(shown: LiveState, chains: Sequence[SensorChain], *, waiting: bool) 
 def _free_bytes(folder: Path) -> int | None:
     try:
         return shutil.disk_usage(folder).free
-    except OSError:  # a folder that was renamed; that is said elsewhere
+    except OSError:  # the folder was renamed, which is reported elsewhere
         return None

@@ -1,7 +1,7 @@
-"""What is shown of a recording, on a separate thread that can neither delay nor end it.
+"""Show a recording on a separate thread that can neither delay nor end it.
 
-The session rings once a second; a display that is still busy then misses the ring and shows the latest state at its
-next turn. What it raises is counted, written into the run and shown if possible, and the display goes on.
+The session requests an update once a second. A display that is still busy then skips the request and shows the latest
+state at its next turn. Its exceptions are counted and written into the run, and the display continues.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from springmass.session.failures import Failures
 __all__ = ["Display"]
 
 LAST_S = 1.0
-"""So long the end of a recording waits for a turn of the display that has begun."""
+"""Maximum time that the end of a recording waits for the display's current turn, s."""
 
 Samples = Sequence[tuple[int, Block]]
 
 
 class Display:
-    """Calls back about once a second on its own thread.
+    """Calls a function about once a second on a separate thread.
 
     Parameters
     ----------
     shown : LiveState
-        This thread's alone from here on.
+        Used only by this thread from now on.
     show : callable
-        Takes the progress.
+        Called with the progress.
     failures : Failures
     """
 
@@ -38,7 +38,7 @@ class Display:
         self._shown = shown
         self._show = show
         self._failures = failures
-        # A ring is what samples to take and how to look at the state; None ends the thread.
+        # A request has a function that takes samples and one that reads the state; None ends the thread.
         self._rings: queue.SimpleQueue[tuple[Callable[[], Samples], Callable[[LiveState], Progress]] | None] = (
             queue.SimpleQueue()
         )
@@ -49,12 +49,12 @@ class Display:
             failures.note("display", error)
 
     def ring(self, take: Callable[[], Samples], look: Callable[[LiveState], Progress]) -> None:
-        """Ask for a turn: take samples, look at where the recording stands, show it. Never waits."""
+        """Request a turn, which takes samples and shows the state of the recording; never wait."""
         if self._rings.empty():
             self._rings.put((take, look))
 
     def close(self) -> None:
-        """Ask for no more turns; return when the last has ended, or hangs, which is a failure too."""
+        """Request no more turns, and wait for the last one to end; if it hangs, record a failure."""
         if self._thread.ident is None:
             return
         self._rings.put(None)
@@ -68,5 +68,5 @@ class Display:
             try:
                 self._shown.push(take())
                 self._show(look(self._shown))
-            except BaseException as error:  # whatever it is, it is no reason to lose a reading
+            except BaseException as error:  # no error of the display may cost a reading
                 self._failures.note("display", error)

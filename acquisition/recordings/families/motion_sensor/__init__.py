@@ -1,6 +1,6 @@
-"""MotionSensor.vi: ``layout`` finds title and columns, ``column`` reads a file, ``position_velocity`` a file or a pair.
+"""MotionSensor.vi: ``layout`` finds the columns, ``column`` reads them, ``position_velocity`` reads a file or a pair.
 
-In: the bytes of one or two such texts. Out: a :class:`~acquisition.recordings.recording.Recording`. The words of titles
+In: the bytes of one or two texts. Out: a :class:`~acquisition.recordings.recording.Recording`. The words of titles
 and column lines are in ``layout``. Faults of rows are handled by the shared code in ``tables`` and ``sampling``.
 """
 

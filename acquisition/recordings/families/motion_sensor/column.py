@@ -1,4 +1,4 @@
-"""Read one MotionSensor.vi file as samples, with the remarks of the reader."""
+"""Read one MotionSensor.vi file as samples, with remarks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _CONSTANT = 0.95
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Column:
-    """Times and one quantity.
+    """The times and the quantity of one file.
 
     Parameters
     ----------
@@ -59,12 +59,12 @@ class Column:
         return says_simulated(f"{self.layout.title} {self.name}")
 
     def tick(self) -> float | None:
-        """Return the step of which all values are multiples, m or m/s, if there is an evident one."""
+        """Return the step (m or m/s) of which all values are multiples; None if there is no evident step."""
         return find_tick(self.samples.value, self.samples.resolution)
 
 
 def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | None, unit: str | None) -> Column:
-    """Read one file; for the arguments and errors see :class:`acquisition.recordings.base.Format`."""
+    """Read one file; for arguments and errors see :class:`acquisition.recordings.base.Format`."""
     check_rate(path, rate_hz)
     text = text_of(path, data)
     layout, sheet = find_layout(path, text, channel, unit)
@@ -95,9 +95,9 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
 
 
 def _usual(stated: F8) -> tuple[float | None, bool]:
-    """Return the usual error, m, and whether it is constant."""
+    """Return the median of the stated errors (m), and whether it is constant."""
     if stated.size and bool((stated == stated[0]).all()):
-        return float(stated[0]), True  # no copy of a column of millions
+        return float(stated[0]), True  # avoids a copy of a column of millions of rows
     finite = stated[np.isfinite(stated)]
     if not finite.size:
         return None, False

@@ -23,22 +23,22 @@ _ERROR = {f"{name} error ({unit})": unit for unit in LENGTHS for name in ("dist"
 _VELOCITY = {f"velocity ({unit}/s)": unit for unit in LENGTHS}
 _CHANNELS: dict[str, Quantity] = {"distance": "distance", "position": "distance", "velocity": "velocity"}
 _HEADER_LINES = 20
-_ROWS_BELOW, _ROWS_OF_SHAPE = 10, 100  # rows to look at with a column line, and without one
+_ROWS_BELOW, _ROWS_OF_SHAPE = 10, 100  # number of rows to examine with and without a column line
 _REMEDY = 'put the column line "Time (s)<TAB>Distance (cm)" or "Time (s)<TAB>Velocity (cm/s)" above the rows'
 
 
 class Layout(NamedTuple):
-    """The first row of a file and the meaning of its columns.
+    """The title of a file and the meaning of its columns.
 
     Parameters
     ----------
     quantity : {"distance", "velocity"}
     columns : int
-        Cells of a row: time, the quantity, and the error if there are three.
+        Number of cells in a row: time, the quantity, and, if there are three, the error.
     unit : str
         The unit of length; "cm" also for velocities in cm/s.
     assumed : str
-        What the shape of the rows shows, if there is no column line; else empty.
+        If there is no column line, the meaning that the shape of the rows or the user indicates; else empty.
     title : str
     """
 
@@ -62,12 +62,12 @@ def evidence(lines: Sequence[str]) -> str:
 
 
 def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> tuple[Layout, Sheet]:
-    """Return the meaning and the place of the rows.
+    """Return the meaning and the location of the rows.
 
     Raises
     ------
     NeedsAnswer
-        If there is no column line above two columns and the rows do not show what they are.
+        If there is no column line above two columns, and the rows do not show their meaning.
     FormatError
         If there are no rows, the columns are different, or ``channel`` or ``unit`` contradict the file.
     """
@@ -133,7 +133,7 @@ def _column_line(lines: Sequence[str]) -> tuple[int, Layout] | None:
 
 
 def _names_others(above: str, row: str) -> bool:
-    """Return whether a line names all columns of the row, in words that this family does not use."""
+    """Return whether a line names all columns of the row below it, in words that this family does not use."""
     mark = guess_delimiter(row)
     names = split_cells(above.lstrip("\ufeff#% "), mark)
     return len(names) == len(split_cells(row, mark)) and (bool(mark) or is_time(name_and_unit(names[0])[0]))
@@ -157,7 +157,7 @@ def _first_row(lines: Sequence[str]) -> int:
 
 
 def _title_and_start(lines: Sequence[str], row: int) -> tuple[str, int]:
-    """Return the first line above the rows as the title, unless it looks like a damaged row, and the first row."""
+    """Return the title, which is line 1 unless that is or looks like a damaged row, and the index of the first row."""
     if row == 0 or (not _is_title(lines[0]) and _begins_with_number(lines[0])):
         return "", 0
     return lines[0].strip(), 1
@@ -169,7 +169,7 @@ def _begins_with_number(line: str) -> bool:
 
 
 def _shape(lines: Sequence[str]) -> Layout | None:
-    """Infer the layout only from rows: a constant third column is the error, a first NaN means velocity."""
+    """Infer the layout from the rows alone: a constant third column is the error, an initial NaN means velocity."""
     every = [_numbers(line) for line in lines[:_ROWS_OF_SHAPE] if line.strip()]
     rows = [[x for x in row if x is not None] for row in every if None not in row]
     three, two = ([row for row in rows if len(row) == n] for n in (3, 2))

@@ -1,12 +1,12 @@
 """MotionSensor.vi: the text files of a LabVIEW front panel for an ultrasonic rangefinder.
 
-A file holds position (``Time (s)``, ``Distance (cm)``, ``Dist Error (cm)``) or velocity (``Time (s)``,
-``Velocity (cm/s)``), tab separated, three decimals, usually without line end after the last row. Title and
-column line may have been edited or deleted; :mod:`acquisition.recordings.families.motion_sensor.layout` finds what is
-there. What is easy to misread:
+A file contains position (``Time (s)``, ``Distance (cm)``, ``Dist Error (cm)``) or velocity (``Time (s)``,
+``Velocity (cm/s)``), tab separated, with three decimals, usually without a line end after the last row. The
+title and the column line may have been edited or deleted;
+:mod:`acquisition.recordings.families.motion_sensor.layout` finds the remaining ones. What is easy to misread:
 
 - Times are row numbers divided by a nominal rate, rounded to a millisecond.
-- The error column is a constant, tens of times the noise.
+- The error column is a constant, tens of times larger than the noise.
 - Velocity is the backward difference of the unrounded position over one sample.
 - Position and velocity files may differ in length and window: they are joined by time, never by row.
 """
@@ -49,7 +49,7 @@ class MotionSensor:
         return bool(self.evidence(head))
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
-        """Return the only channel of a file; nothing if the user must state what the numbers are."""
+        """Return the only channel of a file; an empty tuple if the user must state the meaning of the numbers."""
         try:
             column = read_column(path, data, None, None, None)
         except NeedsAnswer:
@@ -90,12 +90,12 @@ class MotionSensor:
     def read_pair(
         self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
     ) -> Recording:
-        """Join a position and a velocity file by time, in any order: they are distinguished by content.
+        """Join a position file and a velocity file by time; they may be given in either order.
 
         Raises
         ------
         FormatError
-            If they are not one of each, differ in rate, or have no time in common.
+            If the files are not one position and one velocity file, differ in rate, or have no time in common.
         """
         a, b = (_of_pair(path, data, rate_hz) for path, data in (position, velocity))
         if a.layout.quantity == b.layout.quantity:
@@ -105,7 +105,7 @@ class MotionSensor:
 
 
 def _of_pair(path: str, data: bytes, rate_hz: float | None) -> Column:
-    """Read one file of a pair; a file that may be position or velocity is an error here."""
+    """Read one file of a pair; a file that may contain either position or velocity is an error here."""
     try:
         return read_column(path, data, None, rate_hz, None)
     except NeedsAnswer as error:
@@ -148,7 +148,7 @@ def _position_alone(column: Column) -> Recording:
 
 
 def _velocity_alone(column: Column) -> Recording:
-    """Sum velocity to position; its zero is the first sample, because the file does not hold the offset."""
+    """Integrate velocity to position; the first sample is at zero, because the file does not contain the offset."""
     samples, tick = column.samples, column.tick()
     rate_hz, flags = samples.timing.rate_hz, samples.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
@@ -197,7 +197,7 @@ def _join(position: Column, velocity: Column) -> Recording:
 
 
 def _velocity_traps(velocity: Column) -> Iterable[Trap]:
-    """Yield the remarks on the velocity file with its name, without those that both files share."""
+    """Yield the remarks on the velocity file, with its name, except remarks that apply to both files."""
     for trap in velocity.traps:
         if trap.code not in ("nominal_clock", "rate_assumed", "rate_given"):
             yield Trap(trap.code, f"in {velocity.name}: {trap.message}", trap.count, trap.line)
@@ -212,7 +212,7 @@ def _join_traps(p: ChannelSamples, v: ChannelSamples, from_p: I8, from_v: I8) ->
         yield Trap(
             "velocity_missing", f"{alone_p} times are only in the position file, so they have no velocity", alone_p
         )
-    # The velocity of a sample must be its difference from the previous position.
+    # The velocity of a sample must be its difference from the previous position, multiplied by the rate.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
     x, rate_hz = p.value, p.timing.rate_hz
     apart = np.abs((x[from_p[both]] - x[from_p[both - 1]]) * rate_hz - v.value[from_v[both]])

@@ -2,7 +2,7 @@
 
 This file is run as a script, by its path. It imports neither numpy nor the package around it, whose name differs
 between a checkout and a wheel, so that it starts in a few hundredths of a second. Its arguments are the memory limit,
-in bytes, and the largest number of letters to write.
+in bytes, and the maximum number of characters to write.
 
 The JSON is ``{"sheets": [[name, text], ...]}``, each text with one line per row and one tab between cells, or
 ``{"refused": reason}``.
@@ -25,19 +25,19 @@ _BLANK = str.maketrans("\t\r\n", "   ")
 
 
 def read_sheets(data: bytes, most_letters: int) -> list[tuple[str, str]]:
-    """Return name and text of every sheet.
+    """Return the name and the text of every sheet.
 
     Parameters
     ----------
     data : bytes
         An xlsx or xls.
     most_letters : int
-        Largest number of letters of all texts together.
+        Maximum number of characters in all texts together.
 
     Raises
     ------
     ValueError
-        If the texts have more letters.
+        If the texts have more characters.
     python_calamine.CalamineError
         If calamine cannot read the workbook.
     """
@@ -66,7 +66,7 @@ def _text(rows: Sequence[Sequence[Any]], most_letters: int) -> str:
 
 
 def _printed(column: Sequence[Any]) -> list[str]:
-    """Print the cells of a column, its numbers with as many decimals as the longest of them needs.
+    """Return the cells of a column as text; all numbers have as many decimals as the longest of them needs.
 
     The reader of text treats a number with fewer decimals than its column as incomplete.
     """
@@ -83,7 +83,7 @@ def _is_number(cell: object) -> bool:
 
 
 def _word(cell: object) -> str:
-    """Print a cell that is not a number; a duration in seconds."""
+    """Return a cell that is not a number as text; a duration is given in seconds."""
     if isinstance(cell, datetime.timedelta):
         return f"{cell.total_seconds():g}"
     if isinstance(cell, datetime.datetime):
@@ -105,7 +105,7 @@ def _limit_memory(most_bytes: int) -> None:
 
 
 def main() -> None:
-    """Read standard input, write standard output."""
+    """Read a workbook from standard input and write JSON to standard output."""
     most_bytes, most_letters = map(int, sys.argv[1:])
     _limit_memory(most_bytes)
     answer: dict[str, Any]
@@ -114,7 +114,7 @@ def main() -> None:
     except (KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:
-        # calamine raises an error for most damage; otherwise Rust panics, which is not an Exception.
+        # calamine raises an error for most damage. For the rest Rust panics, and that error is not an ``Exception``.
         answer = {"refused": " ".join(str(error).split()) or type(error).__name__}
     sys.stdout.buffer.write(json.dumps(answer, ensure_ascii=False).encode())
 

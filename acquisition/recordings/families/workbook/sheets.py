@@ -1,14 +1,14 @@
 """Workbooks, xlsx and xls (python-calamine): every sheet with rows of numbers is a run.
 
-The cells of a sheet go through the readers of text, one line per row, one tab between cells. Three things differ from
-text:
+The cells of a sheet are passed to the readers of text, with one line per row and one tab between cells. Three things
+differ from text:
 
-- Cells are binary numbers without printed decimals. Each column is printed with the decimals that its longest number
-  needs, for the fifteen digits that a workbook shows. So no number looks incomplete.
+- Cells are binary numbers without printed decimals. Each column is printed with as many decimals as its longest number
+  needs for the fifteen digits that a workbook shows, so that no number looks incomplete.
 - Times of day and dates are separate types of cells.
-- A file of a few bytes can make calamine reserve any amount of memory, and crash its process if there is not enough: it
-  may state any size, have one cell in the last row and column, or share one long string among many cells. So stated
-  sizes are checked first, and calamine runs in a child process with limits of time and memory.
+- A file of a few bytes can make calamine reserve any amount of memory, and crash its process if there is not enough.
+  The file may state any size, have one cell in the last row and column, or share one long string among many cells. So
+  stated sizes are checked first, and calamine runs in a child process with limits of time and memory.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from acquisition.recordings.tables.sheet import ColumnFormat
 __all__ = ["FORMAT"]
 
 MOST_BYTES = 1 << 27
-"""Bytes of an xls, or of an xlsx unpacked: a million rows of three columns take 120 MB."""
+"""Maximum size of an xls, or of an unpacked xlsx, bytes: a million rows of three columns take 120 MB."""
 MOST_CELLS = 1 << 23
-"""Largest number of cells that the sheets may state: eight full columns of an xlsx."""
+"""Maximum number of cells that the sheets may state: eight full columns of an xlsx."""
 MOST_LETTERS = 1 << 27
-"""Letters of all cells as text: a million rows of three columns take 22 million."""
+"""Maximum number of characters of all cells as text: a million rows of three columns take 22 million."""
 MEMORY_BYTES = 1 << 30
-"""Memory of the child process: a million rows of three columns take 600 MB."""
+"""Memory limit of the child process, bytes: a million rows of three columns take 600 MB."""
 TIME_LIMIT_S = 60.0
-"""Time of the child process: a million rows of three columns take 10 s on a laptop of 2020."""
+"""Time limit of the child process: a million rows of three columns take 10 s on a laptop of 2020."""
 
 _ZIP = b"PK\x03\x04"
 _OLE = bytes.fromhex("d0cf11e0a1b11ae1")
@@ -48,7 +48,7 @@ _DIMENSION = re.compile(rb'<(?:\w+:)?dimension\b[^>]*?\bref="' + _CORNER + rb"(?
 # The first record of a worksheet in an xls: its kind BOF, its length, the version (BIFF5 or BIFF8) and "worksheet".
 _WORKSHEET = re.compile(rb"\x09\x08[\x08\x10]\x00\x00[\x05\x06]\x10\x00")
 _DIMENSIONS, _SIZES = 0x200, {10: "<4H", 14: "<IIHH"}
-_MOST_SHEETS, _MOST_RECORDS = 256, 512  # sheets, and records of each, that are searched for sizes
+_MOST_SHEETS, _MOST_RECORDS = 256, 512  # maximum number of sheets, and of records per sheet, to search
 
 
 def _evidence(head: bytes) -> str:
@@ -80,7 +80,7 @@ def _cells_of_xlsx(path: str, data: bytes) -> int:
 
 
 def _number(letters: bytes) -> int:
-    """Return the number of a column by its letters, A being 1."""
+    """Return the number of a column from its letters; A is 1."""
     number = 0
     for letter in letters:
         number = 26 * number + letter - 64
@@ -90,8 +90,8 @@ def _number(letters: bytes) -> int:
 def _cells_of_xls(path: str, data: bytes) -> int:
     """Return the number of cells that the sheets of an xls state (MS-XLS 2.4.90).
 
-    A file may store its records in pieces and out of order. Sizes that are missed for this reason are left to the
-    limits of the child process.
+    A file may store its records in pieces and out of order. If a size is missed for this reason, only the limits of
+    the child process apply.
     """
     if len(data) > MOST_BYTES:
         raise FormatError(path, f"expected a workbook of at most {MOST_BYTES} bytes, got {len(data)}", _REMEDY)
@@ -111,11 +111,11 @@ def _cells_of_xls(path: str, data: bytes) -> int:
 
 
 def _sheets(path: str, data: bytes) -> list[tuple[str, bytes]]:
-    """Return name and text of every sheet, read by the child process."""
+    """Return the name and the text of every sheet, as read by the child process."""
     import json
     import subprocess
 
-    # With -P the folder of the script is not searched for modules. subprocess works in a worker of a pool too.
+    # With -P the folder of the script is not searched for modules. subprocess also works inside a worker of a pool.
     command = [sys.executable, "-P", child.__file__, str(MEMORY_BYTES), str(MOST_LETTERS)]
     try:
         done = subprocess.run(command, input=data, capture_output=True, timeout=TIME_LIMIT_S, check=False)
