@@ -1,4 +1,4 @@
-"""Spring: the part of its own mass that oscillates, and the typical mass where the scene does not state it."""
+"""Spring: the part of its mass that oscillates, and the typical mass where the scene does not state it."""
 
 from __future__ import annotations
 

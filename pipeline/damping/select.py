@@ -279,7 +279,7 @@ def _weigh_all(laws: Sequence[Law], points: _Points, params: Params, unfitted: d
 
 
 def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
-    """Return a rejected fit with uncertainties from the size and the correlation length of its own residuals."""
+    """Return a rejected fit with uncertainties from the size and the correlation length of its residuals."""
     # If the law is not finite at these points, it has no residuals to use.
     own = correlation_length(residual) if np.isfinite(residual).all() else correlation
     widening = fit.reduced_chi2 * max(own / correlation, 1.0)

@@ -14,7 +14,7 @@ from pipeline.dynamics.problem import Problem
 
 __all__ = ["Friction"]
 
-OVERWHELMING = 1e9  # ratio of friction to the spring and viscous forces above which it stops the bob at once
+OVERWHELMING = 1e9  # ratio of friction to the spring and viscous forces above which it stops the bob immediately
 UNSEEN = 1e-17  # relative change of a length that is far below rounding
 _CLOSE = 1e-12  # accuracy of a turning time, relative to the step; at zero velocity its effect is negligible
 _MOST = 40  # maximum number of iterations for a turning time

@@ -144,7 +144,7 @@ class Mode:
 
     @property
     def kind(self) -> Literal["mode", "harmonic", "product"]:
-        """Kind of the mode: at an independent frequency, at a multiple of the main one, or at a sum or difference of both."""
+        """Kind of the mode: independent, a multiple of the main frequency, or a sum or difference of both."""
         if self.turns == (1, 0):
             return "mode"
         return "product" if self.turns[0] else "harmonic"

@@ -1,4 +1,4 @@
-"""Find bursts of times, as stamped by a computer that reads several samples at once, and the even sampling times."""
+"""Find bursts of times, as stamped by a computer that reads several samples together, and the even sampling times."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Read rows of numbers from the cells of a text, for all text formats.
 
-Rows are read in pages of whole lines. :mod:`acquisition.recordings.tables.regular` reads a whole regular page at once;
+Rows are read in pages of whole lines. :mod:`acquisition.recordings.tables.regular` reads a regular page as a whole;
 the rows of other pages are read one by one. A number that lost digits is detected by its number of decimals, which
 differs from the usual number in its column.
 """
