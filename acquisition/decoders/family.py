@@ -12,7 +12,8 @@ from acquisition.readings import Readings
 __all__ = ["RESONATOR_PPM", "Decoder", "DeviceStatus", "Encoder", "Family", "Identity", "Poll", "Polled"]
 
 RESONATOR_PPM = 10_000.0
-"""Maximum error of a ceramic resonator, ppm: 5000 when new, 3000 by temperature, 3000 by aging (Murata P16E)."""
+"""Limit for the error of a ceramic resonator, ppm: about the sum of 5000 when new, 3000 by temperature and 3000 by
+aging (Murata P16E)."""
 
 
 @dataclass(frozen=True, slots=True)
