@@ -58,8 +58,8 @@ def sample_findings(
             "clipped",
             "warning",
             f"{counts['clipped']} of {n} samples are cut off {where}; they were left out.",
-            "Something cuts the motion there: a fixed object or a lost target. The amplitude comes from the rest of "
-            "each period.",
+            "The readings stop there: the bob leaves the range of the sensor, or a fixed object stands between them. "
+            "Period, amplitude and damping come from the other samples of each period.",
             {"samples": counts["clipped"], **{f"level_{i}_m": m for i, m in enumerate(conditioned.plateaus_m, 1)}},
             advice,
         )

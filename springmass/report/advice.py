@@ -95,8 +95,11 @@ _CONSEQUENCES = {
 }
 
 
-_COMPLETE = frozenset({"amplitude_dependent_frequency"})
-"""Codes of findings whose message already states the consequence for the values."""
+_OWN_CONSEQUENCES = {
+    "amplitude_dependent_frequency": "",  # the message states it
+    "clipped": "The values come from the other samples of each period.",
+}
+"""By the code of a finding, the consequence for the values if its harm alone does not state it."""
 
 
 def harm_of(code: str, severity: str) -> Harm:
@@ -132,7 +135,7 @@ def lab_report_line(finding: Mapping[str, Any]) -> str:
     harm = harm_of(finding["code"], finding["severity"])
     if harm is Harm.NOTE:
         return ""
-    consequence = "" if finding["code"] in _COMPLETE else _CONSEQUENCES[harm]
+    consequence = _OWN_CONSEQUENCES.get(finding["code"], _CONSEQUENCES[harm])
     return f"{_sentence(finding['message'])} {consequence}".rstrip()
 
 

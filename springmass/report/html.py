@@ -22,7 +22,7 @@ from springmass.report.charts import chart_data
 from springmass.report.laws import laws_across, laws_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of, without_date
 from springmass.report.tables import page_unit, prefixed, pretty, pretty_number, table_rows
-from springmass.report.words import caption, typeset, verdict
+from springmass.report.words import caption, method, typeset, verdict
 from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
 from springmass.runs.json_results import picked
@@ -126,6 +126,7 @@ def render_html(
         overlay=over,
         compared=comparison,
         provenance=list(_flattened(provenance)),
+        version=provenance["version"],
         glossary=[term for term in TERMS if not term.of_program],
         charts=CHARTS,
         data=_data(runs),
@@ -235,6 +236,7 @@ def _part(
         ],
         "kind": analysis.track.kind,
         "verdict": verdict(analysis),
+        "method": method(analysis),
         "main": main,
         "figures": {
             name: {
@@ -275,6 +277,8 @@ def _correlations(analysis: Analysis) -> list[tuple[str, list[str]]]:
 
 def _sections(part: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield (id, title) of the non-empty sections of a run."""
+    if part["method"]:
+        yield f"method-{part['index']}", "For your lab report"
     filled = {"amplitude": part["laws"], "motion": part["laws"], "classic": part["classic"]}
     for name, title, _ in _SECTIONS:
         if part["drawn"][name] or filled.get(name) is not None:

@@ -15,9 +15,9 @@ from springmass.report.figures.phase_plot import turn_step
 from springmass.report.figures.position import ZOOM_PERIODS, has_error_bars, is_long
 from springmass.report.figures.rest_position import rest_moves
 from springmass.report.motion_table import row_step
-from springmass.report.tables import page_unit, pretty, raised
+from springmass.report.tables import page_unit, pretty, pretty_number, raised
 
-__all__ = ["LETTERS", "caption", "damping_sentence", "equation", "kept", "typeset", "verdict"]
+__all__ = ["LETTERS", "caption", "damping_sentence", "equation", "kept", "method", "typeset", "verdict"]
 
 LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
 
@@ -69,7 +69,7 @@ def typeset(message: str) -> str:
 
 
 def verdict(analysis: Analysis) -> tuple[str, ...]:
-    """Return the result of a run in at most three sentences: values, damping, and the main source of uncertainty."""
+    """Return the result of a run in at most four sentences: values, damping, fit, main source of uncertainty."""
     motion = analysis.motion
     if isinstance(motion, Overdamped) or (isinstance(motion, Still) and "first_mode_period" in analysis.estimates):
         why = typeset(motion.why)
@@ -82,9 +82,44 @@ def verdict(analysis: Analysis) -> tuple[str, ...]:
     measured = f"The {moves} with the period T\u00a0=\u00a0{kept(found['period'])}"
     if "spring_constant" in found:
         measured += f", which with the mass gives the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
-    sentences = (f"{measured}.", damping_sentence(analysis, coefficients=True))
+    sentences = [f"{measured}.", damping_sentence(analysis, coefficients=True)]
+    if not {finding.code for finding in analysis.findings} & COLOURED:
+        sentences.append("The residuals look like noise, and both halves of the recording agree with the fit.")
     cause = _largest_cause(analysis)
-    return (*sentences, cause) if cause else sentences
+    return (*sentences, cause) if cause else tuple(sentences)
+
+
+def method(analysis: Analysis) -> tuple[str, ...]:
+    """Return how the numbers were obtained, in sentences for a lab report; empty if nothing oscillates."""
+    motion = analysis.motion
+    if not isinstance(motion, Oscillation):
+        return ()
+    if "strongly_damped" in {finding.code for finding in analysis.findings}:
+        sentences = ["The equation of motion was solved and fitted to the samples by least squares."]
+    else:
+        sentences = [
+            "A sinusoid was fitted to the samples of every window of one or several periods by robust least squares; "
+            "the period follows from the phases of the windows, and the damping from their amplitudes."
+        ]
+    if motion.full is not None:
+        sentences.append("Then the whole waveform was fitted to all samples.")
+    if not motion.damping.by_statement:
+        sentences.append("The damping laws were compared by χ² and by the Bayesian information criterion.")
+    if (mass := motion.derived.effective_mass_kg) is not None:
+        sentences.append(
+            f"The spring constant is k\u00a0=\u00a0mω² with the oscillating mass m\u00a0=\u00a0{kept(mass)}: the bob, "
+            "and the shares of the spring and the air."
+        )
+    rows = {row.name: row for row in budgets_of(analysis)}
+    expanded = [
+        f"U({symbol})\u00a0=\u00a0{_unbroken(f'{pretty_number(row.budget.expanded, 2)} {row.budget.estimate.unit}')}"
+        for name, symbol in (("period", "T"), ("spring_constant", "k"))
+        if (row := rows.get(name)) is not None
+    ]
+    sentences.append("Uncertainties are standard uncertainties, combined by the law of propagation (GUM).")
+    if expanded:
+        sentences.append(f"The expanded uncertainties for a coverage of 95.45\u00a0% are {' and '.join(expanded)}.")
+    return tuple(sentences)
 
 
 def _largest_cause(analysis: Analysis) -> str:
@@ -101,6 +136,8 @@ def _largest_cause(analysis: Analysis) -> str:
     return f"The largest part of u({symbol})², {100.0 * greatest.share:.0f}\u00a0%, comes from the {label}."
 
 
+COLOURED = frozenset({"model_misfit", "smoothed_sensor", "held_samples", "no_law_fits"})
+"""Findings on residuals that are not noise, or on a fit that does not describe the recording."""
 NAMED_LAWS = 2  # maximum number of named laws that cannot be ruled out
 
 
@@ -128,7 +165,10 @@ def damping_sentence(analysis: Analysis, *, coefficients: bool = False) -> str:
             f"No damping law describes how the amplitude falls; {chosen} is nearest, but quote the amplitude against "
             "time instead of its coefficients."
         )
+    possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
     text = f"The amplitude falls by {chosen}"
+    if possible and not damping.by_statement:
+        text = f"{chosen[0].upper()}{chosen[1:]} fits best"
     if len(damping.best.law.parameters) == 1:
         text = f"The amplitude does not fall measurably in {span}"
     if damping.by_statement:
@@ -140,7 +180,6 @@ def damping_sentence(analysis: Analysis, *, coefficients: bool = False) -> str:
         return f"{text}."
     if coefficients:
         text += f"; the damping rate at the start is λ\u00a0=\u00a0{_damping_rates(analysis.motion)}"
-    possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
     if possible:
         more = len(possible) - NAMED_LAWS
         if more > 1:

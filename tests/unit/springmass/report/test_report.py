@@ -263,9 +263,9 @@ def test_the_head_says_when_and_at_which_bench() -> None:
 
 
 def test_rejected_laws_are_named_in_words() -> None:
-    """Three sentences give the result; the table has every law, with the evidence for and against."""
+    """Four sentences give the result; the table has every law, with the evidence for and against."""
     sentences = verdict(damped())
-    assert len(sentences) == 3
+    assert len(sentences) == 4
     assert "linear and quadratic drag together" in sentences[1]
     page = page_of(run_of(damped()))
     table = page[page.index('<table class="laws"') :].split("</table>")[0]
@@ -274,6 +274,25 @@ def test_rejected_laws_are_named_in_words() -> None:
     assert table.count("<tbody") == len(motion.damping.fits)
     assert re.findall(r'<th scope="col">([^<]*)</th>', table) == ["law", "reduced χ²", "Δχ²", "dof", "ΔBIC"]
     assert re.search(r'linear<br><span class="sub">rejected', table)
+
+
+def test_a_fit_that_does_not_describe_the_run_is_not_praised() -> None:
+    """The sentence on residuals that are noise is missing where a finding says that they are not."""
+    misfit = Finding("model_misfit", "warning", "The residuals are not noise.")
+    fine, wrong = damped(), dataclasses.replace(damped(), findings=(misfit,))
+    assert set(verdict(fine)) - set(verdict(wrong)) == {verdict(fine)[2]}
+
+
+def test_the_page_has_a_paragraph_for_a_lab_report() -> None:
+    """It names the program, the mass that oscillates and the expanded uncertainties; a bob at rest has none."""
+    analysis = damped()
+    assert isinstance(analysis.motion, Oscillation)
+    mass = analysis.motion.derived.effective_mass_kg
+    assert mass is not None
+    page = page_of(run_of(analysis))
+    (paragraph,) = re.findall(r'id="method-0".*?<p>(.*?)</p>', page, re.DOTALL)
+    assert all(words in paragraph for words in ("springmass 0", kept(mass), "U(T)", "U(k)"))
+    assert 'id="method-0"' not in page_of(run_of(still()))
 
 
 @pytest.mark.parametrize(("quantity", "unit"), UNITS.items())
