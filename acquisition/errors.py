@@ -7,7 +7,7 @@
     |   |-- UnknownFormat    no family recognises the content
     |   `-- NeedsAnswer      the file lacks something that must not be guessed (rate, unit, channel)
     |-- SourceError          a source failed during delivery
-    |-- SensorError          an unknown family of rangefinders, or an option that it does not have
+    |-- SensorError          an unknown family of rangefinders, or an option that the family lacks
     |-- PortError            a port that cannot be opened: absent, busy, no permission   springmass exits with 4
     `-- CalibrationError     numbers that cannot be a calibration
 
@@ -119,7 +119,7 @@ class SourceError(AcquisitionError):
 
 
 class SensorError(AcquisitionError):
-    """An unknown family of rangefinders, or an option that it does not have."""
+    """An unknown family of rangefinders, or an option that the family lacks."""
 
 
 class PortError(AcquisitionError):

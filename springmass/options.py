@@ -157,9 +157,9 @@ class PageOptions:
     """The options of the page in the browser."""
 
     page_port: Annotated[TcpPort, _option("N", "port of the page (default: a free one)")] = 0
-    no_browser: Annotated[bool, _flag("print the address of the page, but open no browser")] = False
+    no_browser: Annotated[bool, _flag("print the address of the page, and do not open a browser")] = False
     want_us: Annotated[
-        Positive | None, _option("U", "uncertainty of the period to reach, us (default: 40 ppm of the period)")
+        Positive | None, _option("U", "target uncertainty of the period, us (default: 40 ppm of the period)")
     ] = None
     lan: Annotated[bool, _flag("let other devices on the local network view the page")] = False
     law: StatedLaw = None
@@ -198,7 +198,7 @@ class AnalyseOptions:
     pdf: Annotated[bool, _flag("also write the figures of reports as PDF")] = False
     si: Annotated[bool, _flag("print SI units without prefixes")] = False
     json: Annotated[bool, _flag("print one JSON object per input on standard output")] = False
-    strict: Annotated[bool, _flag("exit with 5 if a finding is an error")] = False
+    strict: Annotated[bool, _flag("exit with code 5 if a finding is an error")] = False
 
 
 @Parameter(name="*")
@@ -223,7 +223,7 @@ class CompareOptions:
     output: Annotated[File | None, _output("DIR", "folder for a report (default: write no report)")] = None
     pdf: Annotated[bool, _flag("also write its figures as PDF")] = False
     json: Annotated[bool, _flag("print one JSON object on standard output")] = False
-    strict: Annotated[bool, _flag("exit with 5 if a finding is an error")] = False
+    strict: Annotated[bool, _flag("exit with code 5 if a finding is an error")] = False
 
 
 @Parameter(name="*")
@@ -333,7 +333,7 @@ class RecoverOptions:
     output: Annotated[File | None, _output("RUN.h5", "run file to create (default: next to the log)")] = None
     overwrite: Annotated[bool, _flag("replace an existing run file")] = False
     speed_of_sound: Annotated[
-        Positive | None, _option("C", "speed of sound for echo times instead of the log's, m/s")
+        Positive | None, _option("C", "speed of sound for converting echo times, m/s (default: the log's)")
     ] = None
 
 
@@ -361,7 +361,7 @@ class SimulateOptions:
 
     scene: Annotated[File, _option("S.toml", "scene file: masses, spring, start, damping")]
     method: Annotated[str, _option("NAME", "integrator, or auto (default: auto)")] = "auto"
-    dt: Annotated[Finite, _option("S", "time between samples and step of the solver, s (default: 0.01)")] = 0.01
+    dt: Annotated[Finite, _option("S", "sampling interval and step of the solver, s (default: 0.01)")] = 0.01
     seconds: Annotated[Positive, _option("N", "length of the simulation, s (default: 10)")] = 10.0
     tolerance: Annotated[
         Finite | None, _option("E", "largest error relative to the amplitude (default: from the band)")

@@ -101,7 +101,7 @@ class SensorFilter:
         return (1.0 - self._passed(omega, self.sizes[1].value)) / math.sqrt(3.0)
 
     def _passed(self, omega: float, samples: float) -> float:
-        """Return the first harmonic of a cosine after a running median, with the delay of half its length removed."""
+        """Return the first harmonic of a cosine after a running median, with the filter's delay removed."""
         count = round(samples)
         if count < 3:  # the median of two is their mean
             return math.cos(0.5 * (count - 1) * omega * self.step_s)

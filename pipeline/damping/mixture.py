@@ -11,7 +11,7 @@ from pipeline.damping.select import Damping, LawFit
 
 __all__ = ["MixedDrag", "Params", "find_mixed"]
 
-PRESENT = 3.0  # minimum of a coefficient in standard uncertainties: a probability of 0.0013 if its true value is zero
+PRESENT = 3.0  # smallest coefficient accepted, in standard uncertainties; a true zero exceeds it with p = 0.0013
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

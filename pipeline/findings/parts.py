@@ -20,7 +20,7 @@ _WHAT = {
 
 
 def part_findings(segments: Segments | None) -> Iterator[Finding]:
-    """Yield findings on the parts that were left out, and why.
+    """Yield findings that state which parts were left out, and why.
 
     Parameters
     ----------

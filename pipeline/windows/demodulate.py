@@ -359,7 +359,7 @@ def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 |
     noise, and an amplitude may be negative.
     """
     size = np.hypot(a, b)
-    # A negligible size is raised to a small positive one before it divides anything, in any unit.
+    # A negligible magnitude is raised to a small positive one before anything is divided by it, whatever the unit.
     least = 1e-30 * float(size.max()) + 1e-150
     size = np.maximum(size, least)
     along, scale = np.arctan2(b, a), size

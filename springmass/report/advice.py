@@ -21,7 +21,7 @@ _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
 
 
 class Harm(enum.IntEnum):
-    """Effect of a finding on the results, the most harmful first."""
+    """Effects that a finding can have on the results, the most harmful first."""
 
     UNUSABLE = 0
     """A result must not be used."""

@@ -201,7 +201,7 @@ def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
 
 
 def _by_leading_law(derived: Derived) -> dict[str, Any]:
-    """Return the numbers that depend on the law, calculated with the clearly leading law."""
+    """Return the numbers that depend on the law, calculated with the law that is clearly preferred."""
     return {
         "law": derived.law,
         "estimates": {name: x for name, x in derived.estimates.items() if name in derived.of_law},

@@ -58,10 +58,10 @@ class ReadOptions:
         str | None, Parameter(metavar="U", help="unit of the times if the file does not state it: s, ms, us, ns, min")
     ] = None
     unverified: Annotated[bool, Parameter(help="read a run file despite a checksum mismatch")] = False
-    from_s: Annotated[Finite | None, Parameter(name="--from", metavar="S", help="use samples from this second on")] = (
+    from_s: Annotated[Finite | None, Parameter(name="--from", metavar="S", help="use samples from this time on, s")] = (
         None
     )
-    to_s: Annotated[Finite | None, Parameter(name="--to", metavar="S", help="use samples up to this second")] = None
+    to_s: Annotated[Finite | None, Parameter(name="--to", metavar="S", help="use samples up to this time, s")] = None
     clock_ppm: Annotated[
         PartsPerMillion | None,
         Parameter(metavar="PPM", help="largest rate error of the sensor's clock (default: that of its family)"),

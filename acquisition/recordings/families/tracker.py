@@ -1,4 +1,4 @@
-"""Tracker: positions of a mass on video, as a table or as a file of the program (trk).
+"""Tracker: positions of a mass on video, as a table or in the program's own format (trk).
 
 The table has an optional line ``mass A`` and a line ``t x y``, without units. Lengths have the unit of the calibration
 stick, so the user must state it. Times are frame numbers at 25 or 30 per second. The name of the mass is in the user's
