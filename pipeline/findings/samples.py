@@ -59,7 +59,8 @@ def sample_findings(
             "warning",
             f"{counts['clipped']} of {n} samples are cut off {where}; they were left out.",
             "The readings stop there: the bob leaves the range of the sensor, or a fixed object stands between them. "
-            "Period, amplitude and damping come from the other samples of each period.",
+            "Period and damping come from the other samples of each period. The turning points beyond were not "
+            "measured, so the amplitude comes from the sinusoid that is fitted to the other samples.",
             {"samples": counts["clipped"], **{f"level_{i}_m": m for i, m in enumerate(conditioned.plateaus_m, 1)}},
             advice,
         )

@@ -84,7 +84,10 @@ def verdict(analysis: Analysis) -> tuple[str, ...]:
         measured += f", which with the mass gives the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
     sentences = [f"{measured}.", damping_sentence(analysis, coefficients=True)]
     if not {finding.code for finding in analysis.findings} & COLOURED:
-        sentences.append("The residuals look like noise, and both halves of the recording agree with the fit.")
+        sentences.append(
+            "No check contradicts these values: the residuals look like noise, and both halves of the recording agree "
+            "with the fit."
+        )
     cause = _largest_cause(analysis)
     return (*sentences, cause) if cause else tuple(sentences)
 
@@ -106,9 +109,11 @@ def method(analysis: Analysis) -> tuple[str, ...]:
     if not motion.damping.by_statement:
         sentences.append("The damping laws were compared by χ² and by the Bayesian information criterion.")
     if (mass := motion.derived.effective_mass_kg) is not None:
+        shares = {"spring_mass": "its share of the spring", "added_mass": "the air that the disc carries along"}
+        moving = ["the bob", *(shares[x.name] for x in analysis.effects if x.included and x.name in shares)]
         sentences.append(
-            f"The spring constant is k\u00a0=\u00a0mω² with the oscillating mass m\u00a0=\u00a0{kept(mass)}: the bob, "
-            "and the shares of the spring and the air."
+            f"The spring constant is k\u00a0=\u00a0mω² with the oscillating mass m\u00a0=\u00a0{kept(mass)}: "
+            f"{_listed(moving)}."
         )
     rows = {row.name: row for row in budgets_of(analysis)}
     expanded = [
