@@ -119,10 +119,9 @@ class OnTerminal:
         os.write(self._master, keys.encode())
 
     def until(self, words: str, lines: int | None = None, limit_s: float = 120.0) -> None:
-        """Read until words stand on the screen, with so many lines from the line of progress on.
+        """Read until the screen shows these words and, if given, this number of lines from the progress line on.
 
-        One read may end in the middle of a frame. Who asks for something about a whole frame must say how many
-        lines it has.
+        A read may end in the middle of a frame, so a test of a whole frame must state its number of lines.
         """
         end = time.monotonic() + limit_s
         while words not in self.screen.text or (lines is not None and self._lines() != lines):

@@ -28,9 +28,6 @@ STARTS = 5
 MOST_UNREAD = 100
 """Maximum number of lines that wait for a page that reads none; further lines are dropped."""
 
-_AGAIN: Mapping[str, Any] = {"phase": "sent again"}
-"""An item in place of a state: the last state is sent again to a page that has just been started."""
-
 
 class PageProcess:
     """Starts and ends the page, as a context manager.
@@ -124,7 +121,7 @@ class PageProcess:
             # The gate must be the page's first line, so it is written before the writing thread can access the process.
             _write(process, {"gate": self._gate})
             self._process = process
-            self._states.put(_AGAIN)
+            self._states.put({})  # nothing new: the last state is for the page that has just been started
             self._listen(process)
             code = process.wait()
             with self._lock:
@@ -134,7 +131,7 @@ class PageProcess:
 
     def _write_states(self) -> None:
         while (state := self._states.get()) is not None:
-            if state is not _AGAIN:
+            if state:
                 self._last = state
             if self._process is not None:
                 _write(self._process, self._last)

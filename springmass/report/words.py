@@ -83,11 +83,8 @@ def verdict(analysis: Analysis) -> tuple[str, ...]:
     if "spring_constant" in found:
         measured += f", which with the mass gives the spring constant k\u00a0=\u00a0{kept(found['spring_constant'])}"
     sentences = [f"{measured}.", damping_sentence(analysis, coefficients=True)]
-    if not {finding.code for finding in analysis.findings} & COLOURED:
-        sentences.append(
-            "No check contradicts these values: the residuals look like noise, and both halves of the recording agree "
-            "with the fit."
-        )
+    if not {finding.code for finding in analysis.findings} & _NOT_NOISE:
+        sentences.append("The checks find nothing but noise in the residuals.")
     cause = _largest_cause(analysis)
     return (*sentences, cause) if cause else tuple(sentences)
 
@@ -109,7 +106,7 @@ def method(analysis: Analysis) -> tuple[str, ...]:
     if not motion.damping.by_statement:
         sentences.append("The damping laws were compared by χ² and by the Bayesian information criterion.")
     if (mass := motion.derived.effective_mass_kg) is not None:
-        shares = {"spring_mass": "its share of the spring", "added_mass": "the air that the disc carries along"}
+        shares = {"spring_mass": "a share of the spring", "added_mass": "the air that the disc carries along"}
         moving = ["the bob", *(shares[x.name] for x in analysis.effects if x.included and x.name in shares)]
         sentences.append(
             f"The spring constant is k\u00a0=\u00a0mω² with the oscillating mass m\u00a0=\u00a0{kept(mass)}: "
@@ -141,8 +138,19 @@ def _largest_cause(analysis: Analysis) -> str:
     return f"The largest part of u({symbol})², {100.0 * greatest.share:.0f}\u00a0%, comes from the {label}."
 
 
-COLOURED = frozenset({"model_misfit", "smoothed_sensor", "held_samples", "no_law_fits"})
-"""Findings on residuals that are not noise, or on a fit that does not describe the recording."""
+_NOT_NOISE = frozenset(
+    {
+        "held_samples",
+        "model_misfit",
+        "no_law_fits",
+        "not_sinusoidal",
+        "quantised",
+        "smoothed_sensor",
+        "stated_law_rejected",
+        "strongly_damped",
+    }
+)
+"""Codes of findings with which the residuals are not noise, or are not checked."""
 NAMED_LAWS = 2  # maximum number of named laws that cannot be ruled out
 
 
@@ -171,11 +179,12 @@ def damping_sentence(analysis: Analysis, *, coefficients: bool = False) -> str:
             "time instead of its coefficients."
         )
     possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
-    text = f"The amplitude falls by {chosen}"
-    if possible and not damping.by_statement:
-        text = f"{chosen[0].upper()}{chosen[1:]} fits best"
     if len(damping.best.law.parameters) == 1:
         text = f"The amplitude does not fall measurably in {span}"
+    elif possible and not damping.by_statement:
+        text = f"{chosen[0].upper()}{chosen[1:]} fits best"
+    else:
+        text = f"The amplitude falls by {chosen}"
     if damping.by_statement:
         text += ", as you stated"
     if coefficients:

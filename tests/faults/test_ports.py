@@ -371,7 +371,8 @@ def test_at_the_wrong_baud_rate_there_is_no_sample(name: str) -> None:
     result = run(name, seconds=0.2, faults=Faults(wrong_baud=True))
     assert len(result.samples) == 0
     held = result.chain.decoder.pending
-    assert sum(result.chain.decoder.faults.values()) + held > min(50, result.sent - 1) >= 0
+    assert result.sent > 0
+    assert sum(result.chain.decoder.faults.values()) + held >= min(51, result.sent)  # a polled sensor sends few
 
 
 def test_a_flood_costs_the_frame_it_hits() -> None:

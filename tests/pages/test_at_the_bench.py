@@ -20,7 +20,7 @@ from storage.run_file.reading import open_run
 
 SEEN = "() => samples.length && samples[0].count > {count}"
 PHASE = "() => bench().phase === '{phase}'"
-# What stands there for a moment only is kept by the page, since a busy computer may look too late.
+# The page itself records what it shows only briefly, because a busy computer may look too late.
 STAGES = """() => {
   const stage = document.getElementById('stage');
   window.stages = [];

@@ -25,8 +25,8 @@ from tests.pages.test_at_the_bench import PHASE, SEEN, STAGES, answer, press
 WIDTHS = {1366: 768, 768: 1024, 390: 844}
 FITTED = "() => motion && motion.estimates && motion.estimates.period && motion.estimates.period.u"
 WHOLE = "() => motion && motion.accuracy === 'standard' && motion.estimates"
-# While the recorder takes the rest position, the key does nothing and a request is refused visibly. In one turn of
-# the page, because that lasts three seconds only.
+# While the recorder measures the rest position, the key does nothing and a request is visibly refused. One call tests
+# both, because the measurement takes only three seconds.
 NOT_WHILE_BUSY = """() => {
   if (bench().phase !== 'still') return false;
   document.dispatchEvent(new KeyboardEvent('keydown', { key: 't', bubbles: true }));

@@ -74,7 +74,7 @@ def demand_printed_pairs(recording: Recording, data: bytes, sound: np.ndarray) -
     assert stated is not None
     for t, value in zip(samples.t[sound], stated[sound], strict=True):
         at = np.abs(known[:, 0] - t) <= 0.00051
-        # Where most times have fewer digits, they are the precision of the others too.
+        # If most times of a file have fewer digits, the others are placed to that many digits only.
         for digits in range(3):
             at |= np.abs(np.round(known[:, 0], digits) - t) <= 1e-9 * (1 + abs(t))
         assert not np.isfinite(value) or (np.abs(known[at, 1] / 100 - value) <= 1e-12 * (1 + abs(value))).any()
