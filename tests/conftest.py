@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Generator, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from types import ModuleType
 
 import numpy as np
@@ -19,10 +19,15 @@ from pipeline.windows.demodulate import Demodulated
 from tests import synthetic as synthetic_runs
 
 # A slow machine is no fault of the data: neither a deadline nor the check for slow generation holds here.
-settings.register_profile(
-    "springmass", derandomize=True, deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow]
-)
-settings.load_profile("springmass")
+for _profile, _examples in (("springmass", 20), ("nightly", 1000)):
+    settings.register_profile(
+        _profile,
+        derandomize=True,
+        deadline=None,
+        max_examples=_examples,
+        suppress_health_check=[HealthCheck.too_slow],
+    )
+settings.load_profile(os.environ.get("SPRINGMASS_EXAMPLES", "springmass"))
 
 # Hypothesis also draws constants that it finds in the project's modules that are imported by then, which depends on
 # the tests that the process ran before. No public setting turns that off; old versions do not draw them.
@@ -33,22 +38,6 @@ with contextlib.suppress(ImportError):
 
 # A job in the background is started with Ctrl-C ignored, and hands that on to the programs that the tests interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-
-# The tests of these folders analyse whole recordings, which coverage makes six times as slow. What they run is measured
-# by the tests of single modules.
-NOT_MEASURED = [Path(__file__).with_name(name) for name in ("extremes", "outputs", "properties", "recordings")]
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_call(item: pytest.Item) -> Generator[None]:
-    """Run the long tests without the measurement of coverage; pytest-cov's ``no_cover`` fails in several processes."""
-    trace = sys.gettrace()
-    if any(item.path.is_relative_to(folder) for folder in NOT_MEASURED):
-        sys.settrace(None)
-    try:
-        return (yield)
-    finally:
-        sys.settrace(trace)
 
 
 @pytest.fixture(autouse=True)
