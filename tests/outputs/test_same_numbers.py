@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import json
 import math
 from collections.abc import Mapping
@@ -13,21 +15,23 @@ import pytest
 
 import springmass as sm
 from pipeline.analyse import Oscillation
+from springmass.cli import main
+from springmass.errors import OK, UNREADABLE
 from springmass.page.feeds import view_of
 from springmass.page.live_analysis import Watcher
-from tests.outputs.play import run
-from tests.outputs.subjects import RECORDINGS
+from tests.sampling import sampled
 
+RECORDINGS = Path(__file__).resolve().parents[2].parent / "shared" / "recordings"
 WILD = {
+    "one of several runs, without a rate": (
+        "Mattia04__Smorzamento/Oscillazioni pretensionata_cd_5e7masse.csv",
+        {"run": "Run #2", "rate_hz": 20.0},
+    ),
     "one of several channels, with its unit": (
         "wild/coupled__maxi2321__trayectorias.csv",
         {"channel": "y_rojo", "unit": "cm"},
     ),
     "one of several rates": ("ubsuny__data-analysis-final20/Raw Data.csv", {"channel": "Gyroscope y"}),
-    "one of several runs, without a rate": (
-        "Mattia04__Smorzamento/Oscillazioni pretensionata_cd_5e7masse.csv",
-        {"run": "Run #2", "rate_hz": 20.0},
-    ),
     "three columns of a spreadsheet": ("EroSkulled__PHY224-324/Data2.csv", {"channel": "y", "unit": "cm"}),
     "a pair of files": (
         "kamjha__PHY224/position_osc.txt",
@@ -39,6 +43,14 @@ WILD = {
     ),
 }
 Numbers = dict[str, tuple[float, float | None]]
+
+
+def run(*arguments: str | Path) -> str:
+    """Run a command line that gives a result, if only that nothing oscillates; return what it printed."""
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()) as err:
+        assert main([str(argument) for argument in arguments]) in (OK, UNREADABLE), err.getvalue()
+    return out.getvalue()
 
 
 def options_of(answers: Mapping[str, Any]) -> list[str]:
@@ -54,7 +66,7 @@ def numbers_of(estimates: Mapping[str, Mapping[str, Any]]) -> Numbers:
 def compare_all(path: Path, answers: Mapping[str, Any], folder: Path, accuracy: str) -> Numbers:
     """Analyse a file in every way, assert that the numbers and the findings are the same, and return the numbers."""
     options = ["--accuracy", accuracy, *options_of(answers)]
-    (line,) = run("analyse", path, "--json", *options).out.splitlines()
+    (line,) = run("analyse", path, "--json", *options).splitlines()
     result = json.loads(line)
     numbers, codes = numbers_of(result["estimates"]), [finding["code"] for finding in result["findings"]]
     assert numbers
@@ -103,8 +115,7 @@ def compare_all(path: Path, answers: Mapping[str, Any], folder: Path, accuracy: 
     return numbers
 
 
-@pytest.mark.parametrize("accuracy", ["fast", "standard"])
-@pytest.mark.parametrize("name", ["undamped", "damped"])
+@pytest.mark.parametrize(("name", "accuracy"), [("undamped", "fast"), ("damped", "standard")])
 def test_a_bundled_recording_has_the_same_numbers_everywhere(tmp_path: Path, name: str, accuracy: str) -> None:
     """A file of MotionSensor.vi, alone."""
     numbers = compare_all(sm.sample_data() / f"{name}_simulated_position.txt", {}, tmp_path, accuracy)
@@ -123,13 +134,13 @@ def test_a_run_file_with_its_scene_has_the_same_numbers_everywhere(tmp_path: Pat
     data = sm.sample_data()
     path = tmp_path / "damped.h5"
     scene = ("--scene", data / "damped.scene.toml")
-    assert run("convert", data / "damped_simulated_position.txt", path, *scene).code == 0
+    run("convert", data / "damped_simulated_position.txt", path, *scene)
     numbers = compare_all(path, {}, tmp_path, "standard")
     assert "drag_coefficient" in numbers
 
 
 @pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/recordings")
-@pytest.mark.parametrize("name", WILD)
+@pytest.mark.parametrize("name", sampled(WILD))
 def test_a_real_recording_has_the_same_numbers_everywhere(tmp_path: Path, name: str) -> None:
     """With the answers to the questions of its reader, given as options and as arguments."""
     path, answers = WILD[name]
