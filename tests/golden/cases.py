@@ -9,6 +9,7 @@ OTHER, WEAK = "{0}/pankaj9um__PHY224/undamped_point_data.txt", "{0}/pankaj9um__P
 THIRD = "{0}/kamjha__PHY224/position_osc.txt"
 CAPSTONE = "{0}/filo0509__smorzamento/molla_durissima_discopieno_14.91945_0.2016_1.csv"
 WHOLE = "{2}/whole_bench.scene.toml"
+SCENES = ["--scene", "{1}/undamped.scene.toml", "--scene", "{1}/damped.scene.toml"]
 
 
 def further() -> list[list[str]]:
@@ -25,7 +26,7 @@ def further() -> list[list[str]]:
         (SHORT, LONG, OTHER, WEAK, THIRD),
     ]
     found = [["compare", *runs, "--scene", BENCH, "--json"] for runs in pairs]
-    found.append(["compare", SHORT, LONG, "--scene", BENCH, "--scene", WHOLE, "--json"])
+    found.append(["compare", SHORT, LONG, *SCENES, "--json"])
     for recording in (SHORT, LONG, OTHER, THIRD, WEAK):
         found.append(["simulate", "--scene", BENCH, "--against", recording, "--json"])
     for recording, seconds in ((SHORT, "5"), (OTHER, "5")):
