@@ -1,4 +1,4 @@
-"""Intervals cover the truth whenever one stops, and predicted uncertainties come true."""
+"""The forecast of how long to go on comes true."""
 
 from __future__ import annotations
 
@@ -7,24 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from springmass.page.stopping import more_seconds, widening
-
-
-def test_who_stops_when_it_looks_best_is_covered_nineteen_times_in_twenty() -> None:
-    """Of 4,000 estimates that are looked at 300 times each, those that ever leave their interval are under 5 %.
-
-    Two standard uncertainties, which cover a single look, are left by more than a quarter of them.
-    """
-    rng = np.random.default_rng(18)
-    information = np.geomspace(1.0, 1e4, 300)
-    steps = rng.standard_normal((4000, 300)) * np.sqrt(np.diff(information, prepend=0.0))
-    error = np.cumsum(steps, axis=1) / information
-    u = information**-0.5
-    reach = np.array([widening(each, wanted_u=0.05) for each in u]) * u
-    ever = (np.abs(error) > reach).any(axis=1).mean()
-    assert ever < 0.05
-    assert (np.abs(error) > 1.96 * u).any(axis=1).mean() > 0.25
-    assert widening(0.05, 0.05) < 3.1
+from springmass.page.stopping import more_seconds
 
 
 @pytest.mark.parametrize("rate_per_s", [0.0, 0.01, 0.05])

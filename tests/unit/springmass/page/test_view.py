@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import struct
 from pathlib import Path
 
@@ -17,9 +16,8 @@ from acquisition.decoders.registry import get_family
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from springmass.page.feeds import LogFeed, view_of
-from springmass.page.live_analysis import Watcher, drawn, motion_of, spectrum
-from springmass.page.view import MOST_PER_MESSAGE, Series, json_of
-from springmass.runs.loading import between
+from springmass.page.live_analysis import motion_of
+from springmass.page.view import MOST_PER_MESSAGE, Series
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
 
@@ -86,65 +84,6 @@ def test_the_motion_of_a_run_is_that_of_an_analysis() -> None:
     assert np.median(np.abs(curve / message["amplitude"]["value"] - 1.0)) < 0.01
 
 
-def test_what_does_not_move_is_said() -> None:
-    """In the analysis's own words, with the spectrum of what is there."""
-    rng = np.random.default_rng(3)
-    t = np.arange(2000) / 100
-    track = springmass.Track.from_arrays(t, 0.3 + 1e-4 * rng.standard_normal(2000))
-    message = motion_of(track, Scene(), 20e-6)
-    assert message["why"]
-    assert "period" not in message["estimates"]
-    assert len(message["spectrum"]["f"]) == len(message["spectrum"]["value"]) > 100
-
-
-def test_a_line_of_the_spectrum_has_its_amplitude() -> None:
-    """At its frequency, whatever is missing."""
-    t = np.arange(8192) / 100
-    y = 0.2 + 0.05 * np.cos(2 * np.pi * (t[1] ** -1 * 100 / 8192) * t)
-    y[::500] = np.nan
-    found = spectrum(springmass.Track.from_arrays(t, y))
-    peak = int(np.argmax(found["value"]))
-    assert found["value"][peak] == pytest.approx(0.05, rel=0.02)
-    assert found["f"][peak] == pytest.approx(100 * 100 / 8192, abs=0.06)
-
-
-@pytest.mark.parametrize(("far", "direction"), [(False, "away"), (True, "nearer")])
-def test_what_cuts_the_motion_says_how_far_to_move(far: bool, direction: str) -> None:
-    """50 mm of swing cut at 35: what is lost and a centimetre to spare, away from the near end or nearer to the far."""
-    t = np.arange(3000) / 100
-    y = 0.25 + 0.05 * np.exp(-0.005 * t) * np.cos(8.0 * t) + 3e-4 * np.random.default_rng(2).standard_normal(t.size)
-    y = np.minimum(y, 0.285) if far else np.maximum(y, 0.215)
-    message = motion_of(Track(t, y, np.zeros(t.size, np.uint8), 100.0, clock="device"), Scene.from_mapping({}))
-    (finding,) = (each for each in message["findings"] if each["code"] == "clipped")
-    assert finding["advice"] == f"Move the sensor 3 cm {direction}."
-
-
-@pytest.mark.parametrize("size", [1e-9, 1.0, 1e6])
-def test_curves_are_told_to_seven_digits(size: float) -> None:
-    """Of any size; what is no number stays none, and JSON calls it null."""
-    values = size * np.concatenate([np.random.default_rng(5).standard_normal(500), [0.0, np.nan, np.inf]])
-    curve = drawn(values)
-    np.testing.assert_allclose(curve, values, rtol=6e-7)
-    text = json_of(curve)
-    assert text.endswith("0.0, null, null]")
-    assert len(text) < 16 * len(curve)
-
-
-def test_a_bob_at_rest_has_numbers_too() -> None:
-    """Rest position, noise, rate and the share of drop-outs, each with its uncertainty; one in ten is missing."""
-    t = np.arange(1000) / 100
-    y = 0.25 + 3e-4 * np.random.default_rng(3).standard_normal(t.size)
-    y[::10] = np.nan
-    message = motion_of(Track(t, y, np.zeros(t.size, np.uint8), 100.0, clock="device"), Scene.from_mapping({}))
-    found = message["estimates"]
-    assert message["why"]
-    assert found["drop_outs"]["value"] == pytest.approx(10.0)
-    assert found["drop_outs"]["u"] == pytest.approx(100.0 * np.sqrt(0.1 * 0.9 / 1000), rel=0.02)
-    assert found["sample_rate"]["value"] == pytest.approx(100.0)
-    assert found["sample_rate"]["u"] > 1e-3
-    assert found["noise"]["value"] == pytest.approx(3e-4, rel=0.1)
-
-
 def test_the_fit_decays_as_its_law() -> None:
     """The curve that the page draws on from the last window is the motion itself, half a minute later too."""
     t = np.arange(3000) / 100
@@ -197,38 +136,6 @@ def test_marks_and_triggers_wait_for_the_first_sample(tmp_path: Path) -> None:
     assert feed.view.track().trigger_s == loaded.track.trigger_s == pytest.approx(3.0, abs=0.01)
     assert view_of(loaded).zero == feed.view.zero
     feed.close()
-
-
-def test_peaks_of_the_spectrum_are_lines_and_not_noise() -> None:
-    """Two swings give two peaks at their frequencies and amplitudes; noise alone gives none in 49 of 50 spectra."""
-    rng = np.random.default_rng(11)
-    t = np.arange(8192) / 100
-    y = (
-        0.3
-        + 0.02 * np.cos(2 * np.pi * 1.3 * t)
-        + 0.002 * np.cos(2 * np.pi * 2.9 * t)
-        + 1e-4 * rng.standard_normal(t.size)
-    )
-    peaks = spectrum(Track.from_arrays(t, y))["peaks"]
-    assert [peak["f"] for peak in peaks] == pytest.approx([1.3, 2.9], abs=3e-4)
-    assert [peak["value"] for peak in peaks] == pytest.approx([0.02, 0.002], rel=0.2)
-    noise = [spectrum(Track.from_arrays(t, rng.standard_normal(t.size)))["peaks"] for _ in range(50)]
-    assert sum(map(bool, noise)) <= 1
-
-
-def test_a_moment_has_the_numbers_of_its_samples_and_no_forecast() -> None:
-    """Half way through a run the page shows what the samples so far amount to, and not how long to go on."""
-    loaded = springmass.load(springmass.sample_data() / "damped_simulated_position.txt")
-    watcher = Watcher(view_of(loaded), loaded.scene, None)
-    try:
-        found = json.loads(watcher.moment(40.0))
-    finally:
-        watcher.close()
-    expected = motion_of(between(loaded.track, -np.inf, 40.0), Scene())
-    assert (found["type"], found["to"], found["accuracy"]) == ("moment", 40.0, "fast")
-    assert found["estimates"] == json.loads(json_of(expected["estimates"]))
-    assert found["t_s"] <= 40.0
-    assert "stop" not in found
 
 
 def test_a_log_that_has_ended_is_analysed_on_the_page_as_anywhere_else(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -15,12 +14,10 @@ import pytest
 from acquisition.block import Block, concatenate
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
-from acquisition.live.line import Transport
 from acquisition.readings import Read, Readings
 from springmass.session import reads
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
-from springmass.session.sensors import Sensor
 from storage.recorder import Recorder
 
 STEP_NS = 10_000_000
@@ -142,24 +139,6 @@ def test_a_defect_of_a_decoder_costs_no_byte_and_ends_nothing(monkeypatch: pytes
     assert list(failures.counts.values()) == [5]
 
 
-def test_a_polled_sensor_is_asked_by_the_decoder_that_hears_its_replies() -> None:
-    """The one of the chain in use, also after a recording has begun with another; a sensor that sends is not asked."""
-    family = get_family("us100")
-    first, second = (SensorChain(family, options={"temperature_every": 1}) for _ in range(2))
-    tee = Tee([first, chain()])
-    sensor = Sensor(family, cast(Transport, SimpleNamespace(name="port")))
-    line = tee.line(0, [sensor])
-    assert line.poll is family.poll
-    assert line.decoder is not None
-    assert line.decoder() is first.decoder
-    tee.reads([(0, 1, bytes([1, 44]))])
-    assert line.decoder().request == b"\x50"
-    started(tee, [second, chain()], 0)
-    assert line.decoder() is second.decoder
-    assert line.decoder().request == b"\x55"
-    assert tee.line(0, [replace(sensor, family=get_family("ffhls"))]).decoder is None
-
-
 def test_a_run_begins_with_the_reads_kept_from_before() -> None:
     """From the moment asked for on, each once, whether or not it was decoded before; breaks are no bytes."""
     tee = Tee([chain()])
@@ -177,75 +156,3 @@ def test_a_run_begins_with_the_reads_kept_from_before() -> None:
     assert [host_ns // STEP_NS for _, host_ns, _ in log.taken] == list(range(5, 21))
     np.testing.assert_allclose(block.t, met(range(5, 21)) - 0.05, atol=1e-12)
     assert block.first == 0
-
-
-def test_the_first_bytes_are_kept_and_no_more() -> None:
-    """So that silence or garbage can be described, with a bounded number of bytes."""
-    tee = Tee([chain()])
-    for _ in range(200):
-        tee.reads([(0, 0, b"x" * 100)])
-    assert tee.heard(0) == b"x" * reads.HEARD_BYTES
-
-
-def test_another_sensor_on_a_port_is_recorded_in_a_channel_of_its_own() -> None:
-    """From the first byte on, and the one after it in the next; the channels of other ports stay."""
-    sensor = Sensor(get_family("line-protocol"), cast(Transport, SimpleNamespace(name="port", identified=False)))
-    chains = [chain(), chain()]
-    tee = Tee(chains)
-    for port in range(2):
-        tee.line(port, [sensor, sensor])
-    log = started(tee, chains, 0)
-    for turn in range(3):
-        tee.reads([(0, turn * STEP_NS, frame(turn)), (1, turn * STEP_NS, frame(100 + turn))])
-        tee.event(0, turn * STEP_NS, "lost", {"why": "cable"})
-        tee.event(0, turn * STEP_NS, "reopened", {"port": "port", "gap_s": 0.5, "sensor": "another"})
-        tee.event(1, turn * STEP_NS, "lost", {})
-        tee.event(1, turn * STEP_NS, "reopened", {"sensor": "continued"})
-    assert [channel for channel, _, _ in log.taken] == [0, 1, 2, 1, 3, 1]
-    kinds = [" ".join(event.split()[0:3:2]) for event in log.events]
-    assert kinds[:6] == ["0 lost", "0 replaced", "2 continues", "1 lost", "1 reopened", "2 lost"]
-    assert json.loads(log.events[2].split(maxsplit=3)[3])["of"] == 0
-    assert json.loads(log.events[1].split(maxsplit=3)[3])["channel"] == 2
-    assert [len(each) for each in chains] == [1, 3, 1, 1, 0]
-    assert tee.gone == {}
-
-
-def test_before_a_recording_whatever_comes_back_is_what_will_be_recorded() -> None:
-    """In a preview there is no run that another sensor could spoil."""
-    sensor = Sensor(get_family("line-protocol"), cast(Transport, SimpleNamespace(name="port", identified=False)))
-    chains, log = [chain()], Log()
-    tee = Tee(chains)
-    tee.line(0, [sensor])
-    tee.start(cast(Recorder, log), chains, 0, preview=True)
-    tee.event(0, 0, "lost", {})
-    tee.event(0, 1, "reopened", {"sensor": "another"})
-    tee.reads([(0, 2, frame(0))])
-    assert [channel for channel, _, _ in log.taken] == [0]
-
-
-def test_a_sensor_of_which_no_byte_tells_is_taken_for_the_same_and_noted() -> None:
-    """Unless the serial number of its adapter says that it is."""
-    for identified, noted in ((True, "identified"), (False, "assumed")):
-        transport = cast(Transport, SimpleNamespace(name="port", identified=identified))
-        tee = Tee([chain()])
-        tee.line(0, [Sensor(get_family("us100"), transport)])
-        log = started(tee, [chain()], 0)
-        tee.event(0, 0, "reopened", {})
-        assert json.loads(log.events[0].split(maxsplit=3)[3]) == {"sensor": noted}
-
-
-def test_a_run_that_a_trigger_begins_holds_nothing_from_before_a_replug() -> None:
-    """The port came back while the trigger waited: what was kept from before may be another sensor's, and goes."""
-    sensor = Sensor(get_family("line-protocol"), cast(Transport, SimpleNamespace(name="/dev/x", identified=False)))
-    tee, log, new = Tee([chain()], Failures()), Log(), chain()
-    tee.line(0, [sensor])
-    tee.keep()
-    tee.reads([(0, i * STEP_NS, frame(i)) for i in range(100)])
-    tee.event(0, 101 * STEP_NS, "lost", {"why": "unplugged"})
-    tee.event(0, 150 * STEP_NS, "reopened", {"sensor": "another", "gap_s": 0.5})
-    after = [(0, i * STEP_NS, frame(100_000 + i)) for i in range(150, 300)]
-    tee.reads(after)
-    tee.start(cast(Recorder, log), [new], 0)
-    assert log.taken == after
-    (found,) = (block for _, block in tee.blocks())
-    assert np.ptp(found.t) == pytest.approx(149 * STEP_NS * 1e-9, abs=0.01)
