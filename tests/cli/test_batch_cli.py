@@ -60,23 +60,6 @@ def test_a_folder_becomes_a_table_a_page_and_reports(runs, cli):
     assert "unchanged" in Path("out/batch.log").read_text()
 
 
-def test_csv_parquet_duckdb_and_the_facade_read_the_same(runs, cli):
-    """Pandas, DuckDB and springmass.results agree to the last bit."""
-    import duckdb
-
-    assert cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK).code == 0
-    frame = springmass.results("out")
-    by_csv = pd.read_csv("out/results.csv")
-    assert (by_csv["period"] == frame["period"]).all()
-    assert (pd.read_parquet("out/results.parquet")["period"] == frame["period"]).all()
-    read = duckdb.sql("select run, period from 'out/results.parquet' order by run").fetchall()
-    assert read == list(zip(frame["run"], frame["period"], strict=True))
-    data = springmass.results("out", form="dataset")
-    assert data["period"].dims == ("run",)
-    assert data["period"].sel(run="run002").item() == frame["period"][2]
-    assert data["period"].attrs["units"] == "s"
-
-
 def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli):
     """What was touched is read, and kept; another content, scene or accuracy is analysed."""
     command = ("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
@@ -164,54 +147,6 @@ def test_bad_files_fail_alone(tmp_path, monkeypatch, cli, good):
     assert f"{good + len(bad)} unchanged, 0 analysed, {len(bad)} failed" in done.err
 
 
-def test_a_run_without_oscillation_is_named(runs, cli):
-    """A bob at rest is a row without a period, a failure in words."""
-    import numpy as np
-
-    write_recording(runs / "still.txt", 0.2 + 3e-4 * np.random.default_rng(1).standard_normal(800))
-    done = cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
-    assert done.code == 1
-    assert rows("out")[-1]["status"] == "no_oscillation"
-    assert "still.txt: no oscillation" in done.err
-
-
-def dies_at_run000(jobs: Sequence[Job]) -> list[dict[str, Any]]:
-    """Analyse runs in a worker process that is killed at one of them."""
-    if any(job.path.endswith("run000.txt") for job in jobs):
-        os.kill(os.getpid(), signal.SIGKILL)
-    return analyse_many(jobs)
-
-
-def test_a_run_that_kills_its_worker_is_a_row_and_tried_again(runs, cli, monkeypatch):
-    """The other runs are analysed and the table is made; the next pass analyses the run."""
-    with monkeypatch.context() as patched:
-        patched.setattr(running, "analyse_many", dies_at_run000)
-        done = cli("batch", runs, "-o", "out", "--jobs", "2", *QUICK)
-    assert done.code == 1
-    assert [row["status"] for row in rows("out")] == ["ended", *["ok"] * 5]
-    (line,) = (line for line in done.err.splitlines() if "run000.txt" in line)
-    assert line == f"springmass: {rows('out')[0]['error']}"
-    done = cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
-    assert "5 unchanged, 1 analysed, 0 failed" in done.err
-    assert [row["status"] for row in rows("out")] == ["ok"] * 6
-
-
-def test_a_file_that_changes_while_it_is_analysed_is_analysed_by_the_next_pass(runs, cli, monkeypatch):
-    """The pass ends with what it read; the next one reads the change."""
-
-    def changed(jobs):
-        made = analyse_many(jobs)
-        shutil.copy(runs / "run001.txt", runs / "run000.txt")
-        return made
-
-    with monkeypatch.context() as patched:
-        patched.setattr(running, "analyse_many", changed)
-        assert cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK).code == 0
-    assert "5 unchanged, 1 analysed" in cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK).err
-    table = rows("out")
-    assert table[0]["period"] == table[1]["period"]
-
-
 def test_lists_patterns_and_folders_in_folders_are_inputs(runs, cli):
     """A list names files, a pattern finds them, folders are looked into; a file that several name is one run."""
     (runs / "late").mkdir()
@@ -277,77 +212,12 @@ def test_a_wrong_table_is_one_line(runs, cli, table, named):
     assert not Path("out/results.csv").exists()
 
 
-def test_a_report_on_demand_is_linked(runs, cli):
-    """By the run's name or its path; a wrong name is answered with the nearest."""
-    cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
-    done = cli("report", "out", "runs/run004.txt")
-    assert done.code == 0
-    assert Path("out/reports/run004.results/report.html").is_file()
-    assert 'href="reports/run004.results/report.html"' in Path("out/index.html").read_text()
-    assert "did you mean run004?" in cli("report", "out", "run04").complaint
-
-
 def test_two_passes_do_not_share_a_folder(runs, cli):
     """The second pass is refused while the first one runs."""
     with Store(Path("out")).held():
         done = cli("batch", runs, "-o", "out")
     assert done.code == 2
     assert "another pass" in done.complaint
-
-
-def test_a_damaged_part_costs_its_runs_alone(runs, cli, monkeypatch):
-    """A part that was cut is named and its runs are analysed again; the results are those of a clean pass."""
-    monkeypatch.setattr(store, "PART", 2)
-    command: tuple[str | Path, ...] = ("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
-    cli(*command)
-    before = contents(Path("out"))
-    part, *_ = sorted(Path("out/parts").glob("*.jsonl"))
-    part.write_bytes(part.read_bytes()[:-5])
-    assert cli("catalog", "out").code == 3
-    done = cli(*command)
-    assert done.code == 0
-    assert str(part) in done.err
-    assert "4 unchanged, 2 analysed" in done.err
-    assert contents(Path("out")) == before
-
-
-@pytest.mark.parametrize("name", ["results.csv", "results.parquet", "index.html"])
-def test_an_edited_table_is_kept_and_made_anew(runs, cli, name):
-    """Neither edited nor cut tables are believed: they are kept under another name, which a line states."""
-    command: tuple[str | Path, ...] = ("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
-    cli(*command)
-    before = contents(Path("out"))
-    kept = []
-    for number in (1, 2):
-        kept.append(before[name][: -10 * number])
-        Path("out", name).write_bytes(kept[-1])
-        done = cli(*command)
-        assert done.code == 0
-        assert "6 unchanged, 0 analysed" in done.err
-        assert name in done.err.splitlines()[-3]
-    after = contents(Path("out"))
-    assert [after.pop(f"{name}.edited"), after.pop(f"{name}.edited-2")] == kept
-    assert after == before
-
-
-def test_an_edited_table_is_not_believed(runs, cli):
-    """What catalog lists are the numbers that were measured."""
-    cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
-    before = cli("catalog", "out").out
-    table = Path("out/results.csv")
-    table.write_text(table.read_text("utf-8").replace(",0.7", ",9.7"), "utf-8")
-    assert cli("catalog", "out").out == before
-
-
-def test_a_table_that_is_missing_is_made(runs, cli):
-    """A table or page that somebody removed is made again, without an analysis."""
-    command: tuple[str | Path, ...] = ("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
-    cli(*command)
-    before = contents(Path("out"))
-    for name in ("results.csv", "index.html"):
-        Path("out", name).unlink()
-    assert "6 unchanged, 0 analysed" in cli(*command).err
-    assert contents(Path("out")) == before
 
 
 def test_a_file_with_brackets_in_its_name_is_a_file_and_no_pattern(runs, cli):
@@ -359,10 +229,3 @@ def test_a_file_with_brackets_in_its_name_is_a_file_and_no_pattern(runs, cli):
     (row,) = rows("out")
     assert row["path"].endswith("run [1].txt")
     assert row["bob_mass_kg"] == "0.2"
-
-
-def test_a_mistyped_option_reaches_the_terminal_escaped(runs, cli):
-    """What somebody pasted steers no terminal."""
-    done = cli("batch", runs, "--jobs", "1\x1b[2J")
-    assert done.code == 2
-    assert "\x1b" not in done.err

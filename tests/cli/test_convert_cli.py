@@ -52,32 +52,6 @@ def test_a_pair_comes_back_into_a_folder(cli: Cli, data: Path, tmp_path: Path) -
     assert np.isfinite(velocity).sum() > 900
 
 
-def test_a_pair_needs_a_folder(cli: Cli, data: Path, tmp_path: Path) -> None:
-    """Two originals do not fit into one name."""
-    position, velocity = (data / f"undamped_simulated_{what}.txt" for what in ("position", "velocity"))
-    assert cli("convert", position, tmp_path / "run.h5", "--velocity", velocity).code == 0
-    done = cli("convert", tmp_path / "run.h5", tmp_path / "back.txt")
-    assert done.code == 2
-    assert "2 originals travel inside" in done.complaint
-    assert "name an existing folder" in done.complaint
-
-
-def test_a_pair_of_one_name_comes_back_under_two(cli: Cli, data: Path, tmp_path: Path) -> None:
-    """Position and velocity are often both called data.txt, in separate folders."""
-    whole = {}
-    for what in ("position", "velocity"):
-        (tmp_path / what).mkdir()
-        whole[what] = (data / f"undamped_simulated_{what}.txt").read_bytes()
-        (tmp_path / what / "data.txt").write_bytes(whole[what])
-    run, folder = tmp_path / "run.h5", tmp_path / "back"
-    folder.mkdir()
-    velocity = tmp_path / "velocity" / "data.txt"
-    assert cli("convert", tmp_path / "position" / "data.txt", run, "--velocity", velocity).code == 0
-    assert cli("convert", run, folder).code == 0
-    assert (folder / "data.txt").read_bytes() == whole["position"]
-    assert (folder / "data-2.txt").read_bytes() == whole["velocity"]
-
-
 def test_an_original_chooses_no_folder(cli: Cli, recording: Path, tmp_path: Path) -> None:
     """A name from outside that climbs out of the folder keeps its last part alone."""
     loaded = springmass.load(recording)
@@ -143,14 +117,6 @@ def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp
         assert b.scene == springmass.read_scene(data / "undamped.scene.toml").to_mapping()
 
 
-def test_other_suffixes_are_refused(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """What is not known to be written is not guessed."""
-    done = cli("convert", recording, tmp_path / "run.mat")
-    assert done.code == 2
-    assert "one of .h5, .hdf5, .nxs, .txt, .lvm, .csv; got .mat" in done.complaint
-    assert cli("convert", recording, tmp_path / "run").complaint.endswith("got no suffix")
-
-
 @pytest.mark.parametrize("suffix", [".txt", ".lvm", ".csv"])
 @pytest.mark.parametrize("name", ["undamped_simulated_position.txt", "sixty_hz_simulated_position.txt"])
 def test_what_is_written_in_another_form_reads_back(
@@ -177,28 +143,6 @@ def test_a_pair_written_is_a_pair_read(cli: Cli, data: Path, tmp_path: Path) -> 
     np.testing.assert_allclose(pair.samples.velocity[1:], expected, atol=1.1e-5)
 
 
-def test_a_pair_is_written_whole_or_not_at_all(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """A velocity file that stands there keeps the position from being written."""
-    (tmp_path / "back_velocity.txt").write_bytes(b"mine")
-    done = cli("convert", recording, tmp_path / "back.txt")
-    assert done.code == 2
-    assert not (tmp_path / "back.txt").exists()
-    assert cli("convert", recording, tmp_path / "back.txt", "--overwrite").code == 0
-    assert (tmp_path / "back_velocity.txt").read_bytes() != b"mine"
-
-
-def test_a_run_file_becomes_what_its_original_was_not(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """Of the original's suffix the original comes back bit for bit; of another the samples are written."""
-    run = tmp_path / "run.h5"
-    assert cli("convert", recording, run).code == 0
-    assert cli("convert", run, tmp_path / "a.txt").code == 0
-    assert (tmp_path / "a.txt").read_bytes() == recording.read_bytes()
-    assert cli("convert", run, tmp_path / "a.lvm").code == 0
-    np.testing.assert_allclose(
-        springmass.load(tmp_path / "a.lvm").samples.distance, springmass.load(run).samples.distance, atol=1e-12
-    )
-
-
 def test_what_a_form_has_no_room_for_is_told(cli: Cli, write: Any, rows: list[bytes], tmp_path: Path) -> None:
     """Flags are lost in rows of numbers; times that a form cannot tell apart are refused."""
     recording = write([*rows[:50], rows[49], *rows[50:]])
@@ -215,16 +159,6 @@ def test_what_a_form_has_no_room_for_is_told(cli: Cli, write: Any, rows: list[by
     assert springmass.load(tmp_path / "b.lvm").info.rate_hz == 10_000.0
 
 
-def test_a_run_without_originals_has_nothing_to_give_back(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """That is said, not an empty file written."""
-    loaded = springmass.load(recording)
-    run = springmass.write_run(tmp_path / "live.h5", [loaded.samples], loaded.info)
-    done = cli("convert", run, tmp_path / "back.dat")
-    assert done.code == 3
-    assert "no original file travels inside" in done.complaint
-    assert not (tmp_path / "back.dat").exists()
-
-
 def test_an_empty_run_is_converted_too(cli: Cli, tmp_path: Path, recording: Path) -> None:
     """A run stopped before its first sample still gives back what travels inside; only analysing it fails."""
     info = springmass.load(recording).info
@@ -236,13 +170,6 @@ def test_an_empty_run_is_converted_too(cli: Cli, tmp_path: Path, recording: Path
     assert (done.code, done.out) == (3, "")
     assert str(run) in done.complaint
     assert "the record holds no sample" in cli("analyse", "--json", "--from", "1", run).complaint
-
-
-def test_a_folder_that_is_missing_is_a_usage_error(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """The line says to make it."""
-    done = cli("convert", recording, tmp_path / "absent" / "run.h5")
-    assert done.code == 2
-    assert "make the folder first" in done.complaint
 
 
 @pytest.mark.parametrize("option", [("--rate-hz", "100"), ("--unit", "cm"), ("--channel", "distance"), ("--run", "1")])

@@ -48,21 +48,6 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return top / "out"
 
 
-def test_the_catalog_lists_what_an_expression_selects(course, cli):
-    """By a tag and an uncertainty, sorted, as CSV and as JSON; an expression that is none is one line."""
-    where = "section = 'A' and period_u < 1e-4"
-    done = cli("catalog", course, "--where", where, "--sort=-period", "--columns", "run,period,section")
-    listed = list(csv.DictReader(done.out.splitlines()))
-    assert {row["run"] for row in listed[:2]} == {"run2", "run6"}  # the heavier bobs
-    assert {row["run"] for row in listed[2:]} == {"run0", "run4"}
-    assert {row["section"] for row in listed} == {"A"}
-    (row,) = (json.loads(line) for line in cli("catalog", course, "--where", "run = 'run3'", "--json").out.splitlines())
-    assert row["run"] == "run3"
-    wrong = cli("catalog", course, "--where", "secton = 'A'")
-    assert wrong.code == 2
-    assert "secton" in wrong.complaint
-
-
 def test_a_course_is_compared_by_spring_and_disc(course, cli):
     """One spring constant of all runs, one drag coefficient a disc, scatter within and between benches."""
     done = cli("compare", course, "--json")
@@ -77,28 +62,3 @@ def test_a_course_is_compared_by_spring_and_disc(course, cli):
         assert found["drag_coefficient", disc]["mean"]["value"] == pytest.approx(drag, rel=0.03)
     assert compared["suspects"] == []
     assert "counts all damping as drag" in cli("compare", course, "--where", "disc = 'thin'").out
-
-
-def test_the_map_holds_the_drag_that_was_put_in(course, cli, tmp_path):
-    """At every amplitude the coefficient of the closed form, at its Re and KC; the figure as SVG and PDF."""
-    done = cli("map", course, "--out", tmp_path)
-    assert done.code == 0
-    assert {path.name for path in tmp_path.glob("drag-map.*")} == {"drag-map.svg", "drag-map.pdf", "drag-map.csv"}
-    with (tmp_path / "drag-map.csv").open(newline="") as file:
-        points = list(csv.DictReader(file))
-    assert len(points) == 8 * 8
-    eta = 1.813e-5  # Pa s, of air at 20 degrees
-    for i, point in enumerate(points):
-        bob_kg, disc = BOBS_KG[i // 8 % 4], ("thin", "thick")[i // 32]
-        assert (point["run"], point["disc"]) == (f"run{i // 8}", disc)
-        coefficient, u = float(point["drag_coefficient"]), float(point["drag_coefficient_u"])
-        assert coefficient == pytest.approx(DRAG[disc], abs=4.0 * u)
-        assert u < 0.1 * DRAG[disc]
-        kc, reynolds = float(point["keulegan_carpenter_number"]), float(point["reynolds_number"])
-        omega = math.sqrt(K / (bob_kg + SPRING_KG / 3.0 + RHO * DIAMETER_M**3 / 3.0))
-        amplitude = kc * DIAMETER_M / (2.0 * math.pi)
-        assert amplitude < 0.0505
-        assert reynolds == pytest.approx(RHO * omega * amplitude / math.sqrt(2.0) * DIAMETER_M / eta, rel=0.01)
-    first = [float(point["keulegan_carpenter_number"]) for point in points[7::8]]
-    assert first == pytest.approx([2.0 * math.pi * 0.05 / DIAMETER_M] * 8, rel=0.03)
-    assert cli("map", course, "--where", "disc = 'none'", "--out", tmp_path).code == 3

@@ -29,15 +29,6 @@ def test_this_installation_is_whole(cli: Cli) -> None:
     assert all(check["ok"] for check in checks)
 
 
-def test_the_packages_are_those_of_this_distribution() -> None:
-    """Each is imported from the folder that the program names: next to it in a checkout, inside it from a wheel."""
-    assert foreign_packages() == {}
-    for name in PACKAGES:
-        module = importlib.import_module(PREFIX + name)
-        assert Path(str(module.__file__)).resolve().parent == part(name)
-    assert distribution("springmass").version == springmass.__version__
-
-
 def python(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the program with a folder first on the path."""
     code = f"import sys; sys.path.insert(0, {str(folder)!r}); from springmass.cli import main; sys.exit(main())"
@@ -68,13 +59,6 @@ def test_a_foreign_package_is_found(foreign: Path) -> None:
     assert "install springmass into a virtual environment" in done.stdout
 
 
-@pytest.mark.skipif(not PREFIX, reason="a checkout imports the packages by their own names")
-def test_a_foreign_package_next_to_a_wheel_does_no_harm(foreign: Path) -> None:
-    """Whoever installed a wheel may have other packages of the same names."""
-    done = python(foreign, "doctor")
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 @in_a_checkout
 def test_a_foreign_package_breaks_other_commands_in_one_line(tmp_path: Path) -> None:
     """Whoever has not asked the doctor is sent there."""
@@ -93,11 +77,3 @@ def test_a_missing_library_is_found(cli: Cli, monkeypatch: pytest.MonkeyPatch) -
     assert (done.code, done.err) == (1, "")
     assert "FAIL  library no_such_library_at_all" in done.out
     assert "install springmass again" in done.out
-
-
-def test_missing_recordings_are_found(cli: Cli, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """An installation without its bundled files says so."""
-    monkeypatch.setattr("springmass.runs.loading.part", lambda name: tmp_path / name)
-    done = cli("doctor")
-    assert done.code == 1
-    assert "FAIL  bundled recordings" in done.out

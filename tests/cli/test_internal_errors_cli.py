@@ -35,18 +35,6 @@ def test_a_defect_is_one_line_and_a_file(
     assert "Traceback" in details.read_text(encoding="utf-8")
 
 
-def test_without_a_place_for_the_file_the_traceback_goes_to_stderr(
-    cli: Cli, recording: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """Nothing is lost where nothing can be written."""
-    monkeypatch.setattr("springmass.commands.analyse.load", defect)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "absent"))
-    done = cli("analyse", recording, "--no-report")
-    assert done.code == INTERNAL
-    assert "Traceback" in done.err
-    assert done.err.splitlines()[-1].startswith("springmass: internal error: KeyError")
-
-
 def test_a_defect_met_on_one_of_several_inputs_leaves_the_others(
     cli: Cli, recording: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -67,18 +55,6 @@ def test_a_defect_met_on_one_of_several_inputs_leaves_the_others(
     assert "period" in done.out
 
 
-def test_a_defect_in_a_batch_is_a_failed_run(
-    cli: Cli, recording: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """The batch goes on, and the row says what happened."""
-    monkeypatch.setattr("springmass.runs.analysing.analyse", defect)
-    done = cli("batch", recording, "-o", tmp_path / "course", "--jobs", "1", "--reports", "0")
-    assert done.code != INTERNAL
-    table = (tmp_path / "course/results.csv").read_text(encoding="utf-8")
-    assert "failed" in table
-    assert "internal error: KeyError" in table
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("arguments", [["analyse", "--no-report"], ["formats"], ["analyse", "--json"]])
 def test_a_full_output_is_one_line(recording: Path, arguments: list[str]) -> None:
@@ -94,24 +70,6 @@ def test_a_full_output_is_one_line(recording: Path, arguments: list[str]) -> Non
     assert done.returncode == USAGE
     (line,) = done.stderr.splitlines()
     assert line.startswith("springmass: standard output cannot be written")
-
-
-@pytest.mark.parametrize("port", ["99999", "-1", "abc"])
-def test_a_port_that_cannot_be_is_refused(cli: Cli, recording: Path, port: str) -> None:
-    """TCP has ports from 0 to 65535."""
-    done = cli("page", recording, f"--page-port={port}", "--no-browser")
-    assert done.code == USAGE
-    assert port in done.err.splitlines()[-1]
-
-
-@pytest.mark.parametrize("option", ["--jobs", "--reports"])
-def test_a_count_that_is_no_number_is_refused_in_words(cli: Cli, recording: Path, option: str) -> None:
-    """The line names the value, and no function of the program."""
-    done = cli("batch", recording, option, "abc")
-    assert done.code == USAGE
-    assert "'abc'" in done.err.splitlines()[-1]
-    assert "_count" not in done.err
-    assert "_whole" not in done.err
 
 
 def test_quiet_holds_for_one_command_alone(cli: Cli, recording: Path) -> None:

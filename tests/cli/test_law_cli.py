@@ -126,20 +126,3 @@ def test_batch_lists_undetermined_coefficients(cli: Callable[..., Done], run: Pa
     assert row["one_law"] == ""
     assert row["undetermined"] == "gamma beta"
     assert float(row["beta_u"]) > abs(float(row["beta"]))
-
-
-def test_a_law_does_nothing_for_a_recording_without_a_page(cli: Callable[..., Done], run: Path) -> None:
-    """Nothing of the terminal's display depends on it."""
-    bench = run.parent / "bench.toml"
-    bench.write_text("[bob]\nmass_kg = 0.2\n")
-    done = cli("record", "--simulate", bench, "--law", "linear", "--seconds", "1", "-o", run.parent / "x.h5")
-    assert done.code == 2
-    assert "--law does nothing without --page" in done.complaint
-
-
-def test_results_json_of_a_report_is_the_same(cli: Callable[..., Done], run: Path) -> None:
-    """results.json in the report's folder holds the stated law."""
-    assert cli("analyse", run, "--law", "linear", "-o", run.parent / "out").code == 0
-    result = json.loads((run.parent / "out" / "bob.results" / "results.json").read_text())
-    result = result[0] if isinstance(result, list) else result
-    assert result["damping"]["stated"] == "linear"

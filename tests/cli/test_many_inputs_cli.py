@@ -89,38 +89,9 @@ def test_a_log_beside_its_run_file_is_no_second_run(cli: Cli, bench: Path, data:
     assert len(done.results) == 3
 
 
-def test_findings_of_several_runs_stand_once(cli: Cli, bench: Path) -> None:
-    """A finding that many runs have is one paragraph that counts them."""
-    (bench / "bare.toml").write_text("[bob]\nmass_kg = 0.2\n[spring]\nmass_kg = 0.01\n")
-    done = cli("analyse", bench, "--no-report", "--scene", bench / "bare.toml")
-    assert done.out.count("uncertainty_missing") == 1
-    assert "uncertainty_missing, 2 of 2 runs (damped_simulated_position, undamped_simulated_position): the first:" in (
-        " ".join(done.out.split())
-    )
-
-
 def test_velocity_and_report_options_that_contradict_are_refused(cli: Cli, bench: Path) -> None:
     """One velocity file does not complete a folder, and no report is not a report."""
     done = cli("analyse", bench, "--velocity", bench / "damped_simulated_velocity.txt", "--json")
     assert done.code == 2
     assert "got a folder" in done.complaint
     assert cli("analyse", bench, "--report", "--no-report").code == 2
-
-
-def test_a_process_ended_from_outside_is_one_line(cli: Cli, bench: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the system takes a process that makes reports, the line says so and the exit code is 1."""
-
-    class Broken:
-        def __init__(self, *_: object, **__: object) -> None: ...
-        def __enter__(self) -> Broken:
-            return self
-
-        def __exit__(self, *_: object) -> None: ...
-        def map(self, *_: object) -> list[object]:
-            raise BrokenProcessPool
-
-    monkeypatch.setattr("springmass.commands.analyse.pool", Broken)
-    monkeypatch.setattr("springmass.commands.analyse.cores", lambda: 2)
-    done = cli("analyse", bench, "--report", "--out", bench / "out")
-    assert done.code == 1
-    assert "a process that makes reports was ended from outside" in done.err.splitlines()[-1]

@@ -69,22 +69,6 @@ def test_each_of_several_inputs_is_asked_for_alone(cli: Cli, table: Path) -> Non
     assert line.endswith(f'? springmass analyse "{table}" --unit cm --channel "height of bob"')
 
 
-def test_formats_gives_the_question_as_data(cli: Cli, table: Path) -> None:
-    """JSON holds what is missing, every choice and an example."""
-    (facts,) = cli("formats", table, "--json").results
-    channel, unit = facts["question"]
-    assert (channel["what"], channel["choices"], unit["what"]) == ("channel", ["height of bob", "y"], "unit")
-    assert facts["needs"].count("--channel") == 1
-    assert "question" not in cli("formats", table).out
-
-
-def test_a_course_is_asked_for_columns_of_its_table(cli: Cli, table: Path, tmp_path: Path) -> None:
-    """The row that failed says which columns of the table of runs would answer."""
-    done = cli("batch", table, "-o", tmp_path / "course")
-    assert "fill in channel, unit in the table of runs" in done.err
-    assert "springmass analyse" not in done.err
-
-
 def test_the_folder_of_sample_data_can_be_analysed(cli: Cli) -> None:
     """JSON that describes recordings is listed as other files, whatever lists are in it; every recording is there."""
     done = cli("analyse", sample_data(), "--json")
@@ -95,27 +79,3 @@ def test_the_folder_of_sample_data_can_be_analysed(cli: Cli) -> None:
     listed = {row["file"]: row for row in cli("formats", sample_data(), "--json").results}
     assert listed["damped_simulated.truth.json"]["family"] == ""
     assert "JSON" in listed["damped_simulated.truth.json"]["error"]
-
-
-def test_json_next_to_a_recording_is_another_file(cli: Cli, table: Path) -> None:
-    """JSON is no recording, with times in it neither: it is listed, and by itself refused with a way to export it."""
-    other = table.with_name("run.json")
-    other.write_text(json.dumps({"time (s)": [0.0, 0.1, 0.2], "height (m)": [0.2, 0.3, 0.2]}), encoding="utf-8")
-    answers = ("--channel", "y", "--unit", "m", "--json")
-    done = cli("analyse", table.parent, *answers)
-    assert "run.json" in done.err
-    assert len(done.results) == 1
-    alone = cli("analyse", other, "--json")
-    assert alone.code == 3
-    assert "JSON" in alone.complaint
-
-
-def test_a_name_that_begins_with_a_minus_is_suggested_so_that_it_works(
-    cli: Cli, table: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Options follow the name, so it cannot stand behind the two hyphens any more."""
-    monkeypatch.chdir(table.parent)
-    table.rename("-run.csv")
-    complaint = cli("analyse", "--no-report", "--", "-run.csv").complaint
-    words = shlex.split(complaint[complaint.index("springmass analyse") :])
-    assert cli(*words[1:]).code == 0

@@ -106,15 +106,6 @@ def recorded(cli: Callable, port: str, out: Path, seconds: float) -> object:
     return cli("record", "--port", port, "--sensor", "line-protocol", "--seconds", str(seconds), "-o", out)
 
 
-def test_record_shows_what_the_sensor_is(cli: Callable, board: Callable[..., Board], tmp_path: Path) -> None:
-    """Model, version and settings; one that is up to date is not asked to be updated."""
-    here = board()
-    done = recorded(cli, here.port, tmp_path / "run.h5", 0.5)
-    assert f"{here.port}: springmass-rangefinder {VERSION}: 100 Hz, echoes of 116 to 25000 us" in done.err
-    assert "older" not in done.err
-    assert here.heard[0] == "?"
-
-
 def test_record_asks_for_an_update_where_the_firmware_is_older(
     cli: Callable, board: Callable[..., Board], tmp_path: Path
 ) -> None:
@@ -144,16 +135,6 @@ def test_a_fault_that_the_sensor_knows_is_said_in_its_words(
     done = recorded(cli, board(VERSION, letter).port, tmp_path / "run.h5", 2.5)
     assert words in re.sub(r"for \d+ s", "for 1 s", done.err)  # a busy machine says it later
     assert done.code == 4
-
-
-def test_firmware_shows_a_board_and_asks_for_an_update(cli: Callable, board: Callable[..., Board]) -> None:
-    """Without a setting it changes nothing."""
-    here = board("1.4.2")
-    done = cli("firmware", "--port", here.port)
-    assert done.code == 0
-    assert f"{here.port}: springmass-rangefinder 1.4.2: 100 Hz" in done.out
-    assert f"{VERSION} comes with this program; `springmass firmware --port {here.port} --flash` updates it" in done.out
-    assert set(here.heard) == {"?"}
 
 
 def test_firmware_sets_a_board_and_shows_what_it_then_is(cli: Callable, board: Callable[..., Board]) -> None:

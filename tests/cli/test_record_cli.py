@@ -161,14 +161,6 @@ def test_a_busy_port_is_called_busy(cli: Callable, tmp_path: Path) -> None:
     assert "used by another program" in done.complaint
 
 
-def test_silence_is_told_before_a_run_starts(cli: Callable, tmp_path: Path, silent_port: str) -> None:
-    """A port on which nothing comes: one line, exit code 4, and no log is left behind."""
-    done = cli("record", "--port", silent_port, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
-    assert done.code == 4
-    assert "not a byte came" in done.err.splitlines()[-1]
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.trials
 def test_another_sensor_is_recognised_by_its_bytes(cli: Callable, tmp_path: Path) -> None:
     """Bytes of another family: the line says what they look like, exit code 4."""
@@ -178,13 +170,6 @@ def test_another_sensor_is_recognised_by_its_bytes(cli: Callable, tmp_path: Path
     assert done.code == 4
     assert "looks like" in done.err.splitlines()[-1]
     assert "FF" in done.err.splitlines()[-1]
-
-
-def test_an_unknown_sensor_is_refused_with_the_known_ones(cli: Callable, tmp_path: Path) -> None:
-    """A family that does not exist: one line that lists all, exit code 2."""
-    done = cli("record", "--port", "/dev/null", "--sensor", "sonar", "-o", tmp_path / "run.h5")
-    assert done.code == 2
-    assert all(family.name in done.complaint for family in families())
 
 
 def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
@@ -257,17 +242,6 @@ def test_options_that_would_do_nothing_are_refused(
     assert not (tmp_path / "run.h5").exists()
 
 
-def test_run_files_of_several_sensors_are_looked_for_before(cli: Callable, tmp_path: Path) -> None:
-    """One of the run files to come exists: refused before a port is opened."""
-    (tmp_path / "run.1.h5").write_bytes(b"precious")
-    done = cli(
-        *("record", "--port", "/dev/ttyNONE1", "--port", "/dev/ttyNONE2", "--sensor", "ffhls"),
-        *("-o", tmp_path / "run.h5"),
-    )
-    assert done.code == 2
-    assert "run.1.h5" in done.complaint
-
-
 def test_a_disk_nearly_full_is_told_before_a_run_starts(
     cli: Callable, tmp_path: Path, scene: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -288,15 +262,6 @@ def test_a_moving_bob_is_no_rest_position(cli: Callable, tmp_path: Path, scene: 
     assert done.code == 4
     assert "the bob moves" in done.err.splitlines()[-1]
     assert not (tmp_path / "run.h5").exists()
-
-
-def test_a_scene_without_a_spring_simulates_nothing(cli: Callable, tmp_path: Path) -> None:
-    """The line names what the scene lacks, exit code 2."""
-    path = tmp_path / "poor.toml"
-    path.write_text("[bob]\nmass_kg = 0.2\n")
-    done = cli("record", "--simulate", path, "-o", tmp_path / "run.h5")
-    assert done.code == 2
-    assert "constant_n_per_m" in done.complaint
 
 
 def start(scene: Path, out: Path, ignoring: tuple[signal.Signals, ...] = ()) -> subprocess.Popen[str]:
@@ -466,32 +431,6 @@ def test_several_distances_need_somebody_who_presses_enter(
     assert done.code == 2
     assert "begun with Enter" in done.err.splitlines()[-1]
     assert not (tmp_path / "run.wire").exists()
-
-
-def test_off_a_terminal_the_progress_line_comes_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
-    """After 1, 10, 40 and 70 seconds, and what moves is looked into for those lines alone."""
-    requested: list[float] = []
-
-    def progress(seconds: float) -> Progress:
-        def motion() -> NotYet:
-            requested.append(seconds)
-            return NotYet("no samples so far")
-
-        return Progress(seconds, 0, 0, 0, 0.0, motion, None, None, waiting=False)
-
-    with Console(pytest.fail) as console:
-        line = ProgressLine(console)
-        for second in range(1, 81):
-            line(progress(float(second)))
-    assert requested == [1.0, 10.0, 40.0, 70.0]
-    assert capsys.readouterr().err.count("no samples so far") == 4
-
-
-def test_the_progress_line_says_what_is_recorded_and_not_shown() -> None:
-    """Samples that came while the display hung are named by their number, and where there are none, nothing is."""
-    found = Progress(3.0, 300, 0, 0, 100.0, lambda: NotYet("too short"), None, None, waiting=False)
-    assert "not shown" not in line_of(found)
-    assert line_of(replace(found, unshown=41)).endswith("| 41 samples recorded and not shown")
 
 
 def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable, tmp_path: Path, scene: Path) -> None:

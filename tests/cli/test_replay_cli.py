@@ -19,86 +19,11 @@ from acquisition.source import SourceInfo
 Cli = Callable[..., Any]
 
 
-@pytest.fixture
-def virtual(monkeypatch: pytest.MonkeyPatch) -> list[VirtualClock]:
-    """Put a clock that never waits in place of the machine's; return those that were made."""
-    made: list[VirtualClock] = []
-
-    def clock() -> VirtualClock:
-        made.append(VirtualClock(10**9))
-        return made[-1]
-
-    monkeypatch.setattr("springmass.commands.replay.SystemClock", clock)
-    return made
-
-
-def table(text: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return the rows of replay's output, its first line checked."""
-    head, *rows = text.splitlines()
-    assert head == "time_s\tdistance_m\tflags"
-    return np.array([[float(cell) for cell in row.split("\t")] for row in rows])
-
-
 def content(path: Path) -> tuple[Any, ...]:
     """Return the samples of a run file, bit for bit."""
     with springmass.open_run(path) as run:
         block = run.samples()
     return block.t.tobytes(), block.distance.tobytes(), block.flags.tobytes(), len(block)
-
-
-def test_every_pace_gives_the_same_run_file(cli: Cli, data: Path, tmp_path: Path, virtual: list[VirtualClock]) -> None:
-    """As recorded, ten times as fast and as fast as possible: identical samples, and two minutes take no time."""
-    old = data / "damped_simulated_position.txt"
-    contents = []
-    for speed in ("1", "10", "max"):
-        path = tmp_path / f"{speed}.h5"
-        done = cli("replay", old, "--speed", speed, "-o", path)
-        assert (done.code, done.out) == (0, "")
-        contents.append(content(path))
-    block = springmass.load(old).samples
-    assert contents[0] == contents[1] == contents[2]
-    assert contents[0] == (block.t.tobytes(), block.distance.tobytes(), block.flags.tobytes(), 12000)
-    waited = [(clock.now_ns() - 10**9) / 1e9 for clock in virtual]
-    assert waited == pytest.approx([119.99, 11.999], abs=1e-6)
-
-
-def test_a_replayed_run_file_analyses_as_the_recording(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """The way through a replay changes no estimate."""
-    path = tmp_path / "run.h5"
-    assert cli("replay", recording, "--speed", "max", "-o", path).code == 0
-    a, b = (cli("analyse", "--json", file).results[0] for file in (recording, path))
-    assert (a["estimates"], a["quality"]) == (b["estimates"], b["quality"])
-
-
-def test_stdout_holds_a_line_per_sample(cli: Cli, recording: Path) -> None:
-    """Time, distance and flags, tab separated, under their names; nothing on stderr."""
-    done = cli("replay", recording, "--speed", "max")
-    assert (done.code, done.err) == (0, "")
-    block = springmass.load(recording).samples
-    rows = table(done.out)
-    np.testing.assert_allclose(rows[:, 0], block.t, atol=5e-7)
-    np.testing.assert_allclose(rows[:, 1], block.distance, atol=5e-7)
-    np.testing.assert_array_equal(rows[:, 2], block.flags)
-
-
-def test_a_missing_sample_is_printed_as_such(cli: Cli, write: Callable[..., Path], rows: list[bytes]) -> None:
-    """It has its line, NaN and its flags."""
-    done = cli("replay", write([*rows[:20], b"0.20"]), "--speed", "max")
-    assert done.out.splitlines()[-1] == "0.200000\tNaN\t33"
-
-
-def test_seek_starts_there(cli: Cli, recording: Path, virtual: list[VirtualClock]) -> None:
-    """The first sample is the one at the second asked for, and what lies before takes no time."""
-    done = cli("replay", recording, "--seek", "7.5")
-    rows = table(done.out)
-    assert (rows[0, 0], rows[-1, 0], len(rows)) == (7.5, 9.99, 250)
-    assert virtual[0].now_ns() - 10**9 == pytest.approx(2.49e9, abs=1e3)
-
-
-def test_seek_past_the_end_gives_no_samples(cli: Cli, recording: Path) -> None:
-    """The column names stand alone."""
-    done = cli("replay", recording, "--speed", "max", "--seek", "99")
-    assert (done.code, table(done.out).size) == (0, 0)
 
 
 def test_the_kind_of_what_is_replayed_stays_true(cli: Cli, recording: Path, tmp_path: Path) -> None:
@@ -125,13 +50,6 @@ def test_a_standing_run_file_is_not_overwritten(cli: Cli, recording: Path, tmp_p
     assert done.code == 2
     assert "choose another name" in done.complaint
     assert path.read_bytes() == b"mine"
-
-
-def test_a_loop_writes_no_run_file(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """It never ends, and a run file is written at the end."""
-    done = cli("replay", recording, "--loop", "-o", tmp_path / "run.h5")
-    assert done.code == 2
-    assert "--loop never ends" in done.complaint
 
 
 @pytest.mark.parametrize("speed", ["0", "-1", "nan", "inf", "fast"])

@@ -113,23 +113,6 @@ def test_what_is_noted_beside_a_recording_is_used_and_said(cli: Cli, run: Path, 
     assert run.read_bytes() == before
 
 
-def test_the_scene_last_used_is_remembered_and_said(cli: Cli, data: Path, tmp_path: Path) -> None:
-    """analyse saves a given scene next to the recording, once, and then uses it; --no-report writes nothing."""
-    recording = tmp_path / "morning.txt"
-    recording.write_bytes((data / "damped_simulated_position.txt").read_bytes())
-    beside, given = recording.with_name("morning.about.toml"), ("--scene", data / "damped.scene.toml")
-    cli("analyse", recording, *given, "--no-report")
-    assert not beside.exists()
-    line = ("analyse", recording, *given, "--mass-kg", "0.3", "--out", tmp_path)
-    first = cli(*line)
-    assert f"bench data saved for this file: {beside}" in first.err
-    (result,) = cli("analyse", recording, "--json").results
-    assert result["provenance"]["parameters"]["scene"]["bob"]["mass_kg"] == 0.3
-    again = cli(*line)
-    assert "from now on" not in again.err
-    assert f"{beside}: its scene read from the notes next to the file" in again.err
-
-
 def test_scenes_of_several_are_remembered_and_the_bundled_recordings_left_alone(
     cli: Cli, data: Path, tmp_path: Path
 ) -> None:
@@ -140,23 +123,6 @@ def test_scenes_of_several_are_remembered_and_the_bundled_recordings_left_alone(
     done = cli("analyse", *runs, "--scene", data / "damped.scene.toml", "--out", tmp_path / "out")
     assert "bench data saved for 2 recordings" in done.err
     assert sorted(path.name for path in tmp_path.glob("*.about.toml")) == ["a.about.toml", "b.about.toml"]
-
-
-def test_where_no_scene_can_be_noted_the_numbers_come_all_the_same(
-    cli: Cli, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A folder that takes nothing costs the note, which is said, and no result."""
-    recording = tmp_path / "morning.txt"
-    recording.write_bytes((data / "damped_simulated_position.txt").read_bytes())
-
-    def refuse(*_: object) -> None:
-        raise WriteFailed(recording, "cannot be written (read-only)", "name another folder")
-
-    monkeypatch.setattr("springmass.commands.analyse.remember_scene", refuse)
-    done = cli("analyse", recording, "--scene", data / "damped.scene.toml", "--out", tmp_path / "out")
-    assert done.code == 0
-    assert "spring constant" in done.out
-    assert "the bench data are not saved" in done.err
 
 
 @pytest.mark.parametrize(
@@ -179,16 +145,6 @@ def test_notes_of_nothing_are_refused(cli: Cli, line: tuple[str, ...]) -> None:
     assert cli("scene", *line).code == 2
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
-def test_the_script_of_a_shell_names_commands_options_and_choices(cli: Cli, shell: str) -> None:
-    """`--completion SHELL` prints what the shell needs, and writes no file."""
-    done = cli("--completion", shell)
-    assert (done.code, done.err) == (0, "")
-    for word in ("analyse", "simulate", "accuracy", "standard", "completion"):
-        assert word in done.out
-    assert "shard" not in done.out
-
-
 @pytest.mark.parametrize("flag", ["-q", "--quiet"])
 def test_quiet_may_follow_the_command(cli: Cli, run: Path, flag: str) -> None:
     """An option of every command holds before the command and after it."""
@@ -196,11 +152,3 @@ def test_quiet_may_follow_the_command(cli: Cli, run: Path, flag: str) -> None:
         done = cli(*line)
         assert (done.code, done.err) == (0, "")
     assert "read:" in cli("analyse", run, "--no-report", "-v").err
-
-
-def test_quiet_leaves_what_is_wrong(cli: Cli, run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """-q takes the lines that only inform, and no error."""
-    monkeypatch.setattr("springmass.errors._quiet", False)
-    run.with_name("damped.about.toml").write_text('notes = ["x"]\n')
-    done = cli("-q", "analyse", run, "absent.txt", "--json")
-    assert done.complaint.startswith("springmass: absent.txt: cannot be opened")

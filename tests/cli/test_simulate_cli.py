@@ -99,13 +99,6 @@ def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Callable, scene:
     assert cli(*arguments[:-2], "--dt", str(limit), "--seconds", "1", "--json").code == 0
 
 
-def test_a_method_by_name_takes_the_step_its_tolerance_needs(cli: Callable, scene: Path) -> None:
-    """rk4 to 1e-7: steps finer than the samples, and the error is kept."""
-    (found,) = cli("simulate", "--scene", scene, "--method", "rk4", "--tolerance", "1e-7", "--check", "--json").results
-    assert found["step_s"] < found["spacing_s"] == 0.01
-    assert found["measured_error"] <= 1e-7
-
-
 @pytest.mark.parametrize("name", ["lsoda", "dop853"])
 def test_scipy_solves_a_scene(cli: Callable, scene: Path, name: str) -> None:
     """scipy's methods run as they are, at a local tolerance that aims at 1e-6 of the amplitude."""
@@ -187,16 +180,6 @@ def test_uncertainties_of_the_scene_make_a_band(cli: Callable, tmp_path: Path) -
     assert not any((folder / name).exists() for name in ("band.csv", "against.csv", "figures/band.pdf"))
 
 
-def test_a_scene_too_vague_for_a_band_is_simulated_without(cli: Callable, tmp_path: Path) -> None:
-    """A mass that may be 0 has no band; why is said, and the rest is done."""
-    path = tmp_path / "vague.toml"
-    path.write_text(MIXED.replace("mass_kg = 0.2\n", "mass_kg = { value = 0.2, u = 0.1 }\n"))
-    done = cli("simulate", "--scene", path, "--json")
-    assert done.code == 0
-    assert "band             none: the uncertainty of bob_mass_kg" in done.err
-    assert done.results[0]["band"] is None
-
-
 def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path: Path) -> None:
     """Exit code 3, one line."""
     noise = np.random.default_rng(1).normal(0.25, 1e-4, 1000)
@@ -261,16 +244,6 @@ def test_friction_stops_the_simulated_bob(cli: Callable, tmp_path: Path) -> None
     assert np.all(samples.velocity[-400:] == 0.0)
 
 
-def test_a_start_in_millimetres_is_asked_about(cli: Callable, tmp_path: Path) -> None:
-    """A simulation has no findings: the question stands on stderr, and the numbers are those asked for."""
-    path = tmp_path / "far.toml"
-    path.write_text(LINEAR.replace("displacement_m = 0.05", "displacement_m = 50"))
-    done = cli("simulate", "--scene", path, "--json")
-    assert done.code == 0
-    assert "[start] displacement_m = 50 is beyond -1 to 1 m (did you mean centimetres: 0.5" in done.err
-    assert done.results[0]["amplitude_m"] == 50.0
-
-
 BENCH = """
 [bob]
 mass_kg = { value = 0.2176, u = 0.00005 }
@@ -308,37 +281,6 @@ def test_the_scene_decides_what_acts(cli: Callable, bench: Path) -> None:
     (found,) = done.results
     assert found["equation"]["drag_per_m"] == found["equation"]["gamma_per_s"] == 0.0
     assert "left out by --without" in done.err
-
-
-def test_no_reference_is_solved_unless_asked_for(cli: Callable, scene: Path) -> None:
-    """Without --check there is no measured error; with it there is, of displacement and velocity, by another method."""
-    (found,) = cli("simulate", "--scene", scene, "--json").results
-    assert found["measured_error"] is None
-    assert found["running_s"] > 0.0
-    (found,) = cli("simulate", "--scene", scene, "--method", "strang", "--check", "--json").results
-    assert 0.0 < found["measured_error"] <= found["predicted_error"] < 1e-5
-    assert 0.0 < found["measured_velocity_error"] < 1e-5
-    assert "DOP853" in found["reference"]
-
-
-def test_a_tolerance_far_below_the_band_is_pointed_out(cli: Callable, bench: Path) -> None:
-    """What the default is by the band is said, and which input makes a finer tolerance idle."""
-    arguments = ("simulate", "--scene", bench, "--seconds", "120", "--json")
-    assert "a hundredth of the band" in cli(*arguments).err
-    output = " ".join(cli(*arguments, "--tolerance", "1e-9").err.split())
-    assert "far below the band: u(" in output
-    assert "1e-03 is enough here" in output
-
-
-def test_without_noise_the_last_reading_is_as_good_as_the_others(cli: Callable, bench: Path, tmp_path: Path) -> None:
-    """Its sound meets the bob after the time is up, where the motion goes on: nothing is a false echo."""
-    run = tmp_path / "exact.h5"
-    arguments = ("simulate", "--scene", bench, "--seconds", "20", "-o", run, "--noise-m", "0", "--echoes", "0")
-    assert cli(*arguments).code == 0
-    found = json.loads(cli("analyse", "--json", run).out)
-    assert found["quality"]["used"] == found["input"]["samples"] == 2001
-    codes = {each["code"] for each in found["findings"]}
-    assert not codes & {"false_echoes", "rest_drift", "model_misfit", "missing_samples"}
 
 
 def test_readings_are_a_recording_like_any_other(cli: Callable, bench: Path, tmp_path: Path) -> None:
@@ -384,18 +326,6 @@ def test_a_record_outside_the_band_names_what_would_have_to_move(cli: Callable, 
     same = cli("simulate", "--scene", other, "--against", run, "--json").results[0]["against"]
     assert same["leaves_s"] is None
     assert same["inside_95"] > 0.93
-
-
-def test_a_scene_has_its_own_trade(cli: Callable, bench: Path, tmp_path: Path) -> None:
-    """Every method's error and time on this scene, and one recommendation that keeps what is wanted."""
-    arguments = ("simulate", "--scene", bench, "--seconds", "2", "--trade", "--out", tmp_path / "trade", "--json")
-    (found,) = cli(*arguments).results
-    assert {"strang", "dop853", "rk4"} <= {row["method"] for row in found["integrators"]}
-    assert found["recommended"]["error"] <= found["recommended"]["wanted"]
-    assert (tmp_path / "trade" / "integrators.svg").is_file()
-    (same,) = cli("trade", "--integrators", "--scene", bench, "--seconds", "2", "--tolerance", "1e-9", "--json").results
-    assert same["recommended"]["wanted"] == 1e-9
-    assert same["recommended"]["error"] <= 1e-9
 
 
 def test_a_hard_spring_and_a_long_run_are_solved(cli: Callable, tmp_path: Path) -> None:

@@ -88,16 +88,6 @@ def test_a_recording_stays_in_its_lines_and_takes_marks(tmp_path: Path, columns:
     assert "next: springmass analyse run.h5" in terminal.screen.text
 
 
-def test_a_recording_without_a_trace_has_two_lines(tmp_path: Path) -> None:
-    """--no-trace leaves progress and keys."""
-    (tmp_path / "bench.toml").write_text(SCENE)
-    arguments = ["record", "--simulate", "bench.toml", "--seconds", "2", "--no-trace", "-o", "run.h5"]
-    with OnTerminal(arguments, tmp_path) as terminal:
-        terminal.until("space marks", lines=2)
-        assert terminal.end() == 0
-        assert not any("\u2801" <= character <= "\u28ff" for character in terminal.screen.raw)
-
-
 def test_the_address_of_the_page_stays_above_the_progress(tmp_path: Path) -> None:
     """The recorder prints the address, so that the lines that it rewrites do not cover it."""
     (tmp_path / "bench.toml").write_text(SCENE)
