@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import shutil
-import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +13,6 @@ import pytest
 
 from acquisition.clock import VirtualClock
 from acquisition.live.line import Sink
-from storage import recorder as recorders
 from storage.disk import DiskNearlyFull, check_disk
 from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
@@ -253,67 +251,6 @@ def test_events_and_marks_outlast_an_overflow() -> None:
     assert recorded + overflow.json()["facts"]["records"] == 19 == recorded + recording.status.dropped_records
 
 
-def test_what_is_given_up_while_a_write_hangs_is_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every read is in the log, in the counts or in the write that hung; a write that returns later adds nothing."""
-    path = tmp_path / "run.wire"
-
-    class Hanging:
-        """A real file whose writes wait."""
-
-        def __init__(self, path: Path) -> None:
-            self.file = open_log_file(path)
-            self.passes, self.hangs = threading.Event(), threading.Event()
-            self.passes.set()
-
-        def write(self, data: bytes | memoryview) -> int:
-            """Write, when it may."""
-            if not self.passes.is_set():
-                self.hangs.set()
-                assert self.passes.wait(WAIT_S)
-            return self.file.write(data)
-
-        def sync(self) -> None:
-            """Sync."""
-            self.file.sync()
-
-        def close(self) -> None:
-            """Close."""
-            self.file.close()
-
-    files: list[Hanging] = []
-
-    def opened(path: Path) -> LogFile:
-        files.append(Hanging(path))
-        return files[0]
-
-    recording = Recorder(path, HEADER, VirtualClock(7), sync_every_s=HOUR_S, queue_bytes=3000, open_file=opened)
-    recording.put(0, 0, b"kept")
-    recording.drain()
-    files[0].passes.clear()
-    recording.put(0, 1, b"hangs")
-    assert files[0].hangs.wait(WAIT_S)
-    for number in range(200):
-        recording.put(number % 2, 2 + number, b"%03d" % number)
-    recording.mark("late", host_ns=300)
-    # A busy disk may need longer than the program waits.
-    monkeypatch.setattr(recorders, "GIVE_UP_S", WAIT_S / 2)
-    assert recording.give_up()
-    contents = read_log(path)
-    records = list(contents)
-    assert [record.payload for record in records if record.kind is Kind.DATA] == [b"kept"]
-    assert [record.text() for record in records if record.kind is Kind.MARK] == ["late"]
-    facts = [record.json()["facts"] for record in records if record.kind is Kind.EVENT]
-    assert sum(each["records"] for each in facts) == 200 == recording.status.dropped_records
-    assert sum(each["bytes"] for each in facts) == 600 == recording.status.dropped_bytes
-    assert contents.damage.lost == 1
-    assert contents.damage.ended
-    files[0].passes.set()
-    recording._appender.join(WAIT_S)
-    assert recording.status.dropped_records == 200
-    assert [record.payload for record in read_log(path) if record.kind is Kind.DATA] == [b"kept"]
-    files[0].close()
-
-
 def test_a_read_that_is_larger_than_the_queue_is_an_overflow_at_once() -> None:
     """Nothing else need come: its event is in the log when the queue has been drained."""
     disk = Disk()
@@ -397,25 +334,6 @@ def test_putting_after_the_end_is_counted() -> None:
     recording.close()
     recording.put(0, 0, b"late")
     assert (recording.status.dropped_records, recording.status.dropped_bytes) == (1, 4)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="this system lets nobody rename or delete an open file")
-def test_a_lost_name_is_reported_once(tmp_path: Path) -> None:
-    """The first that becomes of it, in an event and in the status; what becomes of it later changes neither."""
-    log, clock = tmp_path / "run.wire", VirtualClock(7)
-    recording = Recorder(log, HEADER, clock, sync_every_s=1e-4)
-    assert recording.status.astray == ""
-    log.rename(tmp_path / "other.wire")
-    while recording.status.records < 2:  # the header, and the event to come
-        recording.drain()
-    first = recording.status.astray
-    (tmp_path / "other.wire").rename(log)
-    log.unlink()
-    log.write_bytes(b"mine")
-    recording.close()
-    assert recording.status.astray == first
-    events = [record.json() for record in recording.contents() if record.kind is Kind.EVENT]
-    assert events == [{"kind": "astray", "facts": {"what": first}}]
 
 
 def test_many_threads_may_put(tmp_path: Path) -> None:
