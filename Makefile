@@ -5,14 +5,18 @@ BIN = $(VENV)/bin
 WORKERS ?= 2
 PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
 
-.PHONY: help demo test trials accuracy bench lint docs docs-figures docs-trade firmware clean
+.PHONY: help demo test golden trials nightly mutants accuracy bench lint docs docs-figures docs-trade firmware clean
 
 help:
 	@echo "make demo     from two old recordings to Table 1 and a report"
-	@echo "make test     the tests, in two processes (WORKERS=n for others; make trials: thousands of seeds)"
+	@echo "make test     the tests, in two processes (WORKERS=n for others): 4 minutes on two cores"
+	@echo "make golden   every output of 0.2.0 against today's: 4 minutes"
+	@echo "make trials   what many seeds, kills and long runs show: an hour"
+	@echo "make nightly  trials, docs, firmware, smallest versions and checks of the project's files: two hours"
+	@echo "make mutants  planted faults, and whether tests and goldens notice them: an hour"
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
-	@echo "make lint     ruff, mypy, import contracts, spelling, wording"
+	@echo "make lint     ruff, mypy, import contracts, spelling"
 	@echo "make firmware the rangefinder's hex, as it travels in the package (Debian: gcc-avr avr-libc arduino-core-avr)"
 	@echo "make docs     the pages and the reference of the Python API as a site, docs/_build/index.html"
 
@@ -35,10 +39,20 @@ demo: $(VENV)/.installed
 	$(BIN)/springmass demo -o demo-output
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -m "not trials" -n $(WORKERS) --dist loadfile
+	$(BIN)/python -m pytest -m "not trials" -n $(WORKERS) --dist worksteal
+
+golden: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.golden
 
 trials: $(VENV)/.installed-dev
-	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_ENDS=200 SPRINGMASS_UNPLUGS=20 SPRINGMASS_SECOND_STOPS=30 SPRINGMASS_REPLUGS=40 $(BIN)/python -m pytest -m trials -s
+	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_ENDS=200 SPRINGMASS_UNPLUGS=20 SPRINGMASS_SECOND_STOPS=30 SPRINGMASS_REPLUGS=40 \
+	SPRINGMASS_EXAMPLES=nightly $(BIN)/python -m pytest -m trials -n $(WORKERS) --dist worksteal
+
+nightly: $(VENV)/.installed-dev
+	bash .ci/nightly
+
+mutants: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.mutants
 
 accuracy: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/accuracy --seeds $(or $(SEEDS),2000)
@@ -56,7 +70,6 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	git ls-files -z | xargs -0 $(BIN)/codespell
-	$(BIN)/python .ci/wording.py
 
 docs: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build
