@@ -54,8 +54,7 @@ def record(synthetic: ModuleType, seconds: float, sigma_m: float, seed: int, **t
     return Track.from_arrays(t, synthetic.noisy(synthetic.Truth(**truth), t, sigma_m, seed))
 
 
-@pytest.mark.parametrize("sigma_m", [0.0, 3e-4, 2.39e-3])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(("sigma_m", "seed"), [(0.0, 1), (3e-4, 2), (2.39e-3, 3)])
 def test_period_and_amplitude_are_the_naive_ones(synthetic: ModuleType, sigma_m: float, seed: int) -> None:
     """Period, amplitude and sliding amplitude equal what plain loops give."""
     track = record(synthetic, 10.0, sigma_m, seed, gamma=0.005)
@@ -68,7 +67,7 @@ def test_period_and_amplitude_are_the_naive_ones(synthetic: ModuleType, sigma_m:
     np.testing.assert_allclose(found.window_amplitude, amplitudes, atol=1e-15)
 
 
-@pytest.mark.parametrize("window_s", [0.01, 0.02, 0.07, 0.5, 1.5, 9.99])
+@pytest.mark.parametrize("window_s", [0.01, 0.5, 9.99])
 def test_sliding_amplitude_of_any_width(synthetic: ModuleType, window_s: float) -> None:
     """Windows of two samples up to the whole record equal plain loops."""
     track = record(synthetic, 10.0, 1e-3, 4)
@@ -78,10 +77,9 @@ def test_sliding_amplitude_of_any_width(synthetic: ModuleType, window_s: float) 
     np.testing.assert_allclose(amplitude, amplitudes, atol=1e-15)
 
 
-@pytest.mark.parametrize("sigma_m", [3e-4, 2.39e-3])
-def test_exponential_is_scipys_with_the_start_fixed(synthetic: ModuleType, sigma_m: float) -> None:
+def test_exponential_is_scipys_with_the_start_fixed(synthetic: ModuleType) -> None:
     """Gamma and its formal uncertainty are curve_fit's for A0 e^(-gamma t), A0 held at the first amplitude."""
-    found = classic(record(synthetic, 60.0, sigma_m, 5, gamma=0.01463))
+    found = classic(record(synthetic, 60.0, 2.39e-3, 5, gamma=0.01463))
     t, amplitude = found.window_t - found.window_t[0], found.window_amplitude
     start = amplitude[0]
     (gamma,), covariance = curve_fit(
@@ -110,13 +108,6 @@ def test_amplitude_is_biased_outward(synthetic: ModuleType, sigma_m: float, bias
     """Extremes of noisy samples lie outside the motion, by as much as the docstring says."""
     bias = [classic(record(synthetic, 10.0, sigma_m, s)).estimates["amplitude"].value - 0.05 for s in range(40)]
     assert np.mean(bias) == pytest.approx(bias_m, rel=0.1)
-
-
-def test_stated_uncertainties_are_the_reports(synthetic: ModuleType) -> None:
-    """0.01/7 s for the period, 2.39 mm over root two for the amplitude."""
-    found = classic(record(synthetic, 10.0, 3e-4, 6)).estimates
-    assert found["period"].u == pytest.approx(0.01 / 7)
-    assert found["amplitude"].u == pytest.approx(0.00239 / math.sqrt(2))
 
 
 def test_frequency_and_spring_constant_follow(synthetic: ModuleType) -> None:
@@ -148,25 +139,3 @@ def test_short_record_is_refused_with_what_it_needs(synthetic: ModuleType, secon
     """Fewer than eight maxima are refused in one line that says how many there were."""
     with pytest.raises(AnalysisError, match=words):
         classic(record(synthetic, seconds, 3e-4, 9))
-
-
-def test_record_shorter_than_its_window_is_refused() -> None:
-    """A window longer than the record is refused with both lengths."""
-    t = np.arange(100) / 100
-    with pytest.raises(AnalysisError, match=r"window of 1\.5 s, the record lasts 0\.99 s"):
-        sliding_amplitude(t, np.sin(t), 1.5)
-
-
-@pytest.mark.parametrize("seconds", [0.5, 3.0])
-def test_record_without_motion_is_refused(seconds: float) -> None:
-    """A fixed object has no maxima."""
-    t = np.arange(round(seconds * 100)) / 100
-    with pytest.raises(AnalysisError):
-        classic(Track.from_arrays(t, np.full(t.size, 0.2)))
-
-
-def test_record_without_distances_is_refused() -> None:
-    """Nothing but missing samples is refused in one line, not by an accident of arithmetic."""
-    t = np.arange(1000) / 100
-    with pytest.raises(AnalysisError):
-        classic(Track.from_arrays(t, np.full(1000, np.nan)))
