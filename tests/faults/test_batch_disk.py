@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-from collections.abc import Sequence
+import contextlib
+import resource
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from springmass.batch import reports
-from springmass.batch.plan import Job, plan
+from springmass.cli import main
 from springmass.errors import OK, SOME_FAILED, USAGE
 from tests.courses import contents, short_course
+from tests.sampling import sampled
 
-LIMIT_S = 120.0
-RUNS = 5
-LIMITED = """
-import resource, sys
-from springmass.cli import main
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
-sys.exit(main(sys.argv[2:]))
-"""
+RUNS = 3
 
 
 @pytest.fixture(scope="module")
@@ -32,103 +23,96 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return short_course(tmp_path_factory.mktemp("course") / "runs", RUNS)
 
 
+@contextlib.contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """Let no file grow beyond so many bytes: a disk that is full for this process."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def passed(runs: Path, out: Path, *options: str) -> int:
+    """Return the exit code of a pass."""
+    return main(["-q", "batch", str(runs), "-o", str(out), "--accuracy", "fast", *options])
+
+
 @pytest.fixture(scope="module")
 def clean(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """What an undisturbed pass writes."""
     out = tmp_path_factory.mktemp("clean") / "out"
-    code, _ = batch(runs, out)
-    assert code == OK
+    assert passed(runs, out, "--jobs", "1", "--reports", "1") == OK
     return contents(out)
 
 
-def batch(runs: Path, out: Path, *, jobs: int = 1, largest: int = -1) -> tuple[int, str]:
-    """Run a pass whose files may not grow beyond so many bytes; return the exit code and what stands on stderr."""
-    command = [sys.executable, "-c", LIMITED, str(largest), "-q", "batch", str(runs), "-o", str(out)]
-    options = ["--jobs", str(jobs), "--reports", "2", "--accuracy", "fast"]
-    done = subprocess.run([*command, *options], capture_output=True, text=True, timeout=LIMIT_S)
-    return done.returncode, done.stderr
-
-
-def assert_lines(stderr: str) -> None:
-    """Every line is an error of the program and none is part of a traceback."""
-    lines = stderr.splitlines()
+def errors_of(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """Return the lines on stderr: errors of the program, and no part of a traceback."""
+    lines = capsys.readouterr().err.splitlines()
     assert lines
     assert [line for line in lines if not line.startswith("springmass: ")] == []
+    return lines
 
 
-@pytest.mark.parametrize("largest", [0, 60, 3000, 10_000, 30_000, 150_000])
-def test_a_full_disk_is_one_line_and_the_next_pass_completes_the_course(runs, clean, tmp_path, largest):
+@pytest.mark.parametrize("largest", sampled([3000, 150_000, 0, 60, 10_000, 30_000]))
+def test_a_full_disk_is_one_line_and_the_next_pass_completes_the_course(
+    runs: Path, clean: dict[str, bytes], tmp_path: Path, capsys: pytest.CaptureFixture[str], largest: int
+) -> None:
     """Wherever the disk fills up, the pass ends with lines and an exit code, and the next pass makes the rest."""
-    code, stderr = batch(runs, tmp_path / "out", largest=largest)
+    options = ("--jobs", "1", "--reports", "1")
+    with files_up_to(largest):
+        code = passed(runs, tmp_path / "out", *options)
     assert code in (USAGE, SOME_FAILED)
-    assert_lines(stderr)
-    assert batch(runs, tmp_path / "out") == (OK, "")
+    errors_of(capsys)
+    assert passed(runs, tmp_path / "out", *options) == OK
     assert contents(tmp_path / "out") == clean
 
 
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.trials)])
 @pytest.mark.parametrize(
     ("place", "kind", "expected"),
     [
         ("parts", "file", USAGE),
         ("parts/lock", "folder", USAGE),
-        ("parts/course.json", "folder", USAGE),
         ("results.csv", "folder", USAGE),
-        ("results.parquet", "folder", USAGE),
         ("index.html", "folder", USAGE),
         ("batch.log", "folder", SOME_FAILED),
-        ("reports", "file", SOME_FAILED),
     ],
 )
-def test_a_place_that_cannot_be_written_is_named(runs, tmp_path, place, kind, expected):
+def test_a_place_that_cannot_be_written_is_named(
+    runs: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    place: str,
+    kind: str,
+    expected: int,
+    jobs: int,
+) -> None:
     """A file where a folder must stand, or a folder in place of a file: a line names it, by one process or by two."""
     obstacle = tmp_path / "out" / place
     obstacle.parent.mkdir(parents=True)
     obstacle.mkdir() if kind == "folder" else obstacle.write_bytes(b"")
-    for jobs in (1, 2):
-        code, stderr = batch(runs, tmp_path / "out", jobs=jobs)
-        assert code == expected
-        assert_lines(stderr)
-        assert str(obstacle) in stderr or place == "results.parquet"
+    assert passed(runs, tmp_path / "out", "--jobs", str(jobs), "--reports", "0") == expected
+    assert any(str(obstacle) in line for line in errors_of(capsys))
     if expected == SOME_FAILED:  # the tables and the page do not need it
         assert len((tmp_path / "out" / "results.csv").read_text().splitlines()) == RUNS + 1
         assert (tmp_path / "out" / "index.html").is_file()
 
 
-def test_a_report_that_cannot_be_written_costs_that_report(runs, clean, tmp_path):
-    """The other report, the tables and the page are written; the next pass writes what is missing."""
-    first, second = sorted(name.split("/")[1] for name in clean if name.endswith("report.html"))
-    obstacle = tmp_path / "out" / "reports" / first
+def test_a_report_that_cannot_be_written_costs_that_report(
+    runs: Path, clean: dict[str, bytes], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The tables and the page are written without it, one line names it, and the next pass makes it."""
+    (name,) = [name.split("/")[1] for name in clean if name.endswith("report.html")]
+    obstacle = tmp_path / "out" / "reports" / name
     obstacle.parent.mkdir(parents=True)
     obstacle.write_bytes(b"")
-    code, stderr = batch(runs, tmp_path / "out", jobs=2)
-    assert code == SOME_FAILED
-    assert_lines(stderr)
-    assert stderr.count("\n") == 1
-    assert first in stderr
-    assert (tmp_path / "out" / "reports" / second / "report.html").is_file()
-    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
-    assert first not in page
-    assert second in page
+    options = ("--jobs", "1", "--reports", "1")
+    assert passed(runs, tmp_path / "out", *options) == SOME_FAILED
+    (line,) = errors_of(capsys)
+    assert name in line
+    assert name not in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     obstacle.unlink()
-    assert batch(runs, tmp_path / "out", jobs=2) == (OK, "")
+    assert passed(runs, tmp_path / "out", *options) == OK
     assert contents(tmp_path / "out") == clean
-
-
-def dies_at_run001(tasks: Sequence[tuple[str, Job, Path]]) -> list[str]:
-    """Stand for the writing of reports, in a process that is killed at one of them."""
-    for run, _, folder in tasks:
-        if run == "run001":
-            os.kill(os.getpid(), signal.SIGKILL)
-        folder.mkdir(parents=True, exist_ok=True)
-    return [""] * len(tasks)
-
-
-def test_a_report_that_kills_its_worker_costs_that_report(runs, tmp_path, monkeypatch):
-    """The reports of the other runs are written."""
-    monkeypatch.setattr(reports, "_attempts", dies_at_run001)
-    jobs = plan([str(runs)]).jobs
-    chosen = [(Path(job.path).stem, job) for job in jobs]
-    failed = reports.write_reports(tmp_path, chosen, 2)
-    assert list(failed) == ["run001.results"]
-    made = {path.name for path in (tmp_path / "reports").iterdir()}
-    assert made == {f"run{i:03d}.results" for i in range(RUNS)} - {"run001.results"}

@@ -16,7 +16,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import springmass
-from springmass.batch.store import open_course, table_rows
 from springmass.cli import main
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError
 from tests.courses import short_course
@@ -24,8 +23,6 @@ from tests.courses import short_course
 READERS = (
     ("catalog", "out", "--where", "period > 0", "--json"),
     ("compare", "out"),
-    ("map", "out", "--out", "maps"),
-    ("report", "out", "run000"),
 )
 BATCH = ("batch", "runs", "-o", "out", "--jobs", "1", "--reports", "0", "--accuracy", "fast")
 LISTING = "parts/course.json"
@@ -69,16 +66,6 @@ def row(keys: str, value: object) -> Damage:
     return lambda out: put_value(out, keys.split("."), value)
 
 
-def without(key: str) -> Damage:
-    """Return a function that leaves a key out of every row."""
-
-    def damage(out: Path) -> None:
-        rows = [{name: value for name, value in row.items() if name != key} for row in rows_of(out)]
-        put_part(out, "".join(f"{json.dumps(row)}\n" for row in rows).encode())
-
-    return damage
-
-
 def listing(**changes: object) -> Damage:
     """Return a function that changes the listing."""
 
@@ -117,9 +104,7 @@ def cut(pattern: str) -> Damage:
 
 OUTSIDE = {
     "an empty table": content("results.csv", b""),
-    "a table of zeros": content("results.csv", bytes(2000)),
     "another table": content("results.csv", b"run,status\n\xff\xfe,ok\n"),
-    "an empty Parquet file": content("results.parquet", b""),
     "a cut Parquet file": cut("results.parquet"),
     "a cut page": cut("index.html"),
     "no table": lambda out: (out / "results.csv").unlink(),
@@ -128,62 +113,23 @@ OUTSIDE = {
 INSIDE = {
     "a part that was cut": cut("parts/*.jsonl"),
     "a part that is a folder": folder_for("parts/*.jsonl"),
-    "another file among the parts": content("parts/whole.jsonl", b"{}\n"),
-    "no part": lambda out: next((out / "parts").glob("*.jsonl")).unlink(),
     "no parts": lambda out: shutil.rmtree(out / "parts"),
     "a file for the parts": lambda out: (shutil.rmtree(out / "parts"), (out / "parts").write_bytes(b"")),
     "no listing": lambda out: (out / LISTING).unlink(),
-    "a listing that is a folder": folder_for(LISTING),
     "a listing that was cut": cut(LISTING),
-    "a nested listing": content(LISTING, b"[" * 100_000),
-    "a listing of another course": listing(parts=["rows-" + 64 * "0" + ".jsonl"]),
     "a listing of a path": listing(parts=["../../etc/passwd"]),
-    "a listing with other tags": listing(tags=[5]),
-    "a listing with a tag that is a column": listing(made_of="", tags=["period"]),
-    "a listing with unknown keys": listing(author="me"),
     "a part without rows of JSON": part(b"{\n[]\n5\nnull\n\xff\n"),
-    "a part that is nested": part(b"[" * 100_000),
     "a part of random bytes": part(bytes(range(256)) * 20),
-    "a row of a job alone": part(b'{"job": {"path": "run", "answers": {}}}\n'),
-    "a row with an unknown key": row("author", "me"),
     "another status": row("status", "good"),
-    "a status that is a number": row("status", 5),
     "no job": row("job", None),
     "a job that is a list": row("job", []),
-    "a path that is a number": row("job.path", 5),
     "a path with a zero byte": row("job.path", "a\0b"),
-    "answers that are a list": row("job.answers", []),
-    "an unknown answer": row("job.answers", {"author": "me"}),
-    "a rate that is a word": row("job.answers", {"rate_hz": "high"}),
-    "a rate that is infinite": row("job.answers", {"rate_hz": float("inf")}),
     "tags that are numbers": row("job.tags", {"group": 5}),
-    "a tag that is a column": row("job.tags", {"period": "long"}),
-    "a scene that is nested": row("job.scene", {"a": {"b": {"c": {"d": {"e": {}}}}}}),
-    "estimates that are none": row("estimates", None),
-    "an estimate without u": row("estimates.period", [1.0]),
-    "an estimate that is a word": row("estimates.period", ["long", 0.1]),
     "an estimate that is NaN": row("estimates.period", [float("nan"), 0.1]),
-    "an estimate that is infinite": row("estimates.period", [float("inf"), 0.1]),
-    "an estimate that is too large": row("estimates.period", [1e200, 0.1]),
     "an estimate that is a huge integer": row("estimates.period", [10**400, 0.1]),
-    "a period that is not positive": row("estimates.period", [0.0, 0.1]),
     "a negative u": row("estimates.period", [1.0, -0.1]),
-    "an estimate of another name": row("estimates.run", [1.0, 0.1]),
-    "a mass that is not positive": row("estimates.own_mass_kg", [0.0, 0.1]),
-    "a fraction of a sample": row("samples", 2.5),
-    "a negative number of errors": row("errors", -1),
-    "a count of another name": row("quality.path", 1),
-    "a message of another severity": row("messages", [["fatal", "no"]]),
-    "a message without a text": row("messages", [["warning"]]),
-    "findings that are a number": row("findings", 5),
-    "points of two numbers": row("drag_points", [[1, 2]]),
-    "points that are words": row("drag_points", [["a", "b", "c", "d"]]),
     "an outline that is a script": row("thumbnail", '"/><script>alert(1)</script>'),
-    "stamps that are a number": row("stamps", 5),
     "a digest that is a word": row("input_sha256", "right"),
-    "no estimates": without("estimates"),
-    "no status": without("status"),
-    "no digest of the code": without("code_sha256"),
 }
 """Damage of the rows themselves: they are not read."""
 
@@ -225,22 +171,22 @@ def read_by_all(capsys: pytest.CaptureFixture[str]) -> set[int]:
     return codes
 
 
-@pytest.mark.parametrize("damage", OUTSIDE.values(), ids=OUTSIDE)
-def test_damage_of_a_table_changes_no_answer(out, capsys, damage):
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_damage_of_a_table_changes_no_answer(out, capsys, name):
     """Commands read the rows and not the tables, and the next pass makes the tables anew."""
     before = (out / "results.csv").read_bytes()
-    damage(out)
-    assert read_by_all(capsys) == {OK, UNREADABLE}  # a map and a comparison need a scene
+    OUTSIDE[name](out)
+    assert read_by_all(capsys) == {OK}
     assert main(list(BATCH)) == OK
     assert "0 analysed" in capsys.readouterr().err
     assert (out / "results.csv").read_bytes() == before
 
 
-@pytest.mark.parametrize("damage", INSIDE.values(), ids=INSIDE)
-def test_damage_of_the_rows_is_refused_and_mended(out, capsys, damage):
+@pytest.mark.parametrize("name", INSIDE)
+def test_damage_of_the_rows_is_refused_and_mended(out, capsys, name):
     """Commands that read a damaged course end with one line; the next pass makes it as it was, or names what cannot."""
     before = (out / "results.csv").read_bytes()
-    damage(out)
+    INSIDE[name](out)
     assert read_by_all(capsys) <= {USAGE, UNREADABLE}
     with pytest.raises(ProgramError):
         springmass.results(out)
@@ -261,7 +207,7 @@ ANY_JSON = st.recursive(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_value_at_any_place_is_read_or_refused(course, tmp_path_factory, data):
     """A course is read with a value that its schema allows, and refused in one line with any other one."""
@@ -275,7 +221,7 @@ def test_any_value_at_any_place_is_read_or_refused(course, tmp_path_factory, dat
         keys.append(data.draw(st.sampled_from(sorted(inner))))
     put_value(folder, keys, data.draw(ANY_JSON))
     with contextlib.suppress(ProgramError):
-        assert len(list(table_rows(open_course(folder)))) == 2
+        assert len(springmass.results(folder)) == 2
     shutil.rmtree(folder.parent)
 
 
@@ -288,7 +234,7 @@ def test_any_bytes_of_a_part_are_read_or_refused(course, tmp_path_factory, data)
     put_part(folder, data)
     if data:
         with pytest.raises(ProgramError):
-            list(table_rows(open_course(folder)))
+            springmass.results(folder)
     else:
-        assert list(table_rows(open_course(folder))) == []
+        assert len(springmass.results(folder)) == 0
     shutil.rmtree(folder.parent)

@@ -1,29 +1,28 @@
 """Power loss: pages that were never synced come back as zeros, as old blocks or not at all; no value is wrong.
 
 No process and no plug is needed: a file in memory notes how far it was at each sync, and a seeded disk then keeps what
-was synced and does what it likes with every page after that.
+was synced and does what it likes with every page after that. ``SPRINGMASS_KILLS`` sets the number of states.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Sequence
+import os
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition.decoders.registry import get_family
-from acquisition.live.decoding import SensorChain
-from acquisition.readings import Reading, Readings
+from springmass.cli import main
+from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
-from storage.wire_log.scanning import parse_log
-from storage.wire_log.wire_samples import decode_log
 
+KILLS = int(os.environ.get("SPRINGMASS_KILLS", "0"))
 PAGE = 4096
-SENSOR = SensorEntry(0, "maxbotix", "COM3", 57600)
-HEADER = LogHeader(sensors=(SENSOR,), mono_ns=0, unix_ns=0)
+STEP_NS = 10_000_000
+HEADER = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr", "COM3", 57600),), mono_ns=0, unix_ns=0)
+"""Of a sensor without a checksum: the halves of two frames would make a value."""
 
 
 class Disk:
@@ -50,55 +49,37 @@ class Disk:
         """Nothing is held."""
 
 
-class Frames:
-    """Decodes a sensor that sends ``R1234\\r``: no checksum, so that halves of two frames would make a value."""
+@dataclass
+class Sent:
+    """Millimetres that the reads completed, by their times, and where in the log each value stands."""
 
-    def __init__(self) -> None:
-        self.faults: dict[str, int] = {}
-        self._held = b""
+    by_time: dict[int, list[int]] = field(default_factory=dict)
+    ends: list[tuple[int, int]] = field(default_factory=list)
 
-    @property
-    def pending(self) -> int:
-        """Bytes held."""
-        return len(self._held)
-
-    def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Make readings of the frames that a read completes."""
-        *lines, self._held = (self._held + data).split(b"\r")
-        values = [int(line[1:]) for line in lines if len(line) == 5 and line[:1] == b"R"]
-        return Readings(Reading(host_ns, distance_m=value) for value in values)
-
-    def flush(self) -> None:
-        """Forget half a frame; what is left of it on the other side of a break has no R."""
-        self._held = b""
+    def until(self, size: int) -> list[int]:
+        """Return the values of the reads within so many bytes."""
+        return [value for end, value in self.ends if end <= size]
 
 
-def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
-    """Return a chain of such a sensor for each."""
-    family = dataclasses.replace(get_family("maxbotix-hr"), decoder=Frames)
-    return [SensorChain(family) for _ in sensors]
-
-
-def recording(seed: int, log: int) -> tuple[Disk, dict[int, list[float]]]:
-    """Return a file with its syncs, and the values that each read completes, by its time."""
+def recording(seed: int) -> tuple[Disk, Sent]:
+    """Return a file with its syncs, and what was sent: reads of a few bytes that cut the frames anywhere."""
     rng = np.random.default_rng(seed)
-    disk = Disk()
-    writer = WireLogWriter("run.wire", HEADER, open_file=disk, log=log)
-    values = rng.integers(0, 10_000, 600)
+    disk, sent = Disk(), Sent()
+    writer = WireLogWriter("run.wire", HEADER, open_file=disk, log=seed)
+    values = rng.integers(301, 5000, 600).tolist()
     stream = b"".join(b"R%04d\r" % value for value in values)
-    truth: dict[int, list[float]] = {}
-    at = done = 0
-    read = 0
+    at = done = read = 0
     while at < len(stream):
         read += 1
         size = int(rng.integers(1, 12))
-        writer.append(Kind.DATA, stream[at : at + size], mono_ns=read)
+        writer.append(Kind.DATA, stream[at : at + size], mono_ns=read * STEP_NS)
         at = min(at + size, len(stream))
-        truth[read] = [float(value) for value in values[done : at // 6]]
+        sent.by_time[read * STEP_NS] = values[done : at // 6]
+        sent.ends += [(len(disk.data), value) for value in values[done : at // 6]]
         done = at // 6
         if rng.random() < 0.01:
             writer.sync()
-    return disk, truth
+    return disk, sent
 
 
 def after_power_loss(disk: Disk, old: bytes, rng: np.random.Generator) -> tuple[bytes, int]:
@@ -117,25 +98,33 @@ def after_power_loss(disk: Disk, old: bytes, rng: np.random.Generator) -> tuple[
     return bytes(data), safe
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_power_loss_gives_no_wrong_value(seed: int) -> None:
-    """One hundred states a seed: every synced record is there, every value is one that was sent, in its own read."""
-    disk, truth = recording(seed, log=seed)
-    old = bytes(recording(seed + 100, log=seed + 100)[0].data)
-    whole = {record.sequence: record for record in parse_log(bytes(disk.data))}
+def demand_true(log: Path, sent: Sent, safe: int) -> None:
+    """Demand of the run file of a log that it holds what was synced, and of the rest true values at their times."""
+    out = log.with_suffix(".h5")
+    assert main(["-q", "recover", str(log), "-o", str(out), "--overwrite"]) == 0
+    with open_run(out) as run:
+        assert run.originals()[0].data == log.read_bytes()
+        samples = run.samples()
+    host_ns = np.empty(0, np.int64) if samples.host_ns is None else samples.host_ns
+    result = np.rint(1e3 * samples.distance).astype(int).tolist()
+    synced = sent.until(safe)
+    assert result[: len(synced)] == synced
+    for moment in np.unique(host_ns).tolist():
+        values = [value for value, at in zip(result, host_ns.tolist(), strict=True) if at == moment]
+        true = sent.by_time[moment]
+        assert values == true[len(true) - len(values) :], "a wrong value"
+
+
+@pytest.mark.parametrize(
+    ("seed", "states"), [(0, 25), pytest.param(1, max(25, KILLS), marks=pytest.mark.trials)], ids=["few", "many"]
+)
+def test_power_loss_gives_no_wrong_value(tmp_path: Path, seed: int, states: int) -> None:
+    """Every synced reading is in the run file; every other one is there as it was sent, at its time, or missing."""
+    disk, sent = recording(seed)
+    old = bytes(recording(seed + 100)[0].data)
     rng = np.random.default_rng(seed)
-    for _ in range(100):
+    log = tmp_path / "run.wire"
+    for _ in range(states):
         data, safe = after_power_loss(disk, old, rng)
-        contents = parse_log(data)
-        for record in (read := list(contents)):
-            written = whole[record.sequence]
-            assert (record.mono_ns, record.kind, record.payload) == (written.mono_ns, written.kind, written.payload)
-        synced = {number for number, record in whole.items() if record.offset < safe}
-        assert synced <= {record.sequence for record in read}
-        assert contents.header == HEADER
-        (samples,) = decode_log(contents, [SENSOR], chains_of)
-        host_ns = np.empty(0, np.int64) if samples.host_ns is None else samples.host_ns
-        for moment in np.unique(host_ns):
-            values = samples.distance[host_ns == moment].tolist()
-            sent = truth[int(moment)]
-            assert values == sent[len(sent) - len(values) :], "a wrong value"
+        log.write_bytes(data)
+        demand_true(log, sent, safe)
