@@ -49,9 +49,9 @@ def test_oracle_agrees_with_its_published_approximation(
     assert cipm_2007(temperature_c, pressure_pa, humidity) == pytest.approx(approximation, rel=2.5e-4)
 
 
-@pytest.mark.parametrize("temperature_c", [10.0, 15.0, 20.0, 25.0, 30.0])
-@pytest.mark.parametrize("pressure_pa", [90_000.0, 101_325.0, 104_000.0])
-@pytest.mark.parametrize("humidity", [0.0, 0.4, 0.8])
+@pytest.mark.parametrize("temperature_c", [10.0, 20.0, 30.0])
+@pytest.mark.parametrize("pressure_pa", [90_000.0, 104_000.0])
+@pytest.mark.parametrize("humidity", [0.0, 0.8])
 def test_density_is_the_cipm_2007_equations(temperature_c: float, pressure_pa: float, humidity: float) -> None:
     """The density is that of CIPM-2007 within its range, and nearly so a few degrees beyond."""
     expected = cipm_2007(temperature_c, pressure_pa, humidity)

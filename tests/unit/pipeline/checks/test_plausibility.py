@@ -49,14 +49,6 @@ def test_what_cannot_be_is_uncertain_by_as_much() -> None:
     assert unit["period"].u < 1e-3 * unit["period"].value
 
 
-def test_distances_from_the_first_sample_give_no_warning() -> None:
-    """Distances counted from the first one, as those summed up from a velocity, may be negative."""
-    t = np.arange(2000) / 100.0
-    y = 0.05 * np.cos(8.3 * t) - 0.05 + 1e-4 * np.random.default_rng(1).standard_normal(t.size)
-    y[0] = 0.0
-    assert not {f.code for f in analyse(Track.from_arrays(t, y)).findings if f.severity != "info"}
-
-
 @pytest.mark.parametrize(("hz", "rate_hz"), [(50.0, 500.0), (50.0, 120.0), (60.0, 500.0)])
 def test_the_mains_are_no_bob(hz: float, rate_hz: float) -> None:
     """A line of 0.5 mm at the mains frequency needs more than gravity, and leaves no amplitude worth quoting."""
