@@ -1,4 +1,4 @@
-"""The documentation runs: every ``python`` and ``console`` block of the pages below, in order, as a reader would.
+"""The documentation runs: every ``python`` and ``console`` block of its pages, in order, as a reader would.
 
 A ``console`` block is read line by line: ``$ `` begins a command, and what follows is what it prints, on either stream.
 A ``python`` block is a session with ``>>>`` or plain code. Where a block states an output it is compared as doctest
@@ -16,33 +16,11 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = (
-    "README.md",
-    "docs/tutorial.md",
-    "docs/how-to/add-a-format.md",
-    "docs/how-to/add-a-law.md",
-    "docs/how-to/add-a-sensor.md",
-    "docs/how-to/compare-runs.md",
-    "docs/how-to/compare-with-the-classic-method.md",
-    "docs/how-to/make-a-lab-report.md",
-    "docs/how-to/read-the-budget.md",
-    "docs/how-to/record-at-the-bench.md",
-    "docs/how-to/simulate-a-bench.md",
-    "docs/reference/formats.md",
-    "docs/reference/run-file.md",
-    "docs/reference/wire-log.md",
-    "docs/reference/command-line.md",
-    "docs/explanation/accuracy.md",
-    "docs/explanation/method.md",
-    "docs/explanation/real-records.md",
-    "docs/explanation/velocity.md",
-    "docs/explanation/a-published-report.md",
-    "docs/decisions/0004-demodulation-first.md",
-)
 LONG = (
     "docs/tutorial.md",
     "docs/how-to/compare-runs.md",
@@ -118,9 +96,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize(
-    "page", [pytest.param(page, marks=[pytest.mark.trials] if page in LONG else []) for page in PAGES]
-)
+def pages() -> list[Any]:
+    """Return every page with blocks that are run here; those with many commands are marked as trials."""
+    found = (path.relative_to(ROOT).as_posix() for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))])
+    run_here = [page for page in found if page not in ELSEWHERE and blocks_of(page)]
+    return [pytest.param(page, marks=[pytest.mark.trials] if page in LONG else []) for page in run_here]
+
+
+@pytest.mark.parametrize("page", pages())
 def test_every_block_of_a_page_does_what_it_says(page: str, folder: Path) -> None:
     """The blocks run in order and print what stands beneath them."""
     names: dict[str, object] = {"__name__": "__main__"}
@@ -130,18 +113,6 @@ def test_every_block_of_a_page_does_what_it_says(page: str, folder: Path) -> Non
             run_python(page, block, names)
         else:
             status = run_console(page, block, folder, status)
-
-
-def test_the_pages_that_run_hold_blocks() -> None:
-    """A page is listed above only if there is something on it to run."""
-    assert all(blocks_of(page) for page in PAGES)
-
-
-def test_no_page_with_blocks_is_left_out() -> None:
-    """Every page that has something to run is run here, or named with what runs it."""
-    found = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
-    pages = {path.relative_to(ROOT).as_posix() for path in found}
-    assert {page for page in pages if blocks_of(page)} == {*PAGES, *ELSEWHERE}
 
 
 def run_python(page: str, block: Block, names: dict[str, object]) -> None:
