@@ -44,7 +44,6 @@ def test_the_law_of_the_scene_is_the_stated_one() -> None:
     damping, derived = motion_of(analysis).damping, motion_of(analysis).derived
     assert (damping.selected, damping.admissible, damping.stated) == ("linear", ("linear",), "linear")
     assert derived.law == "linear"
-    assert derived.leading is None
     assert len(damping.fits) > 5
     assert analysis.estimates["damping_rate"].value == pytest.approx(0.0105, rel=0.05)
     assert derived.coefficients["gamma"].value == pytest.approx(analysis.estimates["damping_rate"].value, rel=1e-9)
@@ -52,14 +51,10 @@ def test_the_law_of_the_scene_is_the_stated_one() -> None:
 
 
 def test_a_stated_law_is_far_more_certain() -> None:
-    """Over any law the rate is several times as uncertain; the law that is ahead gives the number of the stated one."""
+    """Over any law the rate is several times as uncertain."""
     free = analyse(LINEAR)
     stated = analyse(LINEAR, Scene(damping_law="linear")).estimates["damping_rate"]
     assert free.estimates["damping_rate"].u > 2.0 * stated.u
-    leading = motion_of(free).derived.leading
-    assert leading is not None
-    assert leading.estimates["damping_rate"].value == pytest.approx(stated.value, rel=1e-9)
-    assert leading.estimates["damping_rate"].u == pytest.approx(stated.u, rel=1e-9)
 
 
 def test_an_option_replaces_the_law_of_the_scene() -> None:
@@ -77,7 +72,6 @@ def test_a_recording_may_contradict_the_stated_law() -> None:
     assert motion_of(analysis).damping.selected == "friction"
     assert "stated_law_rejected" in codes_of(analysis)
     (finding,) = (finding for finding in analysis.findings if finding.code == "stated_law_rejected")
-    assert "friction" in finding.message
     assert finding.values["bic_excess"] > 10.0
 
 
