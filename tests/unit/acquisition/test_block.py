@@ -14,12 +14,6 @@ def block(first: int = 0, count: int = 4, **more: np.ndarray) -> Block:
     return Block(first, t, 0.2 + t, np.zeros(count, np.uint8), **more)
 
 
-def test_a_slice_keeps_its_place_in_the_run() -> None:
-    """The first sample of a slice has the index it had."""
-    part = block(first=10)[1:3]
-    assert (part.first, len(part), part.t.tolist()) == (11, 2, [0.11, 0.12])
-
-
 def test_a_slice_takes_every_column_along() -> None:
     """Host times and velocities are cut like the rest."""
     part = block(host_ns=np.arange(4), velocity=np.arange(4.0))[2:]
@@ -49,11 +43,6 @@ def test_concatenate_fills_columns_that_some_blocks_lack() -> None:
     assert joined.velocity is not None
     assert joined.host_ns.tolist() == [-1, 5]
     np.testing.assert_array_equal(joined.velocity, [np.nan, 2.0])
-
-
-def test_concatenate_of_nothing_is_empty() -> None:
-    """No block at all gives one without samples."""
-    assert len(concatenate([])) == 0
 
 
 def test_flag_values_are_those_of_the_run_file() -> None:

@@ -41,23 +41,3 @@ def test_solution_is_that_of_the_full_matrix(nodes: int) -> None:
         block = dense[2 * k : 2 * k + 2, 2 * k : 2 * k + 2]
         np.testing.assert_allclose(solved.covariance[:, :, k], block, rtol=1e-9, atol=1e-12)
     assert solved.log_determinant == pytest.approx(np.linalg.slogdet(precision)[1], abs=1e-8)
-
-
-def test_covariance_is_left_out_unless_asked_for() -> None:
-    """Without being asked the solver returns the same means and no covariance."""
-    chain, _, _ = made(20, 1, 1)
-    assert chain.solve().covariance is None
-    np.testing.assert_allclose(chain.solve().mean, chain.solve(covariance=True).mean, rtol=1e-12)
-
-
-def test_node_without_observation_lies_between_its_neighbours() -> None:
-    """A node that nothing was seen of is interpolated, and known less well than those beside it."""
-    chain, _, _ = made(3, 1, 2)
-    chain.information[:, :, 1], chain.score[:, :, 1] = 0.0, 0.0
-    solved = chain.solve(covariance=True)
-    assert solved.covariance is not None
-    share = chain.bond[1] / chain.bond.sum()
-    between = (1.0 - share) * solved.mean[:, 0, 0] + share * solved.mean[:, 0, 2]
-    np.testing.assert_allclose(solved.mean[:, 0, 1], between, rtol=1e-10)
-    sizes = [float(np.trace(solved.covariance[:, :, k])) for k in range(3)]
-    assert sizes[1] > min(sizes[0], sizes[2])

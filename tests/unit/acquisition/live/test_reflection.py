@@ -35,15 +35,6 @@ def test_times_are_those_of_the_reflection() -> None:
     np.testing.assert_allclose(t, 0.01 * np.arange(6) + 1e-6 * ways, rtol=0, atol=1e-12)
 
 
-def test_the_way_is_remembered_from_read_to_read() -> None:
-    """Cut into single reads the stream gives the same times bit for bit."""
-    echoes = [1500.0, np.nan, 1600.0, np.nan]
-    lines = [line(i, echo) for i, echo in enumerate(echoes)]
-    whole, cut = (SensorChain(get_family("line-protocol"), rate_hz=100.0) for _ in range(2))
-    together = whole.feed(0, b"".join(lines)).t
-    assert together.tobytes() == np.concatenate([cut.feed(0, first).t for first in lines]).tobytes()
-
-
 def test_an_echo_of_an_earlier_ping_moves_no_time() -> None:
     """Sound on its way for longer than a period did not come from this ping: times go on forward."""
     chain = SensorChain(get_family("line-protocol"), rate_hz=100.0)

@@ -5,14 +5,12 @@ Written from manuals and public files' first lines: oscilloscopes, data loggers,
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.errors import NeedsAnswer, UnknownFormat
+from acquisition.errors import NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
 
@@ -257,56 +255,3 @@ def test_headings_keep_their_letters(tmp_path: Path, encoding: str, heading: str
     path = tmp_path / "run.csv"
     path.write_bytes(f"{heading}\n{rows('{t:.3f},{x:.4f}')}\n".encode(encoding))
     assert open_recording(path).channel == heading.split(",")[1].partition("(")[0].strip()
-
-
-@pytest.mark.parametrize("answers", [{"time": "column 2"}, {"time": "t"}, {"time": "T (s)"}])
-def test_times_may_be_named_by_name_or_number(tmp_path: Path, answers: dict[str, Any]) -> None:
-    """With or without the unit, in either case."""
-    path = tmp_path / "run.csv"
-    path.write_text("x (m),t (s),n (s)\n" + rows("{x:.4f},{t:.3f},{i}") + "\n", encoding="utf-8")
-    np.testing.assert_allclose(open_recording(path, channel="x", **answers).samples.t, T, atol=1e-9)
-
-
-REFUSED = {
-    "labels": (rows("t={t:.3f} x={x:.4f}"), "no format recognises it"),
-    "labels and units": (rows("Time: {t:.3f} s, Height: {x:.4f} m"), "no format recognises it"),
-    "objects": ("\n".join(json.dumps({"t": a, "x": b}) for a, b in zip(T, X, strict=True)), "JSON"),
-    "list of objects": (json.dumps([{"t": a, "x": b} for a, b in zip(T.tolist(), X.tolist(), strict=True)]), "JSON"),
-    "object of lists": (json.dumps({"time": T.tolist(), "x": X.tolist()}), "JSON"),
-    "lists of lists": (json.dumps(np.transpose([T, X]).tolist()), "JSON"),
-    "lists": (f"t = {T.tolist()}\nx = np.array({X.tolist()})\n", "lists of Python"),
-    "tuples": ("# t, x\n" + rows("({t:.3f}, {x:.4f}),"), "lists of Python"),
-    "markdown": ("| t (s) | x (m) |\n|---|---|\n" + rows("| {t:.3f} | {x:.4f} |"), "a table of Markdown"),
-    "pipes": ("t|x\n" + rows("{t:.3f}|{x:.4f}"), "no format recognises it"),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_wraps_its_rows_is_refused_by_name(tmp_path: Path, name: str) -> None:
-    """One line says what the file is, and what to do."""
-    text, named = REFUSED[name]
-    path = tmp_path / "run.txt"
-    path.write_text(text + "\n", encoding="utf-8")
-    with pytest.raises(UnknownFormat) as refusal:
-        open_recording(path)
-    assert named in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    "preamble", ["range: [0, 10, 20, 30]\n", "calibration: [1.0, 0.02, 3.4e-5, 2]\n", "notes:\n - 1\n - 2\n - 3\n"]
-)
-def test_a_table_below_a_line_of_settings_is_read(preamble: str, tmp_path: Path) -> None:
-    """One list above the table makes no YAML of it."""
-    path = tmp_path / "run.csv"
-    path.write_text(preamble + "t (s),x (m)\n" + rows("{t:.2f},{x:.5f}"))
-    assert len(open_recording(path).samples.t) == N
-
-
-def test_a_program_with_a_list_in_it_is_no_recording(tmp_path: Path) -> None:
-    """Lists are columns where they are most of a text, and not one line of many."""
-    path = tmp_path / "plot.py"
-    code = "\n".join(f"def figure_{name}(axes):\n    axes.plot(first, second, label={name!r})" for name in "abcdefgh")
-    path.write_text(f"masses = [0.1, 0.2, 0.3, 0.4]\n{code}\n", encoding="utf-8")
-    with pytest.raises(UnknownFormat):
-        open_recording(path)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from acquisition.errors import FormatError, NeedsAnswer, UnknownFormat
-from acquisition.recordings.identify import get_format, open_recording
-from acquisition.recordings.questions import Missing, MissingItem, Question
+from acquisition.errors import NeedsAnswer
+from acquisition.recordings.identify import open_recording
+from acquisition.recordings.questions import Missing
 from acquisition.recordings.recording import Recording
 
 T = [i / 20 for i in range(60)]
@@ -104,66 +103,3 @@ def test_an_answer_that_fits_nothing_is_asked_again(tmp_path: Path) -> None:
     with pytest.raises(NeedsAnswer) as caught:
         open_recording(path, run="7")
     assert caught.value.question.needs[0].choices == ("Run #1", "Run #2")
-
-
-def test_what_no_answer_helps_is_refused_and_not_asked() -> None:
-    """Three columns that all vary, a run of a file that holds one, and a rate below zero are errors, no questions."""
-    varied = "".join(f"{t}\t{i % 7}\t{i % 5}\n" for i, t in enumerate(T))
-    rows = "Time (s)\tDistance (cm)\n" + "".join(f"{t}\t{i % 7}\n" for i, t in enumerate(T))
-    pair = "Motion Sensor Data File\n" + "".join(f"{t}\t{i % 7}\n" for i, t in enumerate(T))
-    reader: Any = get_format("motion-sensor")
-    calls = (
-        lambda: reader.read("a.txt", f"Motion Sensor Data File\n{varied}".encode()),
-        lambda: reader.read("a.txt", rows.encode(), run="2"),
-        lambda: reader.read("a.txt", rows.encode(), time="t"),
-        lambda: reader.read("a.txt", rows.encode(), rate_hz=-1.0),
-        lambda: reader.read_pair(("a.txt", rows.encode()), ("b.txt", pair.encode())),
-    )
-    for call in calls:
-        with pytest.raises(FormatError) as refused:
-            call()
-        assert not isinstance(refused.value, NeedsAnswer)
-
-
-def test_the_sentence_knows_no_shell(tmp_path: Path) -> None:
-    """A reader does not know who asked: no option and no name of a program stands in its message."""
-    path = tmp_path / "run.txt"
-    for text in FILES.values():
-        path.write_text(text, encoding="utf-8")
-        with pytest.raises(NeedsAnswer) as question:
-            open_recording(path)
-        words = str(question.value)
-        assert "\n" not in words
-        assert " --" not in words
-        assert "springmass" not in words
-
-
-@pytest.mark.parametrize(
-    "error",
-    [
-        FormatError("run.txt", "expected rows", "export it again", line=3),
-        UnknownFormat("run.txt", "expected rows", "export it again"),
-        NeedsAnswer(Question("run.txt", (MissingItem(Missing.RUN, ("a", "b"), "a"),), ("x",)), line=2),
-        NeedsAnswer(Question("run.txt", (MissingItem(Missing.UNIT, ("m",), "m", of="x"),)), "give the unit"),
-    ],
-    ids=lambda error: type(error).__name__,
-)
-def test_errors_of_files_travel_between_processes(error: FormatError) -> None:
-    """Message, type and fields are the same on the other side."""
-    error.add_note("of the third file")
-    back = pickle.loads(pickle.dumps(error))
-    assert type(back) is type(error)
-    assert str(back) == str(error)
-    assert vars(back) == vars(error)
-
-
-def test_yaml_is_refused_by_its_name(tmp_path: Path) -> None:
-    """Lists below each other would be strung together as one channel; a list in line with its key is no table."""
-    path = tmp_path / "run.yml"
-    items = "".join(f"- {t}\n" for t in T)
-    path.write_text(f"type: xy\nx_data:\n{items}y_data:\n{items}", encoding="utf-8")
-    with pytest.raises(UnknownFormat, match="YAML"):
-        open_recording(path)
-    path.write_text(f"t: {T}\nx: {[0.5 + i % 4 for i in range(60)]}\n", encoding="utf-8")
-    with pytest.raises(UnknownFormat, match="YAML"):
-        open_recording(path, unit="m")

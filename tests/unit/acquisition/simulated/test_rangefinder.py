@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import islice
 from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.block import Flag
-from acquisition.errors import SensorError
 from acquisition.simulated.rangefinder import Shot, VirtualRangefinder, VirtualSensor
 
 QUIET: dict[str, Any] = {"noise_m": 0.0, "false_echo_rate_hz": 0.0}
@@ -51,15 +48,6 @@ def test_echo_times_stand_on_the_tick_lattice(tick_s: float) -> None:
     assert np.max(np.abs(echo * 1e-6 - true)) <= 0.5 * tick_s + 1e-8
 
 
-def test_distance_is_half_the_echo_time_at_the_speed_of_sound() -> None:
-    """A sensor in colder air hears later, and states the same distance."""
-    cold, warm = (shots(lambda _: 0.31, 50, speed_of_sound_m_per_s=speed) for speed in (331.3, 349.0))
-    for a, b in zip(cold, warm, strict=True):
-        assert a.echo_us > b.echo_us
-        assert a.distance_m == pytest.approx(0.5e-6 * a.echo_us * 331.3, rel=1e-12)
-        assert a.distance_m == pytest.approx(b.distance_m, abs=50e-6)
-
-
 @pytest.mark.parametrize("noise_m", [80e-6, 1e-3])
 def test_noise_has_the_level_asked_for(noise_m: float) -> None:
     """The distances of a bob at rest scatter by the noise, normally and without memory."""
@@ -80,16 +68,6 @@ def test_an_echo_within_the_dead_time_is_no_target() -> None:
     np.testing.assert_array_equal([math.isnan(shot.echo_us) for shot in result], near)
 
 
-def test_a_fixed_object_makes_a_plateau() -> None:
-    """Beyond the far limit every reading is the limit's."""
-    result = distances(bob, 500, far_limit_m=0.28)
-    beyond = np.array([met(i / 100) >= 0.28 for i in range(500)])
-    assert beyond.sum() > 50
-    assert len(set(result[beyond])) == 1
-    assert result[beyond][0] == pytest.approx(0.28, abs=25e-6)
-    assert np.all(result[~beyond] < 0.28 + 25e-6)
-
-
 @pytest.mark.parametrize("crystal_ppm", [-80.0, 0.0, 50.0])
 def test_a_crystal_that_is_off_takes_its_readings_early_or_late(crystal_ppm: float) -> None:
     """A clock that runs fast shows 10 ms a reading and takes them sooner than that."""
@@ -97,23 +75,6 @@ def test_a_crystal_that_is_off_takes_its_readings_early_or_late(crystal_ppm: flo
     assert result[-1].device_us == 11_999 * 10_000
     assert result[-1].true_s == pytest.approx(119.99 / (1 + crystal_ppm * 1e-6), rel=1e-12)
     assert result[-1].distance_m == pytest.approx(met(result[-1].true_s), abs=25e-6)
-
-
-def test_the_device_clock_wraps() -> None:
-    """After 71.6 minutes the microseconds start over while the sequence goes on."""
-    finder = VirtualRangefinder(bob, VirtualSensor(), np.random.default_rng(1))
-    before, after = finder.shot(429_496), finder.shot(429_497)
-    assert (before.device_us, after.device_us) == (4_294_960_000, 4_294_970_000 - (1 << 32))
-    assert after.sequence == 429_497
-
-
-def test_jitter_moves_the_moment_and_not_the_stamp() -> None:
-    """The stamps stay even while the distances scatter by speed times jitter."""
-    result = shots(lambda t: 0.3 + 0.1 * t, 2000, jitter_s=1e-3)
-    np.testing.assert_allclose(np.diff([shot.true_s for shot in result]), 0.01, atol=1e-9)
-    # A bob that goes away is met a little further off: by its speed over that of sound.
-    error = np.array([shot.distance_m - (0.3 + 0.1 * shot.true_s) / (1 - 0.1 / 344.0) for shot in result])
-    assert np.std(error) == pytest.approx(1e-4, rel=0.1)
 
 
 def test_false_echoes_come_in_clusters_where_the_bob_turns_near_the_sensor() -> None:
@@ -138,12 +99,6 @@ def test_the_seed_gives_the_same_readings_again() -> None:
     assert first.tobytes() != second.tobytes()
 
 
-def test_readings_without_end_are_the_single_ones() -> None:
-    """The iterator takes the same readings as calls with consecutive numbers."""
-    stream, finder = (VirtualRangefinder(bob, VirtualSensor(), np.random.default_rng(3)) for _ in range(2))
-    assert list(islice(stream.shots(), 50)) == [finder.shot(i) for i in range(50)]
-
-
 def finder(**sensor: Any) -> VirtualRangefinder:
     """Return a rangefinder over the bob."""
     return VirtualRangefinder(bob, VirtualSensor(**sensor), np.random.default_rng(2))
@@ -158,37 +113,3 @@ def test_a_block_holds_the_readings_of_its_seconds_at_their_times() -> None:
     np.testing.assert_allclose(samples.t, np.arange(12_001) / 100.0 + samples.distance / 344.0, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(samples.distance, [shot.distance_m for shot in shots])
     np.testing.assert_array_equal(samples.host_ns, [round(shot.true_s * 1e9) for shot in shots])
-
-
-def test_simulated_data_says_that_it_is() -> None:
-    """The kind is simulated, the clock the device's, and the step that of a tick."""
-    info = finder(tick_s=4e-6).info("bench")
-    assert (info.kind, info.clock, info.rate_hz, info.name) == ("simulated", "device", 100.0, "bench")
-    assert info.quantum_m == pytest.approx(0.5 * 4e-6 * 344.0)
-
-
-def test_no_target_is_a_missing_sample_of_a_block() -> None:
-    """A reading within the dead time is NaN and flagged."""
-    samples = finder(dead_time_s=1.2e-3).block(10.0)
-    missing = np.isnan(samples.distance)
-    assert 0 < missing.sum() < len(samples)
-    np.testing.assert_array_equal(samples.flags, np.where(missing, Flag.MISSING, 0))
-
-
-@pytest.mark.parametrize(
-    ("seconds", "crystal_ppm", "expected"), [(0.07, 0.0, 7), (0.071, 0.0, 8), (1000.0, 100.0, 100_010), (0.0, 0.0, 0)]
-)
-def test_a_block_ends_after_its_seconds_of_true_time(seconds: float, crystal_ppm: float, expected: int) -> None:
-    """Every reading is taken before the end, and the next one would not be."""
-    assert len(finder(crystal_ppm=crystal_ppm).block(seconds)) == expected
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("rate_hz", 0.0), ("tick_s", math.nan), ("speed_of_sound_m_per_s", math.inf), ("noise_m", -1.0), ("jitter_s", -1)],
-)
-def test_impossible_settings_are_refused_by_name(name: str, value: float) -> None:
-    """The message is one line with the setting and its value."""
-    with pytest.raises(SensorError, match=f"{name} must .*got {value}") as error:
-        VirtualSensor(**{name: value})
-    assert "\n" not in str(error.value)
