@@ -7,23 +7,22 @@ and held here as well: one flip spoils at most two readings, and the ones after 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
-from acquisition.block import Flag
 from acquisition.decoders.example import FAMILY as EXAMPLE
-from acquisition.decoders.family import Decoder, Family, Polled
+from acquisition.decoders.family import Decoder, Family
 from acquisition.decoders.registry import families, get_family
-from acquisition.readings import COLUMNS, Readings
+from acquisition.readings import Reading
+from tests.sampling import sampled
 
 N = 24
 _I = np.arange(N)
 DISTANCE = np.where(_I % 7 == 5, np.nan, 0.8 + 0.4 * np.sin(1.3 * _I))
-ECHO_US = 2e6 * DISTANCE / 343.0
 TEMPERATURE_C = 18.0 + 0.25 * _I
 SEQUENCE = 4_294_967_290 + _I  # wraps midway where the device's counter has 32 bits
 DEVICE_US = 10_000 * _I + 7
@@ -70,20 +69,18 @@ class Case:
         return self.member.decoder(**self.options)
 
     def frames(self, distance: np.ndarray[Any, np.dtype[np.float64]] = DISTANCE) -> list[bytes]:
-        """Return the bytes of each reading; a polled temperature stands before the distance that it goes with."""
+        """Return the bytes of each reading."""
         encoder = self.member.encoder(**self.options)
-        every = int(self.options.get("temperature_every", 0))
-
-        def encode(i: int) -> bytes:
-            return encoder.encode(
+        return [
+            encoder.encode(
                 sequence=int(SEQUENCE[i]),
                 device_us=int(DEVICE_US[i]),
                 echo_us=2e6 * float(distance[i]) / 343.0,
                 distance_m=float(distance[i]),
                 temperature_c=float(TEMPERATURE_C[i]),
             )
-
-        return [(encode(i) if every and i and i % every == 0 else b"") + encode(i) for i in range(len(distance))]
+            for i in range(len(distance))
+        ]
 
 
 def hexed(text: str) -> bytes:
@@ -107,13 +104,10 @@ CASES = [
         no_target=(hexed("ff0000ff"), hexed("fffffdfb"), hexed("fffffefc")),
     ),
     Case("us100", 0.001, "unseen", known={hexed("07a1"): 1.953}, no_target=(hexed("0000"), hexed("ffff"))),
-    Case("us100", 0.001, "unseen", {"temperature_every": 3}),
     Case("urm37", 0.01, "detected", known={hexed("220123 46"): 2.91}, no_target=(hexed("22ffff20"),)),
-    Case("urm37", 0.01, "detected", {"temperature_every": 4}),
     Case(
         "sen0149", 0.001, "detected", known={hexed("55aa110202 1234 5a"): 4.66}, no_target=(hexed("55aa110202ffff12"),)
     ),
-    Case("sen0149", 0.001, "detected", {"temperature_every": 4}),
     Case("text-lines", 1e-6, "unseen", lead=1, known={b"123.4\n": 1.234}, no_target=(b"0\r\n", b"-1\n")),
     Case("text-lines", 1e-6, "unseen", {"unit": "us"}, lead=1, no_target=(b"0\n", b"38000\n")),
     Case(
@@ -147,21 +141,27 @@ every_case = of(CASES)
 every_framed_case = of([case for case in CASES if case.member.self_framing])  # of the others any two bytes are a reply
 
 
-def run(case: Case, *reads: bytes) -> tuple[Readings, Decoder]:
+def run(case: Case, *reads: bytes) -> tuple[list[Reading], Decoder]:
     """Feed reads to a fresh decoder, return all it gave and the decoder."""
     decoder = case.decoder()
-    return Readings(row for i, data in enumerate(reads) for row in decoder.feed(1_000 + i, data)), decoder
+    return [reading for i, data in enumerate(reads) for reading in decoder.feed(1_000 + i, data)], decoder
 
 
-def columns(readings: Readings, rows: slice = slice(None)) -> dict[str, bytes]:
-    """Return every column but the host's time, as bytes."""
-    names = [name for name in COLUMNS if name != "host_ns"]
-    return {name: getattr(readings, name)[rows].tobytes() for name in names}
+def columns(readings: Sequence[Reading], rows: slice = slice(None)) -> list[str]:
+    """Return every reading without the host's time, comparable bit for bit."""
+    return [repr(reading._replace(host_ns=0)) for reading in readings[rows]]
 
 
-def in_metres(readings: Readings) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return distances, echo times turned into them as the encoder's were made."""
-    return np.where(np.isnan(readings.echo_us), readings.distance_m, readings.echo_us * 343.0 / 2e6)
+def in_metres(readings: Sequence[Reading]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return distances, echo times turned into them as the encoder's were made; NaN for no target."""
+    echoes = np.array([reading.echo_us for reading in readings], float)
+    distances = np.array([reading.distance_m for reading in readings], float)
+    return np.where(np.isnan(echoes), distances, echoes * 343.0 / 2e6)
+
+
+def numbered(readings: Sequence[Reading]) -> list[tuple[int, float]]:
+    """Return the counter and the distance of each reading."""
+    return [(reading.sequence, at) for reading, at in zip(readings, in_metres(readings).tolist(), strict=True)]
 
 
 def flushes(case: Case) -> bool:
@@ -176,11 +176,11 @@ def test_every_family_of_the_registry_has_a_case() -> None:
 
 @every_case
 def test_what_was_encoded_is_decoded(case: Case) -> None:
-    """Distances come back to the rounding of the wire, and no target as NaN with its flag."""
+    """Distances come back to the rounding of the wire, and no target as NaN."""
     readings, decoder = run(case, b"".join(case.frames()))
     assert len(readings) == N - case.lead
     np.testing.assert_allclose(in_metres(readings), DISTANCE[case.lead :], atol=case.step_m / 2 + 1e-9)
-    np.testing.assert_array_equal(readings.flags, np.where(np.isnan(DISTANCE[case.lead :]), Flag.MISSING, 0))
+    np.testing.assert_array_equal(np.isnan(in_metres(readings)), np.isnan(DISTANCE[case.lead :]))
     assert decoder.pending == 0
     assert sum(decoder.faults.values()) == 0 or case.lead
 
@@ -191,38 +191,15 @@ def test_device_time_and_counter_come_back(case: Case) -> None:
     readings, _ = run(case, b"".join(case.frames()))
     own = case.member.has_device_time
     if own or "sequence" in case.options:
-        np.testing.assert_array_equal(readings.sequence, SEQUENCE[case.lead :] % (1 << 32 if own else 1 << 62))
+        assert [reading.sequence for reading in readings] == (
+            SEQUENCE[case.lead :] % (1 << 32 if own else 1 << 62)
+        ).tolist()
     else:
-        assert (readings.sequence == -1).all()
+        assert {reading.sequence for reading in readings} == {-1}
     if own or "time" in case.options:
-        np.testing.assert_array_equal(readings.device_us, DEVICE_US[case.lead :])
+        assert [reading.device_us for reading in readings] == DEVICE_US[case.lead :].tolist()
     else:
-        assert (readings.device_us == -1).all()
-
-
-@every_case
-def test_temperatures_come_back(case: Case) -> None:
-    """With each reading where the wire carries them so, with the next distance where they are asked for apart."""
-    readings, _ = run(case, b"".join(case.frames()))
-    every = int(case.options.get("temperature_every", 0))
-    expected = np.full(N, np.nan)
-    if case.family == "line-protocol" or "temperature" in case.options:
-        expected = TEMPERATURE_C
-    elif every:
-        expected = np.where((_I > 0) & (_I % every == 0), TEMPERATURE_C, np.nan)
-    step = 1.0 if case.family == "us100" else 0.1
-    np.testing.assert_allclose(readings.temperature_c, expected[case.lead :], atol=step / 2 + 1e-9)
-
-
-@every_case
-def test_columns_have_their_types(case: Case) -> None:
-    """Arrays of one length, of the types that Readings says, also for one frame and for none."""
-    frames = case.frames()
-    for size in (0, 1 + case.lead, N):
-        readings, _ = run(case, b"".join(frames[:size]))
-        types = [getattr(readings, name).dtype for name in COLUMNS]
-        assert types == [np.int64] * 3 + [np.float64] * 3 + [np.uint8]
-        assert {getattr(readings, name).size for name in COLUMNS} == {max(size - case.lead, 0)}
+        assert {reading.device_us for reading in readings} == {-1}
 
 
 @every_case
@@ -233,8 +210,8 @@ def test_frames_carry_the_time_of_the_read_that_completed_them(case: Case) -> No
     decoder = case.decoder()
     first = decoder.feed(111, b"".join(frames[:3]) + frames[3][:half])
     second = decoder.feed(222, frames[3][half:] + frames[4])
-    assert first.host_ns.tolist() == [111] * (3 - case.lead)
-    assert second.host_ns.tolist() == [222] * 2
+    assert [reading.host_ns for reading in first] == [111] * (3 - case.lead)
+    assert [reading.host_ns for reading in second] == [222] * 2
 
 
 @every_case
@@ -252,11 +229,8 @@ def test_no_target_is_a_missing_sample_and_never_a_distance(case: Case) -> None:
     lead = b"\n" if case.lead else b""
     for frame in [*case.no_target, *case.frames(np.full(4, np.nan))]:
         readings, _ = run(case, lead + frame)
-        if len(frame) == 1:  # a temperature
-            continue
-        assert readings.flags.tolist() == [Flag.MISSING], frame
-        assert np.isnan(readings.distance_m).all()
-        assert np.isnan(readings.echo_us).all()
+        assert len(readings) == 1, frame
+        assert np.isnan(in_metres(readings)).all()
 
 
 def dirty(case: Case, seed: int) -> bytes:
@@ -277,17 +251,18 @@ def dirty(case: Case, seed: int) -> bytes:
 
 @every_case
 @pytest.mark.parametrize("state", ["clean", "dirty", "long"])
-def test_readings_do_not_depend_on_how_the_stream_was_cut(case: Case, state: str) -> None:
-    """Cut at every place, into single bytes, and at random: the same readings and the same faults."""
+@pytest.mark.parametrize("step", sampled([5, 1], 1))
+def test_readings_do_not_depend_on_how_the_stream_was_cut(case: Case, state: str, step: int) -> None:
+    """Cut in two at many places, into single bytes, and at random: the same readings and the same faults."""
     frames = case.frames()
     long = [*frames[:3], b"x" * 300, *frames[3:6], b"x" * 300]  # more than any line may have, before a frame
     data = {"clean": b"".join(frames), "dirty": dirty(case, 5), "long": b"".join(long)}[state]
     whole, decoder = run(case, data)
     expected = (columns(whole), dict(decoder.faults), decoder.pending)
     rng = np.random.default_rng(6)
-    cuts = [[at] for at in range(len(data) + 1)]
+    cuts = [[at] for at in range(0, len(data) + 1, step)]
     cuts += [list(range(1, len(data)))]
-    cuts += [sorted(rng.integers(0, len(data), 9).tolist()) for _ in range(30)]
+    cuts += [sorted(rng.integers(0, len(data), 9).tolist()) for _ in range(30 // step)]
     for cut in cuts:
         reads = [data[a:b] for a, b in zip([0, *cut], [*cut, len(data)], strict=True)]
         readings, decoder = run(case, *reads)
@@ -304,11 +279,12 @@ def garbage(seed: int) -> bytes:
 
 @every_case
 @pytest.mark.parametrize("at", [0, 9, N], ids=["before", "between", "after"])
-def test_back_in_step_within_two_frames_of_garbage(case: Case, at: int) -> None:
+@pytest.mark.parametrize("seeds", sampled([20, 100], 1))
+def test_back_in_step_within_two_frames_of_garbage(case: Case, at: int, seeds: int) -> None:
     """What came before the garbage stands, and from the third frame after it on every one is read as sent."""
     frames = case.frames()
     clean, _ = run(case, b"".join(frames))
-    for seed in range(100):
+    for seed in range(seeds):
         decoder = case.decoder()
         before = decoder.feed(0, b"".join(frames[:at]))
         decoder.feed(1, garbage(seed))
@@ -351,16 +327,14 @@ def test_back_in_step_within_two_frames_of_a_lost_byte(case: Case) -> None:
 @every_case
 def test_a_flipped_bit_makes_no_reading_or_costs_no_more_than_two(case: Case) -> None:
     """With a checksum nothing that was not sent is read; without, one flip changes at most two readings."""
-    frames = case.frames()[:10]
-    data = b"".join(frames)
+    data = b"".join(case.frames()[:10])
     clean, _ = run(case, data)
-    sent = set(zip(clean.sequence.tolist(), in_metres(clean).tolist(), strict=True))
+    sent = set(numbered(clean))
     for bit in range(len(data) * 8):
         flipped = bytearray(data)
         flipped[bit // 8] ^= 1 << bit % 8
         readings, decoder = run(case, bytes(flipped))
-        rows = zip(readings.sequence.tolist(), in_metres(readings).tolist(), strict=True)
-        strange = [row for row in rows if row not in sent and not math.isnan(row[1])]
+        strange = [row for row in numbered(readings) if row not in sent and not math.isnan(row[1])]
         assert len(strange) <= (0 if case.changes == "detected" else 2), (bit, strange)
         assert abs(len(clean) - len(readings)) <= (2 if case.member.self_framing else 3)
         if case.changes == "detected":
@@ -395,65 +369,13 @@ def test_a_flush_forgets_the_frame_that_has_begun(case: Case) -> None:
 
 
 @every_case
-@pytest.mark.parametrize("filler", [b"\xff", b"\0", b"1", b"R", b"$", b"\x55\xaa", b"noise"], ids=repr)
+@pytest.mark.parametrize("filler", sampled([b"\xff", b"R", b"\0", b"1", b"$", b"\x55\xaa", b"noise"]), ids=repr)
 def test_memory_is_bounded_on_a_stream_without_frame_ends(case: Case, filler: bytes) -> None:
-    """A quarter of a mebibyte of anything leaves a few hundred bytes behind, in small reads or large."""
+    """Many bytes of anything leave a few hundred bytes behind, in small reads or large."""
     decoder = case.decoder()
-    for size in [1] * 600 + [4096] * 64:
+    for size in [1] * 600 + [4096] * 16:
         decoder.feed(0, (filler * size)[:size])
         assert decoder.pending <= MOST_PENDING
-
-
-@every_case
-def test_what_it_gave_does_not_change_when_it_goes_on(case: Case) -> None:
-    """Neither the decoder nor whoever writes into a column changes readings that were handed out."""
-    frames = case.frames()
-    decoder = case.decoder()
-    first = decoder.feed(0, b"".join(frames[:5]))
-    before = columns(first)
-    second = decoder.feed(0, b"".join(frames[5:]))
-    for readings in (first, second):
-        readings.distance_m[:] = 7
-        readings.temperature_c[:] = 7
-        assert not (readings.distance_m == 7).any()
-    assert columns(first) == before
-    assert not (decoder.feed(0, b"".join(frames)).distance_m == 7).any()
-
-
-POLLED = [case for case in CASES if case.member.poll is not None]
-
-
-def conversation(case: Case, lost: frozenset[int]) -> Iterator[tuple[bytes, Readings]]:
-    """Ask forty times as the reader does; replies of the numbers in ``lost`` never come."""
-    decoder = cast(Polled, case.decoder())
-    encoder = cast(Any, case.member.encoder(**case.options))
-    for i in range(40):
-        request = decoder.request
-        reply = encoder.reply(request, distance_m=0.5 + 0.01 * i, temperature_c=float(i))
-        if i in lost:
-            decoder.feed(i, reply[:-1])
-            decoder.flush()
-            continue
-        assert decoder.pending == 0
-        yield request, decoder.feed(i, reply)
-
-
-@pytest.mark.parametrize("case", POLLED, ids=lambda case: f"{case.family}-{len(case.options)}")
-def test_a_polled_sensor_is_asked_in_turn(case: Case) -> None:
-    """Distances, and after as many as asked for a temperature; a lost reply of either kind shifts nothing."""
-    poll = case.member.poll
-    assert poll is not None
-    every = int(case.options.get("temperature_every", 0))
-    for lost in (frozenset[int](), frozenset({0, 7, 8, 15, 21}), frozenset(range(0, 40, 3))):
-        talk = list(conversation(case, lost))
-        readings = Readings(reading for _, given in talk for reading in given)
-        requests = [request for request, _ in talk]
-        assert len(readings) == requests.count(poll.request)
-        assert not readings.flags.any()
-        assert (np.abs(in_metres(readings) - 0.7) < 0.21).all()
-        assert bool(np.isfinite(readings.temperature_c).any()) is (
-            every > 0 and requests.count(poll.request) < len(requests)
-        )
 
 
 def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:
@@ -466,5 +388,4 @@ def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:
     decoder = get_family("us100").decoder()
     readings = decoder.feed(0, b"\x99" + data)
     assert decoder.faults["resynchronised"] == 1
-    assert np.isnan(readings.distance_m[:2]).all()
-    np.testing.assert_allclose(readings.distance_m[2:], distances[1:], atol=1e-9)
+    np.testing.assert_allclose(in_metres(readings), [math.nan, math.nan, *distances[1:]], atol=1e-9)

@@ -158,9 +158,3 @@ def test_inside_the_limit_nothing_grows_and_beyond_it_all_does(name: str) -> Non
         assert inside.relative_energy()[-1] < 0.5
         grown = integrator.run(problem, 1.02 * limit, 500, every=500)
         assert grown.relative_energy()[-1] > 1.05
-
-
-def test_names_are_told() -> None:
-    """An unknown name gives one line with the allowed ones."""
-    with pytest.raises(DynamicsError, match=r"unknown method 'leapfrog'; allowed are auto, forward-euler, .*lsoda"):
-        get_integrator("leapfrog")

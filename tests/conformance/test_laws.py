@@ -9,11 +9,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipeline.damping import select as damping
-from pipeline.damping.laws import LAWS, Drag, Law, in_units, words_of
+from pipeline.damping.laws import LAWS, Drag, Law, in_units
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.numerics.least_squares import central_differences
-from pipeline.registry.laws import LAW_NAMES
 from pipeline.windows.demodulate import Demodulated
+from tests.sampling import sampled
 
 # Rows of coefficients; a law takes those that its parameters name.
 BENCHES = (
@@ -76,14 +76,6 @@ def integrated(law: Law, bench: dict[str, float]) -> np.ndarray:
     return result
 
 
-def test_name_is_key_and_amplitude_comes_first(law: Law) -> None:
-    """A law is found under its own name, has the amplitude in front, and contains laws that have names too."""
-    assert LAWS[law.name] is law
-    assert next(iter(law.parameters.items())) == ("A0", (1, 0, ""))
-    assert set(law.cases) < set(LAWS)
-    assert words_of(law)
-
-
 @pytest.mark.parametrize("bench", [*BENCHES, *STOPPING])
 def test_amplitude_solves_its_differential_equation(law: Law, bench: dict[str, float]) -> None:
     """The closed form is what an integrator makes of the equation, to 1e-10 of the first amplitude."""
@@ -127,8 +119,8 @@ def test_jacobian_is_the_derivative(law: Law, bench: dict[str, float]) -> None:
         )
 
 
-@pytest.mark.parametrize("time_s", [1e-3, 1.0, 60.0])
-@pytest.mark.parametrize("length_m", [1e-9, 1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("time_s", sampled([1e-3, 60.0, 1.0], 1))
+@pytest.mark.parametrize("length_m", sampled([1e-3, 1e3, 1e-9, 1.0]))
 @pytest.mark.parametrize("bench", [BENCHES[0], *STOPPING])
 def test_units_do_not_matter(law: Law, bench: dict[str, float], length_m: float, time_s: float) -> None:
     """Parameters in other units by their exponents give the same fall and rate in those units, and come back."""
@@ -142,8 +134,8 @@ def test_units_do_not_matter(law: Law, bench: dict[str, float], length_m: float,
     np.testing.assert_allclose(back, theta, rtol=1e-12)
 
 
-@pytest.mark.parametrize("length_m", [1e9, 1e3, 1.0, 1e-3])
-@pytest.mark.parametrize("count", [8, 40, 160])
+@pytest.mark.parametrize("length_m", sampled([1e9, 1e-3, 1.0, 1e3]))
+@pytest.mark.parametrize("count", sampled([8, 160, 40]))
 @pytest.mark.parametrize("bench", FADING)
 def test_guess_leads_the_fit_to_the_truth(
     law: Law, bench: dict[str, float], count: int, length_m: float, windows: Callable[..., Demodulated]
@@ -294,8 +286,3 @@ def test_several_motions_are_each_what_its_law_gives() -> None:
         values = amplitudes(T, np.array(rows))
         for row, law in zip(values, drags, strict=True):
             np.testing.assert_allclose(row, amplitude_of(law, T, theta_of(law, bench)), rtol=1e-13)
-
-
-def test_every_law_can_be_named() -> None:
-    """Options and scene files list the laws that ship, in the order in which they are tried."""
-    assert tuple(LAWS) == LAW_NAMES

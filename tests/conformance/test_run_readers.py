@@ -14,10 +14,9 @@ import pytest
 from acquisition.block import Block, Flag
 from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
-from storage.errors import RunDamaged
-from storage.run_file.layout import CHUNK
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
+from tests.sampling import sampled
 
 xr = pytest.importorskip("xarray")
 
@@ -47,8 +46,15 @@ def write(path: Path, n: int, *, full: bool) -> Path:
 
 
 @pytest.fixture(
-    params=[(300, True), (300, False), (0, True), (0, False), (CHUNK + 1, True)],
-    ids=["full", "least", "empty", "least empty", "growing"],
+    params=sampled(
+        [
+            pytest.param((300, True), id="full"),
+            pytest.param((0, False), id="least empty"),
+            pytest.param((300, False), id="least"),
+            pytest.param((0, True), id="empty"),
+            pytest.param((65_537, True), id="growing"),
+        ]
+    )
 )
 def path(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """Return a run file in each of the shapes that the layout allows."""
@@ -63,7 +69,6 @@ def test_xarray_opens_the_signal(path: Path, engine: Literal["h5netcdf", "netcdf
         pytest.importorskip("netCDF4")
     with open_run(path) as run:
         own = run.load_dataset()
-        xr.testing.assert_identical(run.dataset().load(), own)
     with xr.open_dataset(path, group="entry/signal", engine=engine) as result:
         assert tuple(result.sizes) == ("time",)
         assert result.time.dtype == np.float64
@@ -91,29 +96,13 @@ def test_xarray_opens_the_file_without_being_told_a_group(path: Path, engine: Li
 def test_a_file_without_names_at_the_root_opens(path: Path) -> None:
     """As files from before there were any: it verifies, and its samples are the same."""
     with open_run(path) as run:
-        own, names = run.load_dataset(), list(run.dataset().variables)
+        own = run.load_dataset()
     with h5py.File(path, "r+") as file:
-        for name in names:
+        for name in set(file) - {"entry", "raw", "wire"}:
             del file[name]
-        assert set(file) <= {"entry", "raw", "wire"}
     with open_run(path) as run:
         run.verify()
         xr.testing.assert_identical(run.load_dataset(), own)
-
-
-@pytest.mark.parametrize("name", ["distance", "other"])
-def test_an_array_at_the_root_that_is_no_column_is_refused(tmp_path: Path, name: str) -> None:
-    """Another array under a column's name there, or under a new one, would be shown for the run's own."""
-    path = write(tmp_path / "run.h5", 300, full=False)
-    with h5py.File(path, "r+") as file:
-        values = file["entry/signal/distance"][:]
-        if name in file:
-            del file[name]
-        file[name] = values
-    with open_run(path) as run, pytest.raises(RunDamaged, match=f"/{name}.* is damaged"):
-        run.verify()
-    with open_run(path) as run, pytest.raises(RunDamaged, match=f"/{name}"):
-        run.dataset()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
