@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from pipeline.numerics.estimate import Estimate, Joint, format_value
@@ -62,7 +62,6 @@ def test_not_finite_is_printed_as_such(value: float, u: float) -> None:
 SIGNED = st.builds(lambda m, p, s: s * m * 10.0**p, st.floats(1, 9.999), st.integers(-30, 30), st.sampled_from([-1, 1]))
 
 
-@settings(max_examples=500)
 @given(SIGNED | st.just(0.0), st.floats(1, 9.9999), st.integers(-12, 3), st.sampled_from(["", "s", "N/m"]))
 @example(value=0.0999, mantissa=9.96, power=-2, unit="")
 @example(value=999999.9, mantissa=1.0, power=0, unit="")
@@ -77,7 +76,6 @@ def test_printed_value_is_the_value_within_a_tenth_of_u(value: float, mantissa: 
     assert len(digits.partition(".")[2]) == len(u_digits.partition(".")[2])
 
 
-@settings(max_examples=300)
 @given(st.floats(-9.9e5, 9.9e5), st.floats(1e-4, 9.9e5))
 def test_u_has_two_digits(value: float, u: float) -> None:
     """u is printed with two significant digits, no more and no fewer."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from types import ModuleType
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-import pipeline.analyse
-import pipeline.analysis
-from pipeline.analyse import analyse
+from pipeline.analyse import STANDARD, analyse
+from pipeline.damping.laws.of_function import make_law
 from pipeline.errors import AnalysisError
 from pipeline.numerics.threads import one_thread
 from pipeline.track import Track
@@ -41,24 +40,20 @@ def two_threads() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("two_threads")
-def test_an_analysis_runs_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The pool has one thread while a record is analysed or smoothed, and the two it had before afterwards."""
+def test_an_analysis_runs_on_one_thread() -> None:
+    """The pool has one thread while a law of the user is fitted, and the two it had before afterwards."""
     seen: list[set[int]] = []
-    _watch(monkeypatch, pipeline.analyse, "condition", seen)
-    _watch(monkeypatch, pipeline.analysis, "smooth", seen)
-    analyse(Track.from_arrays(T, Y)).smoothed()
-    assert seen == [{1}, {1}]
-    assert pools() == {2}
 
-
-def _watch(monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str, seen: list[set[int]]) -> None:
-    stage = getattr(module, name)
-
-    def watched(*args: object) -> object:
+    def falling(t: np.ndarray, start: float, d: float) -> np.ndarray:
         seen.append(pools())
-        return stage(*args)
+        return start * np.exp(-d * t)
 
-    monkeypatch.setattr(module, name, watched)
+    law = make_law("own", falling, {"d": (0, -1)}, lambda _, a: (a[0], 0.01))
+    seen.clear()
+    analyse(Track.from_arrays(T, Y), params=replace(STANDARD, damping=replace(STANDARD.damping, laws=(law,))))
+    assert seen
+    assert set.union(*seen) == {1}
+    assert pools() == {2}
 
 
 @pytest.mark.usefixtures("two_threads")
