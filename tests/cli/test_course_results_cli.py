@@ -1,4 +1,4 @@
-"""What is asked of a course's results: a search, a comparison, a map of its drag."""
+"""A course's results compared: one spring, one drag coefficient for each disc."""
 
 from __future__ import annotations
 
@@ -61,4 +61,3 @@ def test_a_course_is_compared_by_spring_and_disc(course, cli):
         assert found["drag_coefficient", disc]["runs"] == 4
         assert found["drag_coefficient", disc]["mean"]["value"] == pytest.approx(drag, rel=0.03)
     assert compared["suspects"] == []
-    assert "counts all damping as drag" in cli("compare", course, "--where", "disc = 'thin'").out

