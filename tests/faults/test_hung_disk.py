@@ -29,6 +29,7 @@ from storage.run_file.reading import open_run
 from storage.wire_log.appending import LogFile, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry
 from storage.wire_log.scanning import read_log
+from tests.sampling import sampled
 
 TRIALS = 50 if os.environ.get("SPRINGMASS_TRIALS") else 12
 SECOND_NS = 1_000_000_000
@@ -91,8 +92,7 @@ def bench(rng: np.random.Generator) -> Bench:
     return Bench(reads_hz.tolist(), sizes.tolist())
 
 
-@pytest.mark.trials
-@pytest.mark.parametrize("seed", range(TRIALS))
+@pytest.mark.parametrize("seed", sampled(range(TRIALS)))
 def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_path: Path) -> None:
     """Of 5 to 60 s: every read is in the log, or in the count of the one overflow event of its channel."""
     rng = np.random.default_rng([seed, 14])

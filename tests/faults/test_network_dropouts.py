@@ -22,6 +22,7 @@ from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
+from tests.sampling import sampled
 
 TRIALS = 50 if os.environ.get("SPRINGMASS_TRIALS") else 12
 SECOND_NS = 1_000_000_000
@@ -143,7 +144,7 @@ def analysed(
     return code, json.loads(out) if out else {}
 
 
-@pytest.mark.parametrize("seed", range(TRIALS))
+@pytest.mark.parametrize("seed", sampled(range(TRIALS), 4))
 def test_a_dropout_moves_no_period_beyond_its_uncertainty(
     seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -159,7 +160,7 @@ def test_a_dropout_moves_no_period_beyond_its_uncertainty(
 
 
 @pytest.mark.parametrize("ppm", [0.0, 4000.0])
-@pytest.mark.parametrize("dropout", [(2.0, 15.0), (-1.0, 13.0), (7.0, 21.0), (9.5, 12.0)])
+@pytest.mark.parametrize("dropout", [(2.0, 15.0), (-1.0, 13.0), (9.5, 12.0)])
 def test_thirteen_of_twenty_seconds_at_once_cost_no_accuracy(
     dropout: tuple[float, float], ppm: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,6 +22,7 @@ from acquisition.simulated.pseudo_terminal import VirtualPort
 from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from springmass.cli import main
 from storage.run_file.reading import open_run
+from tests.sampling import sampled
 
 # pyserial 3.5 starts its reading thread in the old way.
 pytestmark = pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\) is deprecated:DeprecationWarning")
@@ -127,7 +128,7 @@ def bridged(family: str, rate_hz: float) -> Iterator[Bridge]:
             bridge.close()
 
 
-@pytest.mark.parametrize(("family", "rate_hz"), [("line-protocol", 100.0), ("us100", 20.0)])
+@pytest.mark.parametrize(("family", "rate_hz"), sampled([("line-protocol", 100.0), ("us100", 20.0)], 1))
 def test_a_sensor_behind_rfc2217_is_recorded_like_one_on_a_cable(family: str, rate_hz: float, tmp_path: Path) -> None:
     """A sender's and a polled sensor's readings come through the telnet wrapping, at the baud rate asked for."""
     out = tmp_path / "run.h5"
