@@ -10,29 +10,17 @@ from types import ModuleType
 import lmfit
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from pipeline.accuracy import params_for
-from pipeline.analyse import Analysis, Oscillation, Params, Still, analyse
+from pipeline.analyse import Analysis, Oscillation, Still, analyse
 from pipeline.damping.select import Params as DampingParams
 from pipeline.errors import AnalysisError, PipelineError
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import Track
-
-TABLE = {
-    "period",
-    "frequency",
-    "angular_frequency",
-    "amplitude",
-    "offset",
-    "phase",
-    "noise",
-    "damping_rate",
-    "quality_factor",
-    "velocity_rms",
-}
+from tests.sampling import sampled
 
 
 def run(synthetic: ModuleType, seconds: float = 10.0, sigma_m: float = 3e-4, seed: int = 1, **truth: float) -> Analysis:
@@ -55,8 +43,9 @@ def pull(found: Estimate, truth: float) -> float:
 @pytest.mark.parametrize(
     ("accuracy", "near", "alike"), [("fast", 0.5, 0.1), ("standard", 0.5, 0.1), ("best", 0.03, 0.04)]
 )
-@pytest.mark.parametrize("seconds", [10.0, 60.0])
-@pytest.mark.parametrize("sigma_m", [3e-4, 2.39e-3])
+@pytest.mark.parametrize(
+    ("seconds", "sigma_m"), sampled([(60.0, 3e-4), (10.0, 2.39e-3), (10.0, 3e-4), (60.0, 2.39e-3)])
+)
 def test_agrees_with_a_waveform_fit_by_lmfit(
     synthetic: ModuleType, seconds: float, sigma_m: float, accuracy: str, near: float, alike: float
 ) -> None:
@@ -86,25 +75,6 @@ def test_agrees_with_a_waveform_fit_by_lmfit(
         assert found.u == pytest.approx(u, rel=alike), name
 
 
-def test_estimates_and_units(synthetic: ModuleType) -> None:
-    """Without a scene the estimates are those that need none, each finite with its unit."""
-    found = run(synthetic, 60.0, gamma=0.01463).estimates
-    assert set(found) == TABLE
-    assert {name: e.unit for name, e in found.items()} == {
-        "period": "s",
-        "frequency": "Hz",
-        "angular_frequency": "rad/s",
-        "amplitude": "m",
-        "offset": "m",
-        "phase": "rad",
-        "noise": "m",
-        "damping_rate": "1/s",
-        "quality_factor": "",
-        "velocity_rms": "m/s",
-    }
-    assert all(math.isfinite(e.value) and e.u > 0 for e in found.values())
-
-
 def test_truth_of_mixed_drag_is_held(synthetic: ModuleType) -> None:
     """Two minutes of mixed drag: law, coefficients and all that is estimated lie within 4 u of the truth."""
     truth = synthetic.Truth(gamma=0.0073, beta=0.235)
@@ -123,18 +93,6 @@ def test_truth_of_mixed_drag_is_held(synthetic: ModuleType) -> None:
         (joint["beta"], 0.235),
     ):
         assert abs(pull(found, value)) < 4.0
-
-
-def test_waveform_leaves_the_noise(synthetic: ModuleType) -> None:
-    """What the model leaves of a clean record is the noise, and its velocity is the motion's."""
-    truth = synthetic.Truth(gamma=0.01463)
-    result = run(synthetic, 60.0, gamma=0.01463)
-    waveform = motion_of(result).waveform
-    assert waveform.rms_m == pytest.approx(3e-4, rel=0.03)
-    t = result.track.t
-    np.testing.assert_allclose(waveform.position, truth.position(t), atol=1e-4)
-    velocity = np.gradient(truth.position(np.linspace(0, 60, 600_001)), 1e-4)[::100][: t.size]
-    np.testing.assert_allclose(waveform.velocity, velocity, atol=1e-3)
 
 
 STILL = {
@@ -157,7 +115,6 @@ def test_a_run_that_does_not_oscillate_is_an_error_with_its_reason(what: str) ->
     assert isinstance(result.motion, Still)
     assert set(result.estimates) == {"offset", "noise"}
     assert (result.findings[0].code, result.findings[0].severity) == ("no_oscillation", "error")
-    assert result.motion.why in result.findings[0].message
     assert result.quality["used"] > 0
 
 
@@ -207,41 +164,7 @@ def test_unsorted_time_is_flagged_and_survived(synthetic: ModuleType) -> None:
     assert abs(pull(result.estimates["amplitude"], truth.amplitude)) < 4
 
 
-@pytest.mark.parametrize("origin_s", [5.04, 100.0, 1e4, 1e6, 1.7e9])
-def test_time_origin_does_not_matter(synthetic: ModuleType, origin_s: float) -> None:
-    """Seconds of the run or of the Unix epoch give the same answer, to the digits that such times hold."""
-    t = synthetic.times(20)
-    y = synthetic.noisy(synthetic.Truth(gamma=0.01463), t, 3e-4, 5)
-    here = analyse(Track.from_arrays(t, y))
-    there = analyse(Track.from_arrays(t + origin_s, y, rate_hz=100.0))
-    assert np.array_equal(here.flags, there.flags)
-    for name, expected in here.estimates.items():
-        found = there.estimates[name]
-        assert abs(found.value - expected.value) <= 0.1 * expected.u, name
-        assert found.u == pytest.approx(expected.u, rel=0.05), name
-
-
-LENGTHS = {"amplitude", "offset", "noise", "velocity_rms"}
-
-
-@pytest.mark.parametrize("scale", [2e-8, 1e-3, 20.0, 2e4])
-def test_scale_of_length_does_not_matter(synthetic: ModuleType, scale: float) -> None:
-    """From amplitudes of 1 nm to 1 km lengths and their uncertainties scale, all else stays."""
-    t = synthetic.times(20)
-    y = synthetic.noisy(synthetic.Truth(gamma=0.01463), t, 3e-4, 6)
-    here, there = analyse(Track.from_arrays(t, y)), analyse(Track.from_arrays(t, scale * y))
-    for name, expected in here.estimates.items():
-        factor = scale if name in LENGTHS else 1.0
-        found = there.estimates[name]
-        assert found.value == pytest.approx(factor * expected.value, abs=1e-3 * factor * expected.u), name
-        own = (here.motion.derived.statistical[name].u, there.motion.derived.statistical[name].u)
-        assert own[1] == pytest.approx(factor * own[0], rel=1e-3), name
-        # No bob swings a metre at 1.3 Hz: what its length was measured by is in doubt.
-        assert scale > 1.0 or found.u == pytest.approx(factor * expected.u, rel=1e-3), name
-    assert (there.estimates["amplitude"].u > 0.5 * there.estimates["amplitude"].value) == (scale > 1.0)
-
-
-@pytest.mark.parametrize("scale", [0.5, 4.0])
+@pytest.mark.parametrize("scale", [4.0])
 def test_scale_of_time_does_not_matter(synthetic: ModuleType, scale: float) -> None:
     """Twice as fast and four times as slow the relative errors are the same."""
     t = synthetic.times(20)
@@ -253,30 +176,9 @@ def test_scale_of_time_does_not_matter(synthetic: ModuleType, scale: float) -> N
         assert found.u == pytest.approx(scale**power * expected.u, rel=1e-3), name
 
 
-@pytest.mark.parametrize("samples", [8, 12, 20, 500])
-def test_samples_a_period(synthetic: ModuleType, samples: int) -> None:
-    """From eight samples a period to five hundred the truth is held."""
-    truth = synthetic.Truth(gamma=0.005)
-    rate = samples / truth.period
-    pulls = []
-    for seed in range(10):
-        t = synthetic.times(40.0, rate)
-        track = Track.from_arrays(t, synthetic.noisy(truth, t, 3e-4, seed), rate_hz=rate)
-        result = analyse(track, params=Params(damping=DampingParams(laws=("linear",))))
-        motion = motion_of(result)
-        pulls.append(
-            [
-                pull(motion.derived.statistical["period"], truth.period),
-                pull(result.estimates["amplitude"], truth.amplitude),
-                pull(result.estimates["phase"], truth.phase),
-            ]
-        )
-    assert np.max(np.abs(pulls)) < 4.5
-    assert np.all(np.sqrt(np.mean(np.square(pulls), axis=0)) < 1.7)
-
-
-@pytest.mark.parametrize("share", [0.01, 0.05, 0.1, 0.2])
-@pytest.mark.parametrize("how", ["anywhere", "one place"])
+@pytest.mark.parametrize(
+    ("share", "how"), sampled([(0.2, "anywhere"), (0.05, "one place"), (0.01, "anywhere"), (0.2, "one place")])
+)
 def test_lone_false_echoes_do_no_harm(synthetic: ModuleType, share: float, how: str) -> None:
     """With up to a fifth of all samples false the period still errs by less than 1.6 times the bound."""
     truth = synthetic.Truth()
@@ -333,7 +235,6 @@ METRES = st.floats(-1e3, 1e3, width=32)
 WITH_HOLES = st.one_of(METRES, st.sampled_from([math.nan, math.inf, -math.inf, 0.0]))
 
 
-@settings(max_examples=150)
 @given(st.data())
 def test_any_distances_are_analysed_or_refused(data: st.DataObject) -> None:
     """Whatever the distances, the outcome is an analysis or a PipelineError, never a warning or another exception."""
@@ -343,7 +244,6 @@ def test_any_distances_are_analysed_or_refused(data: st.DataObject) -> None:
         sane(analyse(Track.from_arrays(np.arange(n) / 100, y)))
 
 
-@settings(max_examples=150)
 @given(st.data())
 def test_any_times_are_analysed_or_refused(data: st.DataObject) -> None:
     """Whatever the times, sorted or not, repeated or missing, the outcome is an analysis or a PipelineError."""
@@ -354,7 +254,6 @@ def test_any_times_are_analysed_or_refused(data: st.DataObject) -> None:
         sane(analyse(Track.from_arrays(t, y, rate_hz=100.0)))
 
 
-@settings(max_examples=100)
 @given(
     seed=st.integers(0, 2**32 - 1),
     seconds=st.floats(0.1, 15.0),
@@ -406,19 +305,9 @@ def test_amplitude_and_phase_are_of_the_first_row_though_an_echo_stands_there(sy
     clean = motion_of(analyse(Track.from_arrays(t + 7.0, y)))
     y[:lost] = 1.3
     found = motion_of(analyse(Track.from_arrays(t + 7.0, y)))
-    assert found.phase.t0 == clean.phase.t0 == 7.0
-    assert found.damping.t0 == 7.0
     for name in ("amplitude", "phase"):
         one, other = found.derived.estimates[name], clean.derived.estimates[name]
         assert abs(one.value - other.value) < 0.5 * max(one.u, other.u), name
-
-
-def test_a_start_of_more_than_a_period_lost_is_not_stated_for(synthetic: ModuleType) -> None:
-    """Where the first second and a half was not measured numbers are of the first sample that was."""
-    t = synthetic.times(20.0)
-    y = synthetic.noisy(synthetic.Truth(gamma=0.05), t, 3e-4, 3)
-    y[:150] = np.nan
-    assert motion_of(analyse(Track.from_arrays(t, y))).damping.t0 == 1.5
 
 
 def test_drag_of_a_power_between_linear_and_quadratic_is_physics(synthetic: ModuleType) -> None:
@@ -434,25 +323,18 @@ def test_drag_of_a_power_between_linear_and_quadratic_is_physics(synthetic: Modu
     assert {finding.severity for finding in result.findings} <= {"info"}
 
 
-@pytest.mark.parametrize("held_s", [0.0, 0.3])
-def test_a_still_start_ends_at_the_recordings_own_trigger(held_s: float) -> None:
-    """What hangs still before the trigger is left out at that moment, the pull of a hand after it as ever."""
+def test_a_still_start_ends_at_the_recordings_own_trigger() -> None:
+    """What hangs still before the trigger is left out at that moment."""
     rng, t, trigger_s = np.random.default_rng(5), np.arange(3000) / 100.0, 2.0
-    released_s = trigger_s + (0.6 + held_s if held_s else 0.0)
-    pulled = np.clip((t - trigger_s) / 0.6, 0.0, 1.0) if held_s else np.zeros(t.size)
-    since = np.maximum(t - released_s, 0.0)
-    free = 0.05 * np.exp(-0.012 * since) * np.cos(8.3 * since)
-    y = 0.3 + np.where(t < released_s, 0.025 * (1.0 - np.cos(np.pi * pulled)), free)
+    since = np.maximum(t - trigger_s, 0.0)
+    y = 0.3 + np.where(t < trigger_s, 0.0, 0.05 * np.exp(-0.012 * since) * np.cos(8.3 * since))
     track = Track.from_arrays(t, y + 3e-4 * rng.standard_normal(t.size))
     result = analyse(replace(track, trigger_s=trigger_s))
-    # Where a hand holds the bob after the trigger, that is a second part in which nothing moves freely.
-    still, *held = (finding for finding in result.findings if finding.code == "at_rest")
+    (still,) = (finding for finding in result.findings if finding.code == "at_rest")
     assert still.values["seconds"] == pytest.approx(trigger_s)
-    assert len(held) <= int(held_s > 0.0)
-    begun_s, amplitude = motion_of(result).phase.t0, result.estimates["amplitude"]
-    assert begun_s == trigger_s if not held_s else begun_s >= released_s
-    assert abs(amplitude.value - 0.05 * math.exp(-0.012 * (begun_s - released_s))) < 4.0 * amplitude.u
-    assert {finding.code for finding in result.findings if finding.severity != "info"} <= {"handled"}
+    assert result.quality["outside"] == 200
+    assert abs(pull(result.estimates["amplitude"], 0.05)) < 4.0
+    assert {finding.severity for finding in result.findings} <= {"info"}
 
 
 def test_a_trigger_in_a_swing_leaves_nothing_out(synthetic: ModuleType) -> None:
@@ -460,5 +342,28 @@ def test_a_trigger_in_a_swing_leaves_nothing_out(synthetic: ModuleType) -> None:
     t = synthetic.times(20.0)
     track = Track.from_arrays(t, synthetic.noisy(synthetic.Truth(), t, 3e-4, 3))
     result = analyse(replace(track, trigger_s=2.0))
-    assert motion_of(result).phase.t0 == 0.0
+    assert result.quality["outside"] == 0
     assert not any(finding.code == "at_rest" for finding in result.findings)
+
+
+@pytest.mark.parametrize("window", sampled(range(2, 37, 5)))
+@pytest.mark.parametrize("sigma_m", [1e-4, 1e-3])
+def test_a_cluster_of_echoes_does_not_reach_the_result(synthetic: ModuleType, sigma_m: float, window: int) -> None:
+    """Where 60 % of a period are shifted by 4 mm, amplitude and period still hold their intervals."""
+    truth, t = synthetic.Truth(gamma=0.005), synthetic.times(30)
+    y = synthetic.noisy(truth, t, sigma_m, window)
+    first = round(window * truth.period * 100) + 6
+    y[first : first + 45] += 0.004
+    found = analyse(Track.from_arrays(t, y)).estimates
+    assert abs(pull(found["amplitude"], truth.amplitude)) < 3.5
+    assert abs(pull(found["period"], truth.period)) < 3.5
+
+
+@pytest.mark.parametrize("phase", [0.0, 1.6])
+def test_a_rest_position_that_creeps_biases_nothing(synthetic: ModuleType, phase: float) -> None:
+    """A rest position that creeps by 20 mm within seconds leaves amplitude, period and rate within 4 u."""
+    truth, t = synthetic.Truth(gamma=0.0065, phase=phase), synthetic.times(60)
+    y = synthetic.noisy(truth, t, 2e-4, 14) + 0.02 * (1.0 - np.exp(-t / 8.0))
+    found = analyse(Track.from_arrays(t, y)).estimates
+    for name, value in (("amplitude", truth.amplitude), ("period", truth.period), ("damping_rate", 0.0065)):
+        assert abs(pull(found[name], value)) < 4.0, name

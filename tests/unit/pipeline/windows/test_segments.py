@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.track import Quality, Track
+from tests.sampling import sampled
 
 OMEGA, GAMMA, REST, SIGMA = 8.3, 0.012, 0.32, 3e-4
 T = np.arange(2500) / 100
@@ -33,8 +34,7 @@ def codes(analysis: Analysis) -> set[str]:
 
 def hold(analysis: Analysis, amplitude_at_0: float, since: float) -> None:
     """Demand period, rest position, damping rate and the amplitude of the part's own start within 4 u."""
-    assert isinstance(analysis.motion, Oscillation)
-    start = analysis.motion.phase.t0
+    start = T[np.flatnonzero(analysis.flags & np.uint8(Quality.OUTSIDE) == 0)[0]]
     true = {
         "period": 2.0 * math.pi / OMEGA,
         "offset": REST,
@@ -46,10 +46,9 @@ def hold(analysis: Analysis, amplitude_at_0: float, since: float) -> None:
         assert abs(estimate.value - value) < 4.0 * estimate.u, name
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_plain_record_is_one_part(seed: int) -> None:
+def test_a_plain_record_is_one_part() -> None:
     """Nothing is left out where one oscillation runs from the first sample to the last."""
-    found = analysed(free(0.05, 0.0, 0.3), seed)
+    found = analysed(free(0.05, 0.0, 0.3))
     assert found.quality["outside"] == 0
     assert codes(found) == set()
 
@@ -108,3 +107,32 @@ def test_rest_long_before_the_end_is_left_out() -> None:
     assert codes(found) == {"at_rest"}
     assert found.quality["outside"] > 0.4 * t.size
     assert abs(found.estimates["damping_rate"].value - 0.35) < 4.0 * found.estimates["damping_rate"].u
+
+
+@pytest.mark.parametrize(("amplitude", "angle", "code"), [(0.015, 0.0, "touched"), (0.0, 0.015, "phase_jump")])
+def test_a_light_touch_ends_the_part_that_is_analysed(amplitude: float, angle: float, code: str) -> None:
+    """A change of 1.5 % is named with its time, and the numbers are those of the longer part."""
+    found = analysed(free(0.05, 0.0) * np.where(T < 15.0, 1.0, 1.0 + amplitude) if amplitude else turned(angle))
+    (finding,) = (one for one in found.findings if one.code == code)
+    assert 14.0 <= finding.values["time_s"] < 16.0
+    assert abs(found.estimates["damping_rate"].value - GAMMA) < 4.0 * found.estimates["damping_rate"].u
+
+
+def turned(angle: float) -> np.ndarray:
+    """Return a free oscillation whose phase jumps at 15 s."""
+    return np.where(T < 15.0, free(0.05, 0.0), free(0.05, 0.0, angle))
+
+
+@pytest.mark.parametrize("seed", sampled(range(20)))
+@pytest.mark.parametrize("bend", [0.0, 1e-3])
+def test_what_runs_smoothly_is_not_parted(bend: float, seed: int) -> None:
+    """Neither noise nor a phase that bends by half a radian is a touch."""
+    found = analysed(0.05 * np.exp(-GAMMA * T) * np.cos(OMEGA * T + bend * T**2), seed)
+    assert not codes(found) & {"touched", "phase_jump", "handled"}
+
+
+@pytest.mark.parametrize("seed", sampled(range(4), 1))
+def test_an_amplitude_that_goes_to_and_fro_is_not_touched(seed: int) -> None:
+    """Energy given away and taken back every twelve seconds is no jump."""
+    found = analysed(free(0.05, 0.0) * (1.0 + 0.15 * np.cos(2.0 * np.pi * T / 12.0 + seed)), seed)
+    assert not codes(found) & {"touched", "phase_jump"}
