@@ -17,6 +17,8 @@ from docs.figures import wiring
 
 from .conftest import ROOT, Built, Emulate, Emulated
 
+pytestmark = pytest.mark.trials
+
 TICK_US = 0.5
 """What an echo time may be off, us, and a ping."""
 

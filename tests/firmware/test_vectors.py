@@ -11,6 +11,8 @@ from acquisition.decoders.line_protocol import LineProtocolDecoder
 
 from .conftest import ROOT, Emulate
 
+pytestmark = pytest.mark.trials
+
 PAGE = ROOT / "docs" / "reference" / "line-protocol.md"
 SCRIPT = (
     (0.5, "?"),
