@@ -118,18 +118,11 @@ class OnTerminal:
         """Press keys."""
         os.write(self._master, keys.encode())
 
-    def until(self, words: str, lines: int | None = None, limit_s: float = 120.0) -> None:
-        """Read until the screen shows these words and, if given, this number of lines from the progress line on.
-
-        A read may end in the middle of a frame, so a test of a whole frame must state its number of lines.
-        """
+    def until(self, words: str, limit_s: float = 120.0) -> None:
+        """Read until the screen shows these words."""
         end = time.monotonic() + limit_s
-        while words not in self.screen.text or (lines is not None and self._lines() != lines):
-            assert self._read(end - time.monotonic()), f"{words!r} in {lines} lines never came:\n{self.screen.text}"
-
-    def _lines(self) -> int:
-        shown = self.screen.text.splitlines()
-        return len(shown) - next((number for number, line in enumerate(shown) if " | " in line), len(shown))
+        while words not in self.screen.text:
+            assert self._read(end - time.monotonic()), f"{words!r} never came:\n{self.screen.text}"
 
     def end(self, limit_s: float = 120.0) -> int:
         """Read until the program ends; return its exit code."""

@@ -93,32 +93,11 @@ def test_what_cannot_be_opened_is_refused(
     refused(run(cli, command, recording, out), recording, "Permission denied")
 
 
-def test_one_row_is_refused(cli: Cli, write: Write, rows: list[bytes]) -> None:
-    """One row tells no rate; with the rate given it is still no oscillation."""
-    path = write(rows[:1])
-    refused(run(cli, "analyse", path, path), path, "--rate-hz")
-    refused(cli("analyse", "--json", "--rate-hz", "100", path), path)
-
-
-def test_rows_without_any_distance_are_refused(cli: Cli, write: Write, rows: list[bytes]) -> None:
-    """All NaN is a recording of nothing."""
-    path = write([row.split(b"\t")[0] + b"\tNaN\t0.239" for row in rows])
-    refused(run(cli, "analyse", path, path), path, "line 3", "NaN")
-
-
 def analysed(cli: Cli, path: Path) -> Any:
     """Demand that a file is analysed without complaint; return the result."""
     done = cli("analyse", "--json", path)
     assert (done.code, done.err) == (0, "")
     return done.results[0]
-
-
-def test_text_in_the_middle_is_counted(cli: Cli, write: Write, rows: list[bytes], recording: Path) -> None:
-    """A comment between two rows is no sample and changes no estimate, but it is counted and told."""
-    sound = analysed(cli, recording)
-    result = analysed(cli, write([*rows[:300], b"here I touched the table", *rows[300:]], "text.txt"))
-    assert result["quality"] == sound["quality"] | {"malformed_rows": 1}
-    assert result["estimates"] == sound["estimates"]
 
 
 def test_a_damaged_row_is_a_flagged_sample(cli: Cli, write: Write, rows: list[bytes]) -> None:
@@ -175,30 +154,12 @@ def test_other_ways_to_write_the_same_numbers_are_read(
     assert (result["quality"], result["estimates"]) == (sound["quality"], sound["estimates"])
 
 
-def test_zeros_behind_the_last_row_are_told(cli: Cli, recording: Path) -> None:
-    """A file system that lost the tail leaves zeros: they are no samples."""
-    sound = analysed(cli, recording)
-    recording.write_bytes(recording.read_bytes() + b"\0" * 4096)
-    result = analysed(cli, recording)
-    assert result["estimates"] == sound["estimates"]
-    assert len(result["findings"]) == len(sound["findings"]) + 1
-
-
 @pytest.mark.parametrize("cut", [20, 3000])
 def test_a_cut_run_file_is_refused(cli: Cli, recording: Path, tmp_path: Path, cut: int) -> None:
     """A copy that ended early says what to do."""
     path = tmp_path / "run.h5"
     assert cli("convert", recording, path).code == 0
     path.write_bytes(path.read_bytes()[:-cut])
-    refused(cli("analyse", "--json", path), path)
-
-
-def test_hdf5_of_another_program_is_refused(cli: Cli, tmp_path: Path) -> None:
-    """It is no run file, and the line says how one is made."""
-    h5py = pytest.importorskip("h5py")
-    path = tmp_path / "other.h5"
-    with h5py.File(path, "w") as file:
-        file["x"] = [1.0, 2.0]
     refused(cli("analyse", "--json", path), path)
 
 

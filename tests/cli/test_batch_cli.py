@@ -175,14 +175,6 @@ def test_runs_csv_gives_scenes_and_tags(runs, cli):
     assert float(table[1]["spring_constant"]) == alone["estimates"]["spring_constant"]["value"]
 
 
-def test_the_template_is_a_table_of_runs(runs, cli):
-    """Printed, saved and given back it says nothing and is taken."""
-    Path("runs.csv").write_text(cli("batch", "--template", runs).out)
-    done = cli("batch", "--runs", "runs.csv", "-o", "out", "--jobs", "1", *QUICK)
-    assert done.code == 0
-    assert len(rows("out")) == 6
-
-
 @pytest.mark.parametrize(
     ("table", "named"),
     [

@@ -71,16 +71,6 @@ def test_disagreement_is_an_error_under_strict(capsys: pytest.CaptureFixture[str
     assert constant["value"] == pytest.approx(14.0, abs=3 * constant["u"])
 
 
-def test_run_files_carry_their_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Runs that hold their scenes need no --scene."""
-    names = []
-    for path, scene in ((BARE, BARE_SCENE), (DISC, DISC_SCENE)):
-        names.append(str(tmp_path / f"{Path(path).stem}.h5"))
-        assert main(["convert", path, names[-1], "--scene", scene]) == 0
-    capsys.readouterr()
-    assert compared([*names, *FAST], capsys)["comparison"]["agree"] is True
-
-
 def test_one_law_across_runs_of_one_bob(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Two releases of one bob, from 50 and from 25 mm, follow one law, fitted jointly; one scene serves both."""
     omega = math.sqrt(14.0 / (0.2176 + 0.01 / 3 + 8 / 3 * 1.1999 * 0.051**3))

@@ -80,18 +80,6 @@ def test_nothing_is_overwritten_unasked(cli: Cli, recording: Path, tmp_path: Pat
     assert cli("convert", recording, run, "--overwrite").code == 0
 
 
-def test_of_a_pair_both_are_given_back_or_none(cli: Cli, data: Path, tmp_path: Path) -> None:
-    """One of two names is taken: nothing is written beside it."""
-    position, velocity = (data / f"undamped_simulated_{what}.txt" for what in ("position", "velocity"))
-    folder = tmp_path / "back"
-    folder.mkdir()
-    (folder / velocity.name).write_bytes(b"mine")
-    assert cli("convert", position, tmp_path / "run.h5", "--velocity", velocity).code == 0
-    done = cli("convert", tmp_path / "run.h5", folder)
-    assert done.code == 2
-    assert [path.read_bytes() for path in folder.iterdir()] == [b"mine"]
-
-
 def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp_path: Path) -> None:
     """A scene put in, samples, originals, traps, family and origin survive the way through a second run file."""
     first, second = tmp_path / "first.h5", tmp_path / "second.h5"
@@ -162,13 +150,6 @@ def test_an_empty_run_is_converted_too(cli: Cli, tmp_path: Path, recording: Path
     done = cli("analyse", "--json", run)
     assert (done.code, done.out) == (3, "")
     assert str(run) in done.complaint
-
-
-def test_a_run_file_needs_no_answers(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """What completes a text is refused where the file says it all."""
-    assert cli("convert", recording, tmp_path / "run.h5").code == 0
-    for option in (("--rate-hz", "100"), ("--unit", "cm"), ("--channel", "distance"), ("--run", "1")):
-        assert cli("convert", tmp_path / "run.h5", tmp_path / "back.txt", *option).code == 2
 
 
 def test_an_angle_goes_into_run_files_only(cli: Cli, recording: Path, tmp_path: Path) -> None:

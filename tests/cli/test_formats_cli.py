@@ -47,14 +47,6 @@ def test_a_recording_is_described(cli: Cli, data: Path) -> None:
     assert (exact["sha256"], exact["missing"]) == (loaded.sha256, 0)
 
 
-def test_a_run_file_is_described(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """It says run, and what the recording inside was seen to be."""
-    assert cli("convert", recording, tmp_path / "run.h5").code == 0
-    facts = facts_of(cli("formats", tmp_path / "run.h5").out)
-    assert (facts["format"], facts["kind"], facts["samples"]) == ("run", "replay", "1000")
-    assert facts["title"] == "Motion Sensor Data File Mar 12, 2024 2:05 PM"
-
-
 def test_a_wire_log_is_an_input(cli: Cli, data: Path, tmp_path: Path) -> None:
     """What record leaves behind is described, converted and analysed like any recording; the log stays as it is."""
     log = tmp_path / "run.wire"

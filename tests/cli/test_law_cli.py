@@ -60,34 +60,6 @@ def test_a_law_that_does_not_exist_is_refused(cli: Callable[..., Done], run: Pat
     assert "linear+quadratic" in done.complaint
 
 
-def test_without_a_law_both_numbers_and_undetermined_coefficients_are_marked(
-    cli: Callable[..., Done], run: Path
-) -> None:
-    """The JSON says which numbers depend on the law, and which coefficients the recording does not determine."""
-    (result,) = cli("analyse", run, "--json").results
-    damping = result["damping"]
-    assert damping["stated"] is None
-    assert damping["law"] is None
-    assert "damping_rate" in damping["of_law"]
-    assert "period" not in damping["of_law"]
-    assert sum(damping["weights"].values()) == pytest.approx(1.0)
-    beta = damping["coefficients"]["beta"]
-    assert beta["determined"] is False
-    assert beta["u"] > abs(beta["value"])
-    assert beta["upper_limit"] > beta["value"]
-
-
-def test_compare_takes_a_stated_law(cli: Callable[..., Done], run: Path) -> None:
-    """Every run's result is stated by it."""
-    other = run.with_name("other.txt")
-    other.write_bytes(run.read_bytes())
-    bench = run.parent / "masses.toml"
-    bench.write_text("[bob]\nmass_kg = 0.2\n[spring]\nmass_kg = 0.01\n")
-    done = cli("compare", run, other, "--scene", bench, "--law", "linear", "--json")
-    (result,) = done.results
-    assert [one["damping"]["stated"] for one in result["runs"]] == ["linear", "linear"]
-
-
 def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Callable[..., Done], run: Path) -> None:
     """The column law of the table of runs takes precedence over the option; the results have both laws."""
     other = run.with_name("other.txt")
@@ -106,15 +78,3 @@ def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Callable[..., Done], r
     wrong = cli("batch", run, other, "--runs", table, "-o", folder, "--jobs", "1", "--reports", "0")
     assert wrong.code == 2
     assert "law must be one of" in wrong.complaint
-
-
-def test_batch_lists_undetermined_coefficients(cli: Callable[..., Done], run: Path) -> None:
-    """Value and u stay in their columns."""
-    folder = run.parent / "course"
-    assert cli("batch", run, "-o", folder, "--jobs", "1", "--reports", "0").code == 0
-    (results,) = folder.glob("*.csv")
-    with results.open(newline="") as file:
-        (row,) = csv.DictReader(file)
-    assert row["one_law"] == ""
-    assert row["undetermined"] == "gamma beta"
-    assert float(row["beta_u"]) > abs(float(row["beta"]))

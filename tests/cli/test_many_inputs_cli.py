@@ -67,25 +67,6 @@ def test_a_folder_without_a_recording_is_refused(cli: Cli, bench: Path) -> None:
     assert "readme.md" in done.complaint
 
 
-def test_a_folder_has_one_scene_for_all_of_it(cli: Cli, bench: Path, data: Path) -> None:
-    """A scene for each input counts inputs, not the files in a folder."""
-    scenes = [data / f"{name}.scene.toml" for name in ("undamped", "damped")]
-    done = cli(
-        "analyse", bench, data / "damped_simulated_position.txt", "--json", "--scene", scenes[0], "--scene", scenes[1]
-    )
-    masses = [result["provenance"]["parameters"]["scene"]["bob"]["mass_kg"]["value"] for result in done.results]
-    assert masses == [0.2007, 0.2007, 0.2176]
-
-
-def test_a_log_beside_its_run_file_is_no_second_run(cli: Cli, bench: Path, data: Path) -> None:
-    """What a run file was made of lies beside it at times; a folder gives the run once."""
-    assert cli("convert", bench / "damped_simulated_position.txt", bench / "run.h5").code == 0
-    (bench / "run.wire").write_bytes(b"whatever")
-    done = cli("analyse", bench, "--json")
-    assert [Path(result["input"]["path"]).name for result in done.results][1] == "run.h5"
-    assert len(done.results) == 3
-
-
 def test_velocity_and_report_options_that_contradict_are_refused(cli: Cli, bench: Path) -> None:
     """One velocity file does not complete a folder, and no report is not a report."""
     done = cli("analyse", bench, "--velocity", bench / "damped_simulated_velocity.txt", "--json")

