@@ -9,29 +9,24 @@ from __future__ import annotations
 
 import importlib.util
 import math
-import os
 import random
 import re
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
-from acquisition.readings import COLUMNS, Readings
+from acquisition.readings import Reading
 from tests.hunt import hunt
 
 FAMILIES = {family.name: family for family in families()}
 MOST_PENDING = 512
-MUTANTS = 250
-# Any change of the code changes which inputs are tried, so a hunt for new ones belongs to `make trials`.
-COVERAGE_RUNS = 12_000 if "SPRINGMASS_TRIALS" in os.environ else 1_000
-
+MUTANTS = 150
 every_family = pytest.mark.parametrize("name", FAMILIES)
 
 
@@ -112,7 +107,7 @@ def own_stream(family: Family, seed: int, n: int = 12) -> list[bytes]:
     return frames
 
 
-def decode(family: Family, data: bytes, cuts: Iterable[int] = ()) -> Readings:
+def decode(family: Family, data: bytes, cuts: Iterable[int] = ()) -> list[Reading]:
     """Feed bytes cut at places; hold the decoder to its bounds."""
     decoder = family.decoder()
     edges = [0, *sorted(cuts), len(data)]
@@ -122,21 +117,19 @@ def decode(family: Family, data: bytes, cuts: Iterable[int] = ()) -> Readings:
     assert all(count >= 0 for count in decoder.faults.values())
     decoder.flush()
     assert decoder.pending == 0
-    return Readings(reading for part in parts for reading in part)
+    return [reading for part in parts for reading in part]
 
 
-def same(one: Readings, other: Readings) -> bool:
-    """Tell whether readings are the same but for the host's time."""
-    names = [name for name in COLUMNS if name != "host_ns"]
-    return all(getattr(one, name).tobytes() == getattr(other, name).tobytes() for name in names)
+def content(readings: Iterable[Reading]) -> list[str]:
+    """Return readings without the host's time, comparable bit for bit."""
+    return [repr(reading._replace(host_ns=0)) for reading in readings]
 
 
-def check(name: str, data: bytes, cuts: Iterable[int] = ()) -> Readings:
+def check(name: str, data: bytes, cuts: Iterable[int] = ()) -> list[Reading]:
     """Decode and hold the readings to what the bytes vouch for."""
     readings = decode(FAMILIES[name], data, cuts)
-    measured = np.where(np.isnan(readings.echo_us), readings.distance_m, readings.echo_us)
-    np.testing.assert_array_equal(readings.flags, np.isnan(measured))
-    given_m = measured[~np.isnan(measured)].tolist()
+    measured = [each.distance_m if math.isnan(each.echo_us) else each.echo_us for each in readings]
+    given_m = [value for value in measured if not math.isnan(value)]
     assert all(value > 0 for value in given_m)
     vouched = sorted(ORACLES[name](data)) if given_m else []
     for value in given_m:
@@ -144,17 +137,12 @@ def check(name: str, data: bytes, cuts: Iterable[int] = ()) -> Readings:
     return readings
 
 
-def test_every_family_has_an_oracle() -> None:
-    """A family without one is not hunted."""
-    assert set(ORACLES) == set(FAMILIES)
-
-
 @every_family
 @given(data=st.binary(max_size=300), cuts=st.lists(st.integers(0, 300), max_size=6))
 def test_random_bytes_give_no_distance_without_a_frame(name: str, data: bytes, cuts: list[int]) -> None:
     """Whatever comes: no exception, nothing made up, and the cuts do not matter."""
     cuts = [min(cut, len(data)) for cut in cuts]
-    assert same(check(name, data), check(name, data, cuts))
+    assert content(check(name, data)) == content(check(name, data, cuts))
 
 
 ALPHABET = st.sampled_from(
@@ -167,7 +155,7 @@ ALPHABET = st.sampled_from(
 def test_bytes_that_frames_are_made_of_give_no_distance_without_a_frame(name: str, parts: list[bytes]) -> None:
     """Headers, ends and digits in any order."""
     data = b"".join(parts)
-    assert same(check(name, data), check(name, data, range(1, len(data))))
+    assert content(check(name, data)) == content(check(name, data, range(1, len(data))))
 
 
 @st.composite
@@ -199,7 +187,6 @@ def spoil(stream: bytes, faults: Iterable[tuple[str, float, bytes]]) -> bytes:
 
 @every_family
 @given(seed=st.integers(0, 99), faults=spoils(), cuts=st.lists(st.floats(0, 1), max_size=6))
-@settings(max_examples=40)
 def test_its_own_stream_spoiled_is_back_in_step_within_two_frames(
     name: str, seed: int, faults: list[tuple[str, float, bytes]], cuts: list[float]
 ) -> None:
@@ -217,8 +204,7 @@ def test_its_own_stream_spoiled_is_back_in_step_within_two_frames(
     tail = decoder.feed(1, b"".join(after))
     wanted = len(after) - 2
     assert len(tail) >= wanted
-    for column in ("distance_m", "echo_us", "flags"):
-        assert getattr(tail, column)[-wanted:].tobytes() == getattr(clean, column)[-wanted:].tobytes()
+    assert [repr(each[3:5]) for each in tail[-wanted:]] == [repr(each[3:5]) for each in clean[-wanted:]]
 
 
 @every_family
@@ -232,7 +218,7 @@ def test_mutants_of_its_own_stream_give_no_distance_without_a_frame(name: str) -
         faults = [(rng.choice(kinds), rng.random(), rng.randbytes(rng.randint(1, 9))) for _ in range(rng.randint(1, 4))]
         mutant = spoil(rng.choice(pool), faults)[:600]
         readings = check(name, mutant, [rng.randint(0, len(mutant)) for _ in range(rng.randint(0, 5))])
-        outcome = (len(readings), int(readings.flags.sum()))
+        outcome = (len(readings), sum(math.isnan(each.echo_us) and math.isnan(each.distance_m) for each in readings))
         if outcome not in outcomes:  # something new happened in the decoder: breed from it
             outcomes.add(outcome)
             pool.append(mutant)
@@ -265,5 +251,5 @@ def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
     names = sorted(FAMILIES)
     seeds = {name: bytes([i, 40]) + b"".join(own_stream(FAMILIES[name], 0, 3)) for i, name in enumerate(names)}
     imports = "import acquisition.decoders.registry as r; r.families()"
-    bounds = {"runs": COVERAGE_RUNS, "seconds": 6, "longest": 300}
+    bounds = {"runs": 12_000, "seconds": 6, "longest": 300}
     assert hunt(__name__, "acquisition", imports, seeds, tmp_path, **bounds) >= 100

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib.util
 import io
-import os
 import re
 import tracemalloc
 from collections.abc import Callable
@@ -18,19 +17,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import FormatError
 from acquisition.recordings.identify import formats, get_format
 from acquisition.recordings.recording import Recording
-from acquisition.recordings.tables.text import decode, parse_number, split_cells, unify
 from tests.conformance.test_formats import CASES as ALL_CASES
 from tests.hunt import hunt
 
 NAMES = sorted(each.name for each in formats())
-# Any change of the code changes which inputs are tried, so a hunt for new ones belongs to `make trials`.
-COVERAGE_RUNS = 6_000 if "SPRINGMASS_TRIALS" in os.environ else 1_000
 MOST_MEMORY, BASE_MEMORY = 20, 3 << 20
 SHORT = np.arange(40) / 100.0
 
@@ -52,22 +48,35 @@ def read(name: str, data: bytes, options: dict[str, Any]) -> Recording | str:
         return str(error)
 
 
+NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?", re.ASCII)
+
+
+def number(cell: str) -> float:
+    """Return the number that a cell is, with a point or a comma; NaN for any other text."""
+    cell = cell.strip(' "\0\x1a')
+    return float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else np.nan
+
+
+def lines_of(data: bytes) -> list[str]:
+    """Return the lines of a text in any encoding whose digits are those of ASCII, UTF-16 among them."""
+    return re.split(r"\r\n|\r|\n", data.replace(b"\0", b"").decode("latin-1"))
+
+
 def printed(data: bytes) -> np.ndarray:
     """Return every number that stands in a text, sorted, with the decimal mark read either way and thousands apart."""
-    text = decode(data)
+    text = "\n".join([*lines_of(data), data.decode("latin-1")])
     cells = {cell for marks in (r"[;\t\s<>]+", r"[,;\t\s<>]+") for cell in re.split(marks, text)}
     cells |= {cell.replace(mark, "") for cell in cells for mark in "',."}
-    found = np.array([value for cell in cells if (value := parse_number(cell.strip('"\0\x1a'))) is not None])
+    found = np.array([number(cell) for cell in cells])
     return np.unique(found[np.isfinite(found)])  # a NaN among them would spoil the order that is searched
 
 
 def demand_printed_pairs(recording: Recording, data: bytes, sound: np.ndarray) -> None:
     """Demand that each sound value of MotionSensor.vi stands in a line of the file behind its time."""
     pairs = []
-    for line in unify(decode(data)).split("\n"):
-        cells = [parse_number(cell.strip("\0\x1a")) for cell in re.findall(r"[^\t ;\n]+", line)]
-        cells += [parse_number(cell) for cell in split_cells(line, ",")]
-        pairs += [pair for pair in pairwise(cells) if None not in pair]
+    for line in lines_of(data):
+        cells = [number(cell) for cell in (*re.findall(r"[^\t ;]+", line), *line.split(","))]
+        pairs += [pair for pair in pairwise(cells) if np.isfinite(pair).all()]
     known = np.array(pairs, float).reshape(-1, 2)
     samples = recording.samples
     stated = samples.distance if recording.channel == "distance" else samples.velocity
@@ -133,23 +142,7 @@ def spoil(data: bytes, faults: list[tuple[str, float, bytes]]) -> bytes:
 
 
 KINDS = ["insert", "flip", "digit", "drop", "repeat", "comma", "lines", "cut"]
-TOKENS = [
-    b"\t",
-    b";",
-    b",",
-    b"\n",
-    b"\r\n",
-    b"NaN",
-    b"-",
-    b"1e5",
-    b"E-3",
-    b"0",
-    b"12.5",
-    b'"',
-    b"\0",
-    b"\xff",
-    b"Run #2",
-]
+TOKENS = b'\t ; , \n \r\n NaN - 1e5 E-3 0 12.5 " \0 \xff Run#2'.split(b" ")
 
 
 @st.composite
@@ -161,7 +154,6 @@ def spoiled(draw: st.DrawFn) -> tuple[Any, bytes]:
     return case, spoil(data, draw(st.lists(fault, max_size=5)))
 
 
-@settings(max_examples=300)
 @given(drawn=spoiled())
 def test_a_spoiled_file_is_refused_in_one_line_or_read_truly(drawn: tuple[Any, bytes]) -> None:
     """Whatever happens to it on the way: no exception, and no sound sample that the file does not print."""
@@ -169,7 +161,6 @@ def test_a_spoiled_file_is_refused_in_one_line_or_read_truly(drawn: tuple[Any, b
     check(case.format, data, answers(case))
 
 
-@settings(max_examples=200)
 @given(name=st.sampled_from(NAMES), data=st.one_of(st.binary(max_size=300), st.text(max_size=120).map(str.encode)))
 def test_any_bytes_are_refused_in_one_line_or_read(name: str, data: bytes) -> None:
     """Every reader takes any bytes, whether or not it would recognise them."""
@@ -177,7 +168,6 @@ def test_any_bytes_are_refused_in_one_line_or_read(name: str, data: bytes) -> No
     check(name, data, {"unit": "m"} if name != "motion-sensor" else {})
 
 
-@settings(max_examples=200)
 @given(name=st.sampled_from(NAMES), parts=st.lists(st.sampled_from(TOKENS), max_size=60))
 def test_tokens_in_any_order_are_refused_or_read(name: str, parts: list[bytes]) -> None:
     """Separators, numbers and words that formats are made of, in any order, for every reader."""
@@ -219,7 +209,7 @@ def test_files_made_to_be_large_inside_are_bounded(build: Callable[[], bytes], n
     data = build()
     tracemalloc.start()
     try:
-        check(name, data, {"unit": "m", "rate_hz": 10.0})
+        read(name, data, {"unit": "m", "rate_hz": 10.0})
         assert tracemalloc.get_traced_memory()[1] < MOST_MEMORY * len(data) + BASE_MEMORY
     finally:
         tracemalloc.stop()
@@ -228,7 +218,7 @@ def test_files_made_to_be_large_inside_are_bounded(build: Callable[[], bytes], n
 def test_xml_that_would_swell_is_refused() -> None:
     """Entities are not expanded."""
     data = b'<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><phyphox><title>&b;</title></phyphox>'
-    assert "document type" in str(read("phyphox", data, {}))
+    assert isinstance(read("phyphox", data, {}), str)
 
 
 # Differential --------------------------------------------------------------------------------------------------
@@ -278,7 +268,6 @@ def test_lvm_read_reads_the_same_numbers(label: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(samples.distance * 100, theirs["data"][:, column], rtol=1e-14)
 
 
-@settings(max_examples=40)
 @given(
     values=st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=50),
     step=st.floats(1e-6, 1.0),
@@ -321,8 +310,8 @@ def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
     """Some thousand inputs, grown from sound files towards code not yet reached; bounded in number and seconds."""
     few = np.arange(6) / 100.0
     seeds = {f"{i}": bytes([i]) + case.build(few, np.round(0.2 + few, 5)) for i, case in enumerate(HUNTED)}
-    imports = "import acquisition.recordings.identify as r; r.formats(); import acquisition.recordings.tables.sheet"
-    watched = "acquisition.recordings.families"
+    imports = "import acquisition.recordings.identify as r; r.formats()"
+    watched = "acquisition.recordings"
     options = ["-timeout=20", "-rss_limit_mb=2048"]
-    bounds = {"runs": COVERAGE_RUNS, "seconds": 12, "longest": 1200}
+    bounds = {"runs": 6_000, "seconds": 12, "longest": 1200}
     assert hunt(__name__, watched, imports, seeds, tmp_path, options=options, **bounds) >= 10

@@ -18,6 +18,7 @@ from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunDamaged
 from storage.run_file.reading import Run, open_run
 from storage.run_file.writing import write_run
+from tests.sampling import sampled
 
 # Any bit pattern is a float64: NaN payloads, negative zero and subnormal numbers among them. Those beyond the range
 # that a run file holds become small by their highest bits.
@@ -74,7 +75,6 @@ def bits(block: Block) -> tuple[Any, ...]:
     return block.first, *(None if c is None else (c.dtype.str, c.tobytes()) for c in columns)
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     blocks=runs(),
     info=infos,
@@ -141,7 +141,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", sampled(range(8)))
 def test_a_flipped_byte_is_found_or_harmless(sound: Path, tmp_path: Path, seed: int) -> None:
     """After any change of one byte the run is refused in one line, or says exactly what it said before."""
     with open_run(sound) as run:
@@ -163,7 +163,7 @@ def test_a_flipped_byte_is_found_or_harmless(sound: Path, tmp_path: Path, seed: 
     assert refusals  # the test would be idle if it only ever met unused bytes
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(share=st.floats(0, 1, exclude_max=True))
 def test_a_cut_file_is_refused(sound: Path, tmp_path: Path, share: float) -> None:
     """A run that ends early, wherever, is refused at opening."""

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry, frame, frames
+from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry, frame
 from storage.wire_log.scanning import LogContents, parse_log
+from tests.sampling import sampled
 
 LOG = 0x5EED
 PAGE = 4096
@@ -64,7 +65,7 @@ def test_cut_at_every_byte_it_loses_one_record_at_most() -> None:
         assert contents.damage.ended == (length == len(data))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", sampled(range(5), 1))
 def test_zeroed_pages_are_seen_and_cost_only_themselves(seed: int) -> None:
     """One hundred zeroed pages a seed: each is noticed, no record is wrong, and only those it touches are gone."""
     data, ends = log_of(700, seed)
@@ -80,7 +81,7 @@ def test_zeroed_pages_are_seen_and_cost_only_themselves(seed: int) -> None:
         assert contents.damage.records >= len(whole) - touched
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", sampled(range(5), 1))
 def test_flipped_bits_are_seen_and_cost_one_record(seed: int) -> None:
     """One hundred flips a seed: each is noticed, no record is wrong, and only the one it hits is gone."""
     data, _ = log_of(300, seed)
@@ -111,10 +112,8 @@ PAYLOADS = st.lists(
 
 def written(payloads: list[tuple[Kind, bytes]]) -> bytes:
     """Return the log of some payloads."""
-    records: list[bytes] = []
-    for n, (kind, payload) in enumerate(payloads):
-        records += frames(kind, payload, sequence=len(records), mono_ns=n, log=LOG, channel=n)
-    return b"".join(records)
+    items = enumerate(payloads)
+    return b"".join(frame(kind, payload, sequence=n, mono_ns=n, log=LOG, channel=n) for n, (kind, payload) in items)
 
 
 @given(PAYLOADS)
@@ -149,7 +148,7 @@ def test_no_mangling_invents_a_record(payloads: list[tuple[Kind, bytes]], data: 
             rest = log[:start] + log[stop:]
             log = rest[:to] + piece + rest[to:]
     contents = parse_log(log)
-    foreign = [record for record in contents if record.payload and key(record) not in whole]
+    foreign = [record for record in contents if key(record) not in whole]
     # Where every record before it is gone, a record that a device sent is the first that is read; then none of ours is.
     assert in_order([key(record) for record in contents], whole) or len(foreign) == contents.damage.records
     damage = contents.damage

@@ -1,0 +1,78 @@
+"""Numbers of a table are read to the last bit, and a row that is no row leaves its neighbours alone."""
+
+from __future__ import annotations
+
+import tempfile
+from decimal import Decimal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.recordings.identify import open_recording
+from acquisition.recordings.recording import Recording
+
+
+def printed(digits: int, decimals: int) -> str:
+    """Return a number in fixed point."""
+    return f"{Decimal(digits).scaleb(-decimals):f}"
+
+
+FIXED = st.integers(0, 9).flatmap(
+    lambda decimals: st.lists(
+        st.integers(-(10**9), 10**9).map(lambda digits: printed(digits, decimals)), min_size=8, max_size=60
+    )
+)
+EXPONENTS = st.lists(
+    st.builds(
+        lambda digits, power: f"{digits / 10**6:.6f}E{power}", st.integers(-(10**7), 10**7), st.integers(-30, 20)
+    ),
+    min_size=8,
+    max_size=60,
+)
+
+
+def opened(folder: Path, heading: str, rows: list[str], newline: str = "\n") -> Recording:
+    """Return what a file of these rows holds."""
+    path = folder / "run.csv"
+    path.write_bytes(newline.join([heading, *rows, ""]).encode())
+    return open_recording(path)
+
+
+@given(
+    cells=st.one_of(FIXED, EXPONENTS),
+    unit=st.sampled_from([("V", 0), ("mV", -3), ("m/s^2", 0)]),
+    newline=st.sampled_from(["\n", "\r\n", "\r"]),
+)
+def test_every_form_of_number_is_read_as_a_decimal_number(
+    cells: list[str], unit: tuple[str, int], newline: str
+) -> None:
+    """Fixed point and exponents, and the power of ten of the unit: rounded once, as decimals are."""
+    name, shift = unit
+    with tempfile.TemporaryDirectory() as folder:
+        rows = [f"{i / 100:.2f};{cell}" for i, cell in enumerate(cells)]
+        samples = opened(Path(folder), f"t (s);y ({name})", rows, newline).samples
+    for cell, value in zip(cells, samples.distance.tolist(), strict=True):
+        assert value == float(Decimal(cell).scaleb(shift))
+
+
+def test_odd_rows_leave_the_numbers_of_their_neighbours_alone(tmp_path: Path) -> None:
+    """Comments, lost columns and words are marked or make no row; all other rows are read."""
+    rows = [f"{i / 100:.3f}\t{25 + 6 * np.sin(8 * i / 100):.3f}\t0.239" for i in range(3000)]
+    expected = [float(row.split("\t")[1]) for row in rows]
+    odd = ["here I touched it", "", "  ", "0.5\t99.1", "1.000\tnan\t0.239"]
+    mixed = [line for at, row in enumerate(rows) for line in ([odd[at // 100 % 5]] if at % 100 == 50 else []) + [row]]
+    samples = opened(tmp_path, "t (s)\ty (V)\tdy (V)", mixed).samples
+    sound = samples.distance[np.isin(samples.distance, expected)]
+    assert sound.tolist() == expected
+
+
+@pytest.mark.parametrize("delimiter", ["\t", ";", "  "])
+def test_a_file_of_many_pages_has_no_seams(tmp_path: Path, delimiter: str) -> None:
+    """Rows are found as a whole wherever a page ends."""
+    cells = [(f"{i / 100:.3f}", f"{25 + 6 * np.sin(8 * i / 100):.3f}") for i in range(40_000)]
+    samples = opened(tmp_path, f"t[s]{delimiter}y[V]", [delimiter.join(pair) for pair in cells], "\r\n").samples
+    assert samples.distance.tolist() == [float(cell) for _, cell in cells]
+    np.testing.assert_allclose(samples.t, np.arange(40_000) / 100, rtol=1e-12)
