@@ -49,23 +49,14 @@ pytestmark = pytest.mark.trials
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What was found of one drag, length and noise.
-
-    Parameters
-    ----------
-    drag : str
-    seconds, noise_m : float
-    errors, stated, own : (n, 4) float64
-        Of the quantities: error, stated u, and u of the fit of linear and quadratic drag, of the true law where that
-        lies outside; NaN where a quantity was not given.
-    """
+    """What was found of one drag, length and noise."""
 
     drag: str
     seconds: float
     noise_m: float
-    errors: F8
-    stated: F8
-    own: F8
+    errors: F8  # (n, 4), of the quantities; NaN where one was not given
+    stated: F8  # their u
+    own: F8  # u of the fit of linear and quadratic drag, of the true law where that lies outside
 
     def covered(self, k: int, sigmas: float) -> float:
         """Return the share of intervals of a quantity that hold the truth."""

@@ -6,16 +6,13 @@ import math
 import os
 from collections import Counter
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 
-from pipeline.damping.mixture import find_mixed
-from pipeline.damping.select import Damping, fit_damping
-from pipeline.samples.condition import condition
+from pipeline.analyse import Oscillation, analyse
 from pipeline.track import Track
-from pipeline.windows.cycles import Cycles, find_cycles
-from pipeline.windows.demodulate import demodulate
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "30"))
 SINGLE = ("linear", "quadratic", "friction")
@@ -25,7 +22,7 @@ FINE_M, COARSE_M = 3e-4, 2.39e-3
 pytestmark = pytest.mark.trials
 
 
-def runs(synthetic: ModuleType, name: str, seconds: float, sigma_m: float) -> list[Damping]:
+def runs(synthetic: ModuleType, name: str, seconds: float, sigma_m: float) -> list[Any]:
     """Return the damping found in runs of one truth that differ in noise and phase."""
     t = synthetic.times(seconds)
     amplitude = synthetic.Truth(**synthetic.LAW_TRUTHS[name]).amplitude_at(t)
@@ -33,10 +30,9 @@ def runs(synthetic: ModuleType, name: str, seconds: float, sigma_m: float) -> li
     for seed in range(TRIALS):
         rng = np.random.default_rng((seed, 11))
         y = 0.22 + amplitude * np.cos(8.3 * t + rng.uniform(-math.pi, math.pi)) + sigma_m * rng.standard_normal(t.size)
-        conditioned = condition(Track.from_arrays(t, y))
-        cycles = find_cycles(conditioned)
-        assert isinstance(cycles, Cycles)
-        found.append(fit_damping(demodulate(conditioned, cycles), 0.0))
+        motion = analyse(Track.from_arrays(t, y)).motion
+        assert isinstance(motion, Oscillation)
+        found.append(motion.damping)
     return found
 
 
@@ -91,17 +87,3 @@ def test_an_exponential_is_rejected_where_it_is_wrong_and_only_there(synthetic: 
     print(line)
     assert at_least(wrong, 0.99), line
     assert at_least(TRIALS - right, 0.98), line
-
-
-@pytest.mark.parametrize(("sigma_m", "share"), [(FINE_M, 0.99), (COARSE_M, 0.93)])
-@pytest.mark.parametrize("name", [*SINGLE, *MIXED])
-def test_mixed_drag_is_found_where_it_is(synthetic: ModuleType, name: str, sigma_m: float, share: float) -> None:
-    """Of 120 s a mixture's own terms are told in 99 % of runs at 0.3 mm; wrong ones are in 1 % at most."""
-    counts = Counter(mixed and mixed.fit.name for mixed in map(find_mixed, runs(synthetic, name, 120.0, sigma_m)))
-    line = f"120 s, {sigma_m * 1e3:g} mm, {name}: mixed drag {dict(counts)} of {TRIALS}"
-    print(line)
-    if name in SINGLE:
-        assert at_least(counts[None], 0.99), line
-    else:
-        assert at_least(counts[name], share), line
-        assert at_least(counts[name] + counts[None], 0.99), line

@@ -67,27 +67,15 @@ def bound(law: str, seconds: float, noise_m: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What was found of one law, length and noise.
-
-    Parameters
-    ----------
-    law : str
-    stated : bool
-        Whether the analysis knew the law.
-    seconds, noise_m : float
-    errors, u : (n,) float64
-        Of the damping rate at the start, 1/s.
-    contradicted : int
-        Recordings of which a warning said that they contradict the law.
-    """
+    """What was found of one law, length and noise."""
 
     law: str
     stated: bool
     seconds: float
     noise_m: float
-    errors: F8
+    errors: F8  # of the damping rate at the start, 1/s
     u: F8
-    contradicted: int
+    contradicted: int  # recordings of which a warning said that they contradict the law
 
     @property
     def covered(self) -> float:

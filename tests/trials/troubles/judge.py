@@ -27,17 +27,11 @@ LIMIT = 4.0  # stated uncertainties beyond which a number is wrong
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """One estimate held against the truth.
-
-    Parameters
-    ----------
-    error, u, u_own : float
-        What it is off by, its stated uncertainty, and what the record's own scatter contributes to that.
-    """
+    """One estimate held against the truth."""
 
     error: float
     u: float
-    u_own: float
+    u_own: float  # what the record's own scatter contributes to u
 
     @property
     def z(self) -> float:
@@ -49,36 +43,15 @@ class Given:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What became of one record.
-
-    Parameters
-    ----------
-    kind : str
-    seed : int
-    given : mapping of str to Given
-        The estimates that have a truth.
-    warnings : tuple of str
-        Codes of the findings that are warnings or errors.
-    notes : tuple of str
-        Codes of the others.
-    refused : bool
-        Whether none of the estimates that have a truth was given.
-    named : bool
-        Whether a warning names the kind.
-    cpu_s : float
-        Processor time of the analysis.
-    rows : int
-        Of the record.
-    tier : str
-    """
+    """What became of one record."""
 
     kind: str
     seed: int
-    given: Mapping[str, Given]
-    warnings: tuple[str, ...]
-    notes: tuple[str, ...]
-    refused: bool
-    named: bool
+    given: Mapping[str, Given]  # the estimates that have a truth
+    warnings: tuple[str, ...]  # codes of the findings that are warnings or errors
+    notes: tuple[str, ...]  # codes of the others
+    refused: bool  # whether none of the estimates that have a truth was given
+    named: bool  # whether a warning names the kind
     cpu_s: float
     rows: int
     tier: str

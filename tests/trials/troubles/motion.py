@@ -25,53 +25,28 @@ STEPS_A_PERIOD = 100
 
 @dataclass(frozen=True, kw_only=True)
 class Bob:
-    """What moves, and how it starts.
+    """What moves, and how it starts."""
 
-    Parameters
-    ----------
-    omega : float
-        Angular frequency without damping at small amplitudes, rad/s.
-    amplitude, phase : float
-        At the start, m and rad: displacement A cos(phase), velocity -A omega sin(phase).
-    gamma, beta, mu : float
-        Drag that makes dA/dt = -(mu + gamma A + beta A^2): 1/s, 1/(m s), m/s.
-    c, n : float
-        Drag that makes dA/dt = -c A^n.
-    cubic : float
-        Restoring force grows by the factor 1 + cubic x^2, 1/m^2.
-    slackens : bool
-        Whether the spring hangs slack above its own length, where only the weight acts.
-    drift : float
-        Relative change of the stiffness a second, 1/s.
-    drive, drive_omega, drive_chirp : float
-        Acceleration of a periodic force, m/s^2, its angular frequency, rad/s, and how that grows, rad/s^2.
-    """
-
-    omega: float = 8.3
-    amplitude: float = 0.05
-    phase: float = 0.0
-    gamma: float = 0.0
-    beta: float = 0.0
-    mu: float = 0.0
-    c: float = 0.0
+    omega: float = 8.3  # angular frequency without damping at small amplitudes, rad/s
+    amplitude: float = 0.05  # m: displacement A cos(phase) and velocity -A omega sin(phase) at the start
+    phase: float = 0.0  # rad
+    gamma: float = 0.0  # 1/s, of drag that makes dA/dt = -(mu + gamma A + beta A^2)
+    beta: float = 0.0  # 1/(m s)
+    mu: float = 0.0  # m/s
+    c: float = 0.0  # of drag that makes dA/dt = -c A^n
     n: float = 1.0
-    cubic: float = 0.0
-    slackens: bool = False
-    drift: float = 0.0
-    drive: float = 0.0
-    drive_omega: float = 0.0
-    drive_chirp: float = 0.0
+    cubic: float = 0.0  # 1/m^2: the restoring force grows by the factor 1 + cubic x^2
+    slackens: bool = False  # whether the spring hangs slack above its own length, where only the weight acts
+    drift: float = 0.0  # relative change of the stiffness a second, 1/s
+    drive: float = 0.0  # acceleration of a periodic force, m/s^2
+    drive_omega: float = 0.0  # its angular frequency, rad/s
+    drive_chirp: float = 0.0  # how that grows, rad/s^2
 
 
 class Motion:
-    """A solution: displacement from rest, m, and what is true of it.
+    """A solution: displacement from rest, m, at the steps, and what is true of it.
 
-    Parameters
-    ----------
-    t, x, v : (n,) float64
-        At the steps: s, m, m/s.
-    lopsided : bool
-        Whether the motion goes farther to one side of the rest position than to the other.
+    A lopsided one goes farther to one side of the rest position than to the other.
     """
 
     def __init__(self, t: F8, x: F8, v: F8, *, lopsided: bool = False) -> None:
@@ -140,21 +115,9 @@ class Motion:
 
 
 def swing(bob: Bob, seconds: float, *, start: float = -2.0) -> Motion:
-    """Solve the motion of a bob.
+    """Solve the motion of a bob from ``start`` to ``seconds``; it ends where friction holds the bob, if it does.
 
-    Parameters
-    ----------
-    bob : Bob
-        How it is at ``start``.
-    seconds : float
-        Until when, s.
-    start : float
-        From when, s; before 0, so that the amplitude at 0 lies between turning points.
-
-    Returns
-    -------
-    Motion
-        Ended where friction holds the bob, if it does.
+    The start lies before 0, so that the amplitude at 0 lies between turning points.
     """
     step = 2.0 * math.pi / bob.omega / STEPS_A_PERIOD
     accelerate = _law(bob)

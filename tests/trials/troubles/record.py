@@ -63,26 +63,13 @@ CODES: Mapping[str, frozenset[str]] = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Record:
-    """A record and what is true of it.
+    """A record and what is true of it."""
 
-    Parameters
-    ----------
-    t, y : (n,) float64
-        Times, s, and distances, m, as a file would give them; NaN where none was measured.
-    truth : mapping of str to float or callable
-        By the name of the estimate, in SI units; only what is defined. An empty mapping: nothing moves, so any
-        period is wrong.
-    scene : mapping
-        The tables of a scene file.
-    text : bytes or None
-        The file to be read instead of the arrays.
-    """
-
-    t: F8
-    y: F8
-    truth: Mapping[str, Truth]
+    t: F8  # s
+    y: F8  # m; NaN where none was measured
+    truth: Mapping[str, Truth]  # by the name of the estimate; empty: nothing moves, so any period is wrong
     scene: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
-    text: bytes | None = None
+    text: bytes | None = None  # the file to be read instead of the arrays
 
 
 Make = Callable[[int], Record]
@@ -91,29 +78,14 @@ Make = Callable[[int], Record]
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """A kind of trouble.
-
-    Parameters
-    ----------
-    name : str
-    cause : str
-        Of :data:`CODES`.
-    make : callable
-        Gives the record of a seed.
-    cure : bool
-        Whether right numbers are asked for, and not only a warning.
-    spread : tuple of str
-        Estimates whose uncertainty states how far something moves, by definition, and not how well it is known.
-    plain : bool
-        Whether it is a record without trouble, on which a warning is a false alarm.
-    """
+    """A kind of trouble."""
 
     name: str
     cause: str
     make: Make
-    cure: bool = False
-    spread: tuple[str, ...] = ()
-    plain: bool = False
+    cure: bool = False  # whether right numbers are asked for, and not only a warning
+    spread: tuple[str, ...] = ()  # estimates whose u states how far something moves, by definition
+    plain: bool = False  # whether it is a record without trouble, on which a warning is a false alarm
 
     @property
     def codes(self) -> frozenset[str]:
@@ -122,20 +94,7 @@ class Kind:
 
 
 class Bench:
-    """What a seed draws: a bob, where it hangs, a sensor's noise.
-
-    Parameters
-    ----------
-    seed : int
-    key : str
-        The kind's name: no two kinds draw the same numbers.
-    seconds, rate_hz : float
-        How long and how often is measured.
-    sigma_m : float
-        Standard deviation of one distance, m.
-    bob
-        What is not to be drawn: of :class:`tests.trials.troubles.motion.Bob`.
-    """
+    """What a seed and a kind's name draw: a bob, where it hangs, a sensor's noise; ``bob`` says what is not drawn."""
 
     def __init__(
         self,

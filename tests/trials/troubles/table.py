@@ -20,13 +20,7 @@ MEASURED = 16  # records of which the rms error is known well enough to be held 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One kind at one tier.
-
-    Parameters
-    ----------
-    kind : Kind
-    verdicts : sequence of Verdict
-    """
+    """One kind at one tier."""
 
     kind: Kind
     verdicts: Sequence[Verdict]
