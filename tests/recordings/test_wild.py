@@ -15,6 +15,7 @@ from acquisition.recordings.questions import Missing
 from pipeline.analyse import analyse
 from pipeline.track import UNUSABLE
 from springmass.runs.tracks import to_track
+from tests.sampling import sampled
 
 DEG = np.pi / 180
 
@@ -241,7 +242,7 @@ def test_what_a_dialect_leaves_out_is_asked_in_one_line(recordings: Path, row: R
     assert set(caught.value.question.missing) == set(row.asks)
 
 
-@every
+@pytest.mark.parametrize("row", sampled(TABLE, 5), ids=lambda row: f"{row.start}:{row.channel}")
 def test_a_dialect_can_be_surveyed(recordings: Path, row: Row) -> None:
     """What a file holds is told without a question, the channel among it."""
     found = inspect(only(recordings, row.start))
@@ -362,7 +363,7 @@ def test_what_oscillates_unevenly_has_the_period_of_its_crossings(recordings: Pa
     assert period.u < 1e-2 * period.value
 
 
-@pytest.mark.parametrize("row", [each for each in TABLE if UNIT in each.asks], ids=lambda row: row.start)
+@pytest.mark.parametrize("row", sampled([each for each in TABLE if UNIT in each.asks]), ids=lambda row: row.start)
 def test_the_unit_that_is_answered_changes_no_time(recordings: Path, row: Row) -> None:
     """Nor what is flagged: a unit says how large values are, and no more."""
     path = only(recordings, row.start)

@@ -45,14 +45,14 @@ def test_an_analysis_runs_on_one_thread() -> None:
     seen: list[set[int]] = []
 
     def falling(t: np.ndarray, start: float, d: float) -> np.ndarray:
-        seen.append(pools())
+        if not seen:  # looking takes a while
+            seen.append(pools())
         return start * np.exp(-d * t)
 
     law = make_law("own", falling, {"d": (0, -1)}, lambda _, a: (a[0], 0.01))
     seen.clear()
     analyse(Track.from_arrays(T, Y), params=replace(STANDARD, damping=replace(STANDARD.damping, laws=(law,))))
-    assert seen
-    assert set.union(*seen) == {1}
+    assert seen == [{1}]
     assert pools() == {2}
 
 
