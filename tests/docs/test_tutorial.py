@@ -36,7 +36,7 @@ ELSEWHERE = (
     "docs/how-to/analyse-a-course.md",  # tests/cli/test_batch_cli.py, with folders of recordings
     "docs/how-to/many-machines.md",  # tests/docs/test_many_machines.py, with a cluster on this machine
     "docs/how-to/watch-a-recording.md",  # tests/pages: a page stays open until its reader ends it
-    "docs/reference/page-messages.md",  # tests/pages/test_bench_page.py, with the address of a page
+    "docs/reference/page-messages.md",  # tests/pages/test_at_the_bench.py, with the address of a page
 )
 """Pages whose blocks need what no page can bring along, and where the same is run."""
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE

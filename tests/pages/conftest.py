@@ -1,7 +1,9 @@
-"""Pages in a browser, driven by playwright."""
+"""One browser and one old run's page for all tests of pages; a recording with its page for tests that act on it."""
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import os
 import re
 import signal
@@ -10,18 +12,18 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from springmass.cli import main
-from springmass.runs.loading import sample_data
 from tests.browser import chromium, headless
+from tests.courses import damped, write_recording
+from tests.pages.bench import LIMIT_S, MOVES, OLD_RUN, SEEN, Program
 
-LIMIT_S = 180.0
 SCENE = """
 [bob]
 mass_kg = { value = 0.2, u = 0.0001 }
@@ -35,6 +37,8 @@ gamma_per_s = 0.01
 [start]
 displacement_m = 0.05
 """
+KINDS = ("clipped", "undamped", "sixty_hz")
+LAPTOP: Any = {"width": 1366, "height": 900}
 
 
 @pytest.fixture(scope="session")
@@ -48,93 +52,50 @@ def browser() -> Iterator[Browser]:
         yield launched
 
 
-@pytest.fixture(scope="session")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The page of each command that writes one, of the bundled recordings."""
-    out, data = tmp_path_factory.mktemp("pages"), sample_data()
-
-    undamped, damped, clipped = (
-        str(data / f"{name}_simulated_position.txt") for name in ("undamped", "damped", "clipped")
+@contextlib.contextmanager
+def started(out: Path, *arguments: str) -> Iterator[Program]:
+    """Start the program, wait for the address of its page, and kill it at the end if it still runs."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "springmass", *arguments, "--no-browser"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
     )
-    scenes = ["--scene", str(data / "undamped.scene.toml"), "--scene", str(data / "damped.scene.toml")]
-    velocity = ["--velocity", str(data / "damped_simulated_velocity.txt")]
-    assert main(["analyse", damped, *velocity, *scenes[2:], "--method", "classic", "--out", str(out)]) == 0
-    assert main(["analyse", clipped, "--out", str(out)]) == 0
-    assert main(["compare", undamped, damped, *scenes, "--out", str(out / "compared")]) == 0
-    return {
-        "analyse": out / "damped_simulated_position.results" / "report.html",
-        "warned": out / "clipped_simulated_position.results" / "report.html",
-        "compare": out / "compared" / "report.html",
-    }
+    stream = process.stderr
+    assert stream is not None
+    messages: list[str] = []
+    address_known = threading.Event()
 
+    def read() -> None:
+        for line in stream:
+            messages.append(line)
+            if "page: http" in line:
+                address_known.set()
+        address_known.set()
 
-@dataclass
-class Program:
-    """A process of the program with a page."""
-
-    process: subprocess.Popen[str]
-    address: str
-    messages: list[str]
-    out: Path
-    reader: threading.Thread
-
-    def ended(self) -> int:
-        """Wait for its end and its last message; return the exit code."""
-        code = self.process.wait(LIMIT_S)
-        self.reader.join(LIMIT_S)
-        return code
-
-    def end(self) -> None:
-        """End it as Ctrl-C does."""
-        self.process.send_signal(signal.SIGINT)
-        self.ended()
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        assert address_known.wait(LIMIT_S)
+        found = re.search(r"page: (http\S+)", "".join(messages))
+        assert found, "".join(messages)
+        yield Program(process, found[1], messages, out, reader)
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+        reader.join(LIMIT_S)
+        stream.close()
 
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
     """Return a function that starts the program and waits for the address of its page; none outlives the test."""
     with ExitStack() as stack:
-
-        def started(*arguments: str) -> Program:
-            command = [sys.executable, "-m", "springmass", *arguments, "--no-browser"]
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-                text=True,
-                env={**os.environ, "PYTHONUNBUFFERED": "1"},
-                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
-            )
-            messages: list[str] = []
-            address_known = threading.Event()
-
-            def read() -> None:
-                assert process.stderr is not None
-                for line in process.stderr:
-                    messages.append(line)
-                    if "page: http" in line:
-                        address_known.set()
-                address_known.set()
-
-            reader = threading.Thread(target=read)
-            reader.start()
-
-            def stop() -> None:
-                if process.poll() is None:
-                    process.kill()
-                process.wait()
-                reader.join(LIMIT_S)
-                assert process.stderr is not None
-                process.stderr.close()
-
-            stack.callback(stop)
-            assert address_known.wait(LIMIT_S)
-            found = re.search(r"page: (http\S+)", "".join(messages))
-            assert found, "".join(messages)
-            return Program(process, found[1], messages, tmp_path / "run.h5", reader)
-
-        yield started
+        yield lambda *arguments: stack.enter_context(started(tmp_path / "run.h5", *arguments))
 
 
 @pytest.fixture
@@ -149,10 +110,10 @@ def record(start: Callable[..., Program], tmp_path: Path) -> Callable[..., Progr
     return recording
 
 
-@pytest.fixture
-def context(browser: Browser) -> Iterator[BrowserContext]:
-    """Return a browser with separate cookies, in which an error on a page fails the test."""
-    context = browser.new_context(viewport={"width": 1366, "height": 900})
+@contextlib.contextmanager
+def watched(browser: Browser, **options: Any) -> Iterator[BrowserContext]:
+    """Open a browser with separate cookies, in which an error on a page fails the test."""
+    context = browser.new_context(viewport=LAPTOP, **options)
     context.set_default_timeout(LIMIT_S * 1e3)
     wrong: list[Any] = []
     context.on("weberror", lambda error: wrong.append(error.error))
@@ -161,7 +122,87 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
     assert not wrong
 
 
-WIDTHS = {"laptop": (1366, 768), "phone": (390, 844), "A4": (680, 970)}
+@pytest.fixture
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    """Return a browser with separate cookies."""
+    with watched(browser) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="session")
+def old_run(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Any]]:
+    """The address of the page of an old run, and the cookies of the browser that opened it."""
+    with started(tmp_path_factory.mktemp("old"), "page", str(OLD_RUN)) as program:
+        with watched(browser) as first:
+            page = first.new_page()
+            page.goto(program.address)
+            page.wait_for_function(MOVES)
+            cookies = first.storage_state()
+        yield program.address.partition("?")[0], cookies
+
+
+@pytest.fixture
+def replay(browser: Browser, old_run: tuple[str, Any]) -> Iterator[Page]:
+    """Return the page of an old run, as it is when it has been opened."""
+    address, cookies = old_run
+    with watched(browser, storage_state=cookies) as context:
+        page = context.new_page()
+        page.goto(address)
+        page.wait_for_function(SEEN.format(count=11000))
+        page.wait_for_function(MOVES)
+        yield page
+
+
+@pytest.fixture(scope="session")
+def page_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return a function that makes a page of each kind once: three reports, and a course."""
+    out, data = tmp_path_factory.mktemp("pages"), OLD_RUN.parent
+    clipped, undamped, slow = (str(data / f"{name}_simulated_position.txt") for name in KINDS)
+    scenes = ["--scene", str(data / "undamped.scene.toml")]
+
+    @functools.cache
+    def made(name: str) -> Path:
+        if name == "analyse":
+            bench = ["--scene", str(data / "damped.scene.toml"), "--method", "classic"]
+            assert main(["analyse", str(OLD_RUN), *bench, "--out", str(out)]) == 0
+            return out / f"{OLD_RUN.stem}.results" / "report.html"
+        if name == "warned":
+            assert main(["analyse", clipped, "--out", str(out)]) == 0
+            return out / "clipped_simulated_position.results" / "report.html"
+        if name == "compare":
+            assert main(["compare", undamped, slow, *scenes, "--out", str(out / "compared")]) == 0
+            return out / "compared" / "report.html"
+        return course_of(out)
+
+    return made
+
+
+def course_of(top: Path) -> Path:
+    """Return the page of a course of three runs, one at rest and one that cannot be read."""
+    runs = top / "runs"
+    runs.mkdir()
+    for i in range(3):
+        write_recording(runs / f"run{i}.txt", damped(i, omega=8.0 + 0.1 * i))
+    write_recording(runs / "still.txt", 0.2 + 3e-4 * np.random.default_rng(1).standard_normal(800))
+    (runs / "bad.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + b"\0" * 600)
+    (top / "runs.csv").write_text("path,section,bob_mass_kg\nruns/run0.txt,mon,0.2\nruns/run1.txt,tue,0.21\n")
+    options = ["--runs", str(top / "runs.csv"), "--jobs", "1", "--reports", "1", "--accuracy", "fast"]
+    assert main(["batch", str(runs), "-o", str(top / "course"), *options]) == 1
+    return top / "course" / "index.html"
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """A page without network, its errors kept as failures."""
+    with watched(browser, offline=True) as context:
+        opened = context.new_page()
+        failed: list[str] = []
+        opened.on("requestfailed", lambda request: failed.append(request.url))
+        yield opened
+        assert failed == []
+
+
+WIDTHS = {"phone": (390, 844), "laptop": (1366, 768), "A4": (680, 970)}
 """Pixels; A4 less margins of 15 mm at 96 pixels an inch."""
 
 OUTSIDE = """() => {
@@ -180,20 +221,6 @@ OUTSIDE = """() => {
     if (!picture.complete || picture.naturalWidth === 0) found.push('not shown ' + name(picture));
   return found;
 }"""
-
-
-@pytest.fixture
-def page(browser: Browser) -> Iterator[Page]:
-    """A page without network, its errors kept as failures."""
-    context = browser.new_context(offline=True)
-    context.set_default_timeout(LIMIT_S * 1e3)
-    opened = context.new_page()
-    errors: list[str] = []
-    opened.on("pageerror", lambda error: errors.append(str(error)))
-    opened.on("requestfailed", lambda request: errors.append(request.url))
-    yield opened
-    context.close()
-    assert errors == []
 
 
 @pytest.fixture

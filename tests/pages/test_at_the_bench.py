@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import signal
+import struct
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,38 +17,18 @@ import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, BrowserContext, Page
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from springmass.page.run_actions import ASIDE
 from storage.run_file.reading import open_run
+from tests.pages.bench import FITTED, LIMIT_S, MOVES, PHASE, SEEN, STAGES, Client, answer, press
 
-SEEN = "() => samples.length && samples[0].count > {count}"
-PHASE = "() => bench().phase === '{phase}'"
-# The page itself records what it shows only briefly, because a busy computer may look too late.
-STAGES = """() => {
-  const stage = document.getElementById('stage');
-  window.stages = [];
-  new MutationObserver(() => stages.push(stage.textContent)).observe(stage, { childList: true, characterData: true });
-}"""
 LOST_ONCE = """() => {
   const trouble = document.getElementById('trouble');
   window.lost_once = false;
   new MutationObserver(() => { if (!trouble.hidden) window.lost_once = true; }).observe(trouble, { attributes: true });
 }"""
-
-
-def answer(page: Page, *texts: str) -> None:
-    """Answer the page's question."""
-    page.wait_for_selector("#ask[open]")
-    for field, text in zip(page.locator("#ask input").all(), texts, strict=True):
-        field.fill(text)
-    page.keyboard.press("Enter")
-
-
-def press(page: Page, key: str) -> None:
-    """Press a key once its button is there."""
-    page.wait_for_selector(f"#actions button[data-key='{key}']:not([hidden])")
-    page.keyboard.press(key)
 
 
 @pytest.fixture
@@ -55,67 +39,6 @@ def bench(record: Callable[..., Any], context: BrowserContext) -> tuple[Any, Pag
     page.goto(program.address)
     page.wait_for_function(PHASE.format(phase="ready"))
     return program, page
-
-
-@pytest.mark.trials
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1366, 390])
-def test_everybody_can_read_a_bench(
-    record: Callable[..., Any], context: BrowserContext, width: int, scheme: Any
-) -> None:
-    """While it records: no violation of the accessibility rules, nothing wider than the screen."""
-    program = record()
-    page = context.new_page()
-    page.emulate_media(color_scheme=scheme)
-    page.set_viewport_size({"width": width, "height": 844})
-    page.goto(program.address)
-    page.wait_for_function(SEEN.format(count=600))
-    page.wait_for_function("() => motion && motion.omega")
-    found = Axe().run(page)
-    assert found.violations_count == 0, found.generate_report()
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
-        page.screenshot(path=Path(folder) / f"live-{width}-{scheme}.png", full_page=True)
-
-
-def page_process(program: Any) -> int:
-    """Return the number of the page's process."""
-    command = f"springmass page --recorder.* {program.out.with_suffix('.wire')}"
-    found = subprocess.run(["pgrep", "-f", command], capture_output=True, text=True)
-    (pid,) = found.stdout.split()
-    return int(pid)
-
-
-def test_the_first_minute(bench: tuple[Any, Page]) -> None:
-    """From opening to the report in five actions: zero, record, stop, yes, report."""
-    program, page = bench
-    page.wait_for_function(SEEN.format(count=100))
-    press(page, "z")
-    page.wait_for_function("() => bench().phase === 'ready' && bench().rest_m")
-    assert "zero 250." in page.inner_text("#calibration")
-    assert page.evaluate("position.labels[1]") == "displacement / mm"
-    press(page, "r")
-    page.wait_for_function(PHASE.format(phase="recording"))
-    page.wait_for_function("() => motion && motion.estimates && motion.estimates.period && motion.estimates.period.u")
-    page.wait_for_function("() => phase.plot.data[0].length > 50 && spectrum.plot.data[0].length > 50")
-    for chart in ("position", "amplitude", "phase", "spectrum"):
-        assert page.locator(f"div#{chart} canvas").count() == 1
-    ids = page.evaluate("[...document.querySelectorAll('[id]')].map((e) => e.id)")
-    assert len(set(ids)) == len(ids)
-    press(page, "s")
-    answer(page)
-    page.wait_for_function(PHASE.format(phase="built"))
-    press(page, "o")
-    page.wait_for_url("**/v1/report")
-    assert "Period" in page.inner_text("body") or "period" in page.inner_text("body")
-    page.go_back()
-    press(page, "q")
-    answer(page)
-    assert program.ended() == 0
-    with open_run(program.out) as run:
-        kinds = [event["kind"] for event in run.provenance["events"]]
-    assert "still" in kinds
-    assert (program.out.parent / "run.results" / "report.html").is_file()
 
 
 @pytest.mark.trials
@@ -143,54 +66,6 @@ def test_the_trigger_keeps_what_came_before(bench: tuple[Any, Page]) -> None:
     assert np.abs(stamps_s[first - 1 : first + 2]).min() < 1e-6
     steps_s = np.diff(stamps_s[: moved.argmax()])
     assert -1.5 <= stamps_s[0] <= -1.5 + 0.03 + steps_s.max()
-
-
-@pytest.mark.trials
-def test_a_trigger_is_disarmed_and_the_run_begun_by_hand(bench: tuple[Any, Page]) -> None:
-    """T again goes back to ready; what is asked beyond what may be is passed over."""
-    program, page = bench
-    press(page, "t")
-    answer(page, "500", "2")
-    page.wait_for_function(PHASE.format(phase="armed"))
-    page.evaluate("ask_server({ type: 'stop' })")  # nothing is recorded: there is nothing to stop
-    press(page, "t")
-    page.wait_for_function(PHASE.format(phase="ready"))
-    press(page, "r")
-    page.wait_for_function(PHASE.format(phase="recording"))
-    program.end()
-
-
-@pytest.mark.trials
-def test_record_while_armed_begins_the_run(bench: tuple[Any, Page]) -> None:
-    """Record, pressed once, ends the wait for the trigger and begins the recording."""
-    program, page = bench
-    press(page, "t")
-    answer(page, "500", "2")
-    page.wait_for_function(PHASE.format(phase="armed"))
-    press(page, "r")
-    page.wait_for_function(PHASE.format(phase="recording"))
-    program.end()
-
-
-@pytest.mark.trials
-def test_a_ruler_moves_the_zero_of_the_distances(bench: tuple[Any, Page]) -> None:
-    """The bob that hangs at 250 mm is said to hang at 260: the run's distances say so too."""
-    program, page = bench
-    press(page, "k")
-    answer(page, "260")
-    page.wait_for_function("() => bench().phase === 'ready' && bench().ruler_m")
-    page.wait_for_function("() => run.calibration.startsWith('by ruler: offset')")
-    assert page.evaluate("bench().rest_m") == pytest.approx(0.26, abs=1e-3)
-    press(page, "k")
-    answer(page, "900")  # the bob hangs where it hung: two distances for one place
-    page.wait_for_function("() => bench().failed")
-    assert "move the target" in page.inner_text("#told")
-    press(page, "r")
-    page.wait_for_function(PHASE.format(phase="recording"))
-    page.wait_for_function(SEEN.format(count=50))
-    program.end()
-    with open_run(program.out) as run:
-        assert run.provenance["sensor"]["calibration"]["offset_m"] == pytest.approx(0.01, abs=1e-3)
 
 
 @pytest.mark.trials
@@ -231,29 +106,6 @@ def test_nothing_is_recorded_where_the_page_is_closed_before(bench: tuple[Any, P
     assert "nothing was recorded" in "".join(program.messages)
 
 
-@pytest.mark.trials
-def test_a_killed_server_comes_back(bench: tuple[Any, Page]) -> None:
-    """Under the same address, to the same browser, which needs no other link; the recording lacks nothing."""
-    program, page = bench
-    press(page, "r")
-    page.wait_for_function(PHASE.format(phase="recording"))
-    page.wait_for_function(SEEN.format(count=100))
-    session, killed = page.evaluate("run.session"), page_process(program)
-    os.kill(killed, 9)
-    page.wait_for_function("() => document.getElementById('trouble').textContent.includes('server is lost')")
-    page.wait_for_function(f"() => run.session !== '{session}' && samples[0].count > 200")
-    assert page.is_hidden("#trouble")
-    assert page.evaluate("bench().phase") == "recording"
-    press(page, "s")
-    answer(page)
-    page.wait_for_function(PHASE.format(phase="built"))
-    press(page, "q")
-    answer(page)
-    assert program.ended() == 0
-    with open_run(program.out) as run:
-        assert np.isfinite(run.samples().distance).all()
-
-
 @pytest.fixture
 def viewers(record: Callable[..., Any], context: BrowserContext) -> tuple[Any, Page, str]:
     """Return a recording that is open to viewers, its page, and their address."""
@@ -292,59 +144,174 @@ def test_two_viewers_and_one_controller(viewers: tuple[Any, Page, str], browser:
     for other in others:
         other.pages[0].wait_for_function("() => state.marks.length === 1")
         other.close()
+    assert Client(address).code_after('{"type": "mark", "text": "no"}') == 1003
     assert page.evaluate("bench().phase") == "recording"
     program.end()
 
 
-@pytest.mark.trials
-def test_a_viewer_by_a_script(viewers: tuple[Any, Page, str]) -> None:
-    """What no browser would send is refused too: a command closes the socket with 1003."""
-    import http.client
-    from urllib.parse import urlsplit
+def test_from_opening_to_the_run_file(record: Callable[..., Any], context: BrowserContext) -> None:
+    """Open, see the motion, mark, stop: the mark is shown once the log has it, and the run file holds all of it."""
+    program = record()
+    page = context.new_page()
+    page.goto(program.address)
+    page.wait_for_function(PHASE.format(phase="recording"))
+    assert page.inner_text("#source") == "SIMULATED"
+    press(page, "m")
+    answer(page, "lamp on")
+    page.wait_for_function("() => state.marks.length === 1")
+    page.wait_for_function(MOVES)
+    assert page.evaluate("motion.estimates.period.value") == pytest.approx(0.7573, abs=0.01)
+    press(page, "s")
+    answer(page)
+    page.wait_for_function(PHASE.format(phase="built"))
+    press(page, "q")
+    answer(page)
+    assert program.ended() == 0
+    page.wait_for_function("() => !document.getElementById('trouble').hidden")
+    with open_run(program.out) as run:
+        assert [mark["text"] for mark in run.provenance["marks"]] == ["lamp on"]
+        (ended,) = [event["facts"] for event in run.provenance["events"] if event["kind"] == "ended"]
+        distance = run.samples().distance
+    assert ended["by"] == "the page"
+    shown = np.array(page.evaluate("Array.from(samples[0].y.subarray(0, samples[0].count))"), np.float64)
+    np.testing.assert_array_equal(shown, distance[: shown.size])
+    assert distance.size - shown.size < 50
 
-    program, _, address = viewers
-    parts = urlsplit(address)
-    connection = http.client.HTTPConnection(parts.netloc)
-    connection.request("GET", f"/?{parts.query}")
-    cookie = str(connection.getresponse().headers["Set-Cookie"]).split(";")[0]
-    connection.close()
-    with connect(
-        f"ws://{parts.netloc}/v1/run",
-        origin=f"http://{parts.netloc}",  # type: ignore[arg-type]
-        additional_headers={"Cookie": cookie},
-    ) as run:
+
+def test_messages_are_the_samples(record: Callable[..., Any]) -> None:
+    """As docs/reference/page-messages.md has them; a script may mark."""
+    program = record()
+    with Client(program.address).socket() as run:
         hello = json.loads(run.recv())
-        assert (hello["role"], hello["controls"]) == ("viewer", False)
-        run.send('{"type": "mark", "text": "no"}')
-        while run.close_code is None:
-            try:
-                run.recv()
-            except Exception:
-                break
-        assert run.close_code == 1003
+        assert (hello["type"], hello["version"], hello["simulated"]) == ("hello", 1, True)
+        count = 0
+        while count < 50:
+            message = run.recv()
+            if isinstance(message, bytes):
+                kind, sensor, first, size = struct.unpack_from("<4I", message)
+                assert (kind, sensor, first) == (1, 0, count)
+                assert np.all(np.diff(np.frombuffer(message, "<f8", size, 16)) > 0)
+                count += size
+        run.send('{"type": "mark", "text": "from a script"}')
+        while not (isinstance(message, str) and json.loads(message).get("marks")):
+            message = run.recv()
+        assert json.loads(message)["marks"][0][1] == "from a script"
     program.end()
 
 
 @pytest.mark.trials
-def test_the_cursor_and_a_part_by_the_keyboard(start: Callable[..., Any], context: BrowserContext) -> None:
-    """X puts the cursor, arrows move it, Enter pins it, G has the part between fitted; arrows scrub without it."""
-    import springmass
+def test_the_client_of_the_documentation(record: Callable[..., Any]) -> None:
+    """The ten lines of docs/reference/page-messages.md run as they stand and print the samples."""
+    program = record()
+    page = (Path(__file__).parents[2] / "docs/reference/page-messages.md").read_text()
+    client = page.split("## An example client")[1].split("```python\n")[1].split("```")[0]
+    client = re.sub(r'"http://127[^"]*"', repr(program.address), client)
+    with subprocess.Popen([sys.executable, "-u", "-c", client], stdout=subprocess.PIPE, text=True) as reading:
+        assert reading.stdout is not None
+        printed: list[str] = []
+        while not {"hello", "state"} <= set(printed) or not any(line.startswith("[") for line in printed):
+            line = reading.stdout.readline()
+            assert line, "the client ended"
+            printed.append(line.strip())
+        reading.kill()
+    assert printed[0] == "hello"
 
-    program = start("replay", str(Path(springmass.sample_data()) / "damped_simulated_position.txt"), "--page")
+
+@pytest.mark.trials
+def test_a_killed_page_ends_no_recording(record: Callable[..., Any]) -> None:
+    """The page's process is gone; the recording goes on until Ctrl-C, and lacks no reading."""
+    program = record()
+    log = program.out.with_suffix(".wire")
+    found = subprocess.run(["pgrep", "-f", f"springmass page --recorder.* {log}"], capture_output=True, text=True)
+    os.kill(int(found.stdout), signal.SIGKILL)
+    size = log.stat().st_size
+    while log.stat().st_size < size + 4096:
+        assert program.process.poll() is None, "".join(program.messages)
+    assert program.end() == 130
+    with open_run(program.out) as run:
+        samples = run.samples()
+    assert np.isfinite(samples.distance).all()
+    assert np.diff(samples.t).max() < 0.015
+
+
+@pytest.mark.trials
+@pytest.mark.parametrize(("width", "scheme"), [(1366, "light"), (390, "dark")])
+def test_everybody_can_read_a_bench(
+    record: Callable[..., Any], context: BrowserContext, width: int, scheme: Any
+) -> None:
+    """While it records: no violation of the accessibility rules, nothing wider than the screen."""
+    program = record()
     page = context.new_page()
+    page.emulate_media(color_scheme=scheme)
+    page.set_viewport_size({"width": width, "height": 844})
     page.goto(program.address)
-    page.wait_for_function(SEEN.format(count=11000))
-    page.wait_for_function("() => motion && motion.estimates")
-    page.keyboard.press("x")
-    page.keyboard.press("Enter")
-    for _ in range(20):
-        page.keyboard.press("Shift+ArrowRight")
-    assert "slope" in page.inner_text("#cursor")
-    page.keyboard.press("g")
-    cell = page.wait_for_selector("#region-estimates tr[data-name='period'] td")
-    assert cell is not None
-    assert float(cell.inner_text().split("(")[0]) == pytest.approx(0.7901, abs=0.001)
-    page.keyboard.press("x")
-    assert page.inner_text("#cursor") == ""
-    page.keyboard.press("ArrowLeft")
-    assert page.evaluate("play_time") == pytest.approx(page.evaluate("samples[0].t[samples[0].count - 1]") - 1.0)
+    page.wait_for_function(SEEN.format(count=600))
+    page.wait_for_function("() => motion && motion.omega")
+    found = Axe().run(page)
+    assert found.violations_count == 0, found.generate_report()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
+        page.screenshot(path=Path(folder) / f"live-{width}-{scheme}.png", full_page=True)
+
+
+@pytest.mark.trials
+def test_the_first_minute(bench: tuple[Any, Page]) -> None:
+    """From opening to the report in five actions: zero, record, stop, yes, report."""
+    program, page = bench
+    page.wait_for_function(SEEN.format(count=100))
+    press(page, "z")
+    page.wait_for_function("() => bench().phase === 'ready' && bench().rest_m")
+    assert page.evaluate("bench().rest_m") == pytest.approx(0.25, abs=1e-3)
+    assert page.evaluate("position.labels[1]") == "displacement / mm"
+    press(page, "r")
+    page.wait_for_function(PHASE.format(phase="recording"))
+    page.wait_for_function(FITTED)
+    page.wait_for_function("() => phase.plot.data[0].length > 50 && spectrum.plot.data[0].length > 50")
+    ids = page.evaluate("[...document.querySelectorAll('[id]')].map((e) => e.id)")
+    assert len(set(ids)) == len(ids)
+    press(page, "s")
+    answer(page)
+    page.wait_for_function(PHASE.format(phase="built"))
+    press(page, "o")
+    page.wait_for_url("**/v1/report")
+    assert "period" in page.inner_text("body").lower()
+    page.go_back()
+    press(page, "q")
+    answer(page)
+    assert program.ended() == 0
+    with open_run(program.out) as run:
+        assert "still" in [event["kind"] for event in run.provenance["events"]]
+    assert (program.out.parent / "run.results" / "report.html").is_file()
+
+
+@pytest.mark.trials
+def test_a_trigger_is_disarmed_and_record_ends_the_wait(bench: tuple[Any, Page]) -> None:
+    """T again goes back to ready; Record, pressed once while armed, begins the recording."""
+    program, page = bench
+    for key, phase in (("t", "ready"), ("r", "recording")):
+        press(page, "t")
+        answer(page, "500", "2")
+        page.wait_for_function(PHASE.format(phase="armed"))
+        page.evaluate("ask_server({ type: 'stop' })")  # nothing is recorded: there is nothing to stop
+        press(page, key)
+        page.wait_for_function(PHASE.format(phase=phase))
+    program.end()
+
+
+@pytest.mark.trials
+def test_a_stranger_sees_nothing(record: Callable[..., Any], browser: Browser, context: BrowserContext) -> None:
+    """The cookie opens a second page in the same browser; another browser, host or origin gets nothing."""
+    program = record()
+    first, second = context.new_page(), context.new_page()
+    first.goto(program.address)
+    second.goto(program.address.partition("?")[0])
+    for page in (first, second):
+        page.wait_for_function(SEEN.format(count=50))
+    stranger = browser.new_context()
+    answered = stranger.new_page().goto(program.address)
+    assert answered is not None
+    assert answered.status == 403
+    stranger.close()
+    netloc = program.address.split("/")[2]
+    with pytest.raises(InvalidStatus):
+        connect(f"ws://{netloc}/v1/run", origin="http://evil.example", open_timeout=LIMIT_S)  # type: ignore[arg-type]

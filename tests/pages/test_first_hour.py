@@ -69,20 +69,6 @@ def typed(bench: Path) -> Callable[..., str]:
 
 
 @pytest.mark.trials
-def test_finding_the_way(typed: Callable[..., str], bench: Path) -> None:
-    """Version, help, near misses, what files hold, and a scene to fill in: each ends with what to type next."""
-    typed("--version", shows=("springmass ",))
-    typed("record", "--help", shows=("--simulate", "--trigger"))
-    typed("analyze", "damped.txt", ends=2, shows=("did you mean analyse?",))
-    typed("formats", "damped.txt", shows=("motion-sensor", "100 Hz", "next: springmass analyse damped.txt"))
-    typed("sensors", shows=("line-protocol", "next: springmass ports"))
-    typed("scene", shows=("[bob]", "mass_kg", "next: springmass scene > bench.toml"))
-    typed("scene", "--check", "bench.toml", shows=("[bob] mass_kg", "next: springmass analyse RECORDING"))
-    (bench / "grams.toml").write_text(SCENE.replace("value = 0.2, u", "value = 217.6, u"))
-    typed("analyse", "damped.txt", "--scene", "grams.toml", "--no-report", shows=("did you mean grams: 0.2176?",))
-
-
-@pytest.mark.trials
 def test_from_a_file_to_a_figure(typed: Callable[..., str], clipped: Callable[..., list[str]], bench: Path) -> None:
     """One run with its report, two in one table, the comparison: nothing wraps, nothing is clipped on any medium."""
     shown = typed(

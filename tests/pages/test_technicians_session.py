@@ -1,4 +1,4 @@
-"""A technician's session: zero, ruler, trigger, marks, selection, reload, phone, report, and the same run again.
+"""A technician's session: zero, trigger, marks, selection, reload, phone, report, and the same run again.
 
 With ``SPRINGMASS_SCREENSHOTS`` naming a folder, every step leaves pictures there, in three widths, light and dark.
 """
@@ -19,11 +19,9 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from springmass.runs.analysing import load_and_analyse
-from tests.pages.conftest import LIMIT_S
-from tests.pages.test_at_the_bench import PHASE, SEEN, STAGES, answer, press
+from tests.pages.bench import FITTED, LIMIT_S, PHASE, SEEN, STAGES, answer, press
 
 WIDTHS = {1366: 768, 768: 1024, 390: 844}
-FITTED = "() => motion && motion.estimates && motion.estimates.period && motion.estimates.period.u"
 WHOLE = "() => motion && motion.accuracy === 'standard' && motion.estimates"
 # While the recorder measures the rest position, the key does nothing and a request is visibly refused. One call tests
 # both, because the measurement takes only three seconds.
@@ -71,20 +69,6 @@ def select(page: Page, left: float, right: float) -> None:
     page.wait_for_selector("#region-estimates tr[data-name='period']")
 
 
-def calibrate(page: Page) -> None:
-    """Give the distance by the ruler: what cannot be read is named, and the question stays."""
-    press(page, "k")
-    for wrong, says in (("0.25", "Did you mean 0.25 m?"), ("a foot", "Cannot read")):
-        answer(page, wrong)
-        page.wait_for_selector("#ask-error:not([hidden])")
-        assert says in page.inner_text("#ask-error")
-        assert page.locator("#ask[open]").count() == 1
-    look_at(page, "2-calibration")
-    answer(page, "0.25 m")
-    page.wait_for_function("() => bench().phase === 'ready' && bench().ruler_m")
-    assert page.evaluate("bench().ruler_m") == [0.25]
-
-
 @pytest.mark.trials
 def test_a_session_from_the_first_minute_to_the_report(
     record: Callable[..., Any], start: Callable[..., Any], context: BrowserContext, browser: Browser
@@ -98,7 +82,6 @@ def test_a_session_from_the_first_minute_to_the_report(
     page.wait_for_function("() => rate_hz() !== null")
     assert page.evaluate("rate_hz()") == pytest.approx(100.0, abs=5.0)
     look_at(page, "1-ready")
-    calibrate(page)
     press(page, "z")
     page.wait_for_function(NOT_WHILE_BUSY)
     page.wait_for_function(PHASE.format(phase="ready"))
@@ -132,7 +115,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     assert re.search(r"from the pin at [\d.]+ s: [\d.]+ s, −?[\d.]+ mm, slope", read)
     page.wait_for_function(f"() => samples[0].count > {count + 60}")
     assert page.inner_text("#cursor") == read
-    look_at(page, "3-recording")
+    look_at(page, "2-recording")
 
     page.reload()
     page.wait_for_function(FITTED)
@@ -148,7 +131,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     assert "Standard accuracy, whole run" in page.inner_text("#tier")
     assert page.inner_text("#stopping") == ""
     assert page.evaluate("position.labels[1]") == "displacement / mm"
-    look_at(page, "4-saved")
+    look_at(page, "3-saved")
     shown, marks = page.evaluate(NUMBERS), page.evaluate("state.marks")
     press(page, "o")
     page.wait_for_url("**/v1/report")
@@ -176,8 +159,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     assert page.evaluate("state.marks") == marks
     assert page.evaluate("position.labels[1]") == "displacement / mm"
     page.locator("#time").fill("0.6")
-    page.wait_for_function("() => moment && Math.abs(moment.to - play_time) < 0.3")
-    look_at(page, "5-replay")
+    look_at(page, "4-replay")
     again.end()
 
 
@@ -205,7 +187,7 @@ def watch_on_two_phones(browser: Browser, address: str) -> None:
         for opened in ("#amplitude", "#phase", "#spectrum", "#freeze"):
             assert page.is_visible(opened)
         if number == 0:
-            look_at(page, "6-viewer")
+            look_at(page, "5-viewer")
         context.close()
 
 
@@ -251,35 +233,4 @@ def test_no_old_number_is_without_its_age(record: Callable[..., Any], context: B
     assert ages["worst"] > 3.0
     assert ages["unmarked"] == []
     assert "no samples for" in page.inner_text("#clock")
-    program.end()
-
-
-def test_a_forecast_counts_down_and_disappears(start: Callable[..., Any], context: BrowserContext) -> None:
-    """By the age of its analysis; reached, it is left out."""
-    import springmass
-
-    program = start("page", str(springmass.sample_data() / "damped_simulated_position.txt"))
-    page = context.new_page()
-    page.goto(program.address)
-    page.wait_for_function("() => motion && motion.stop")
-    words = [
-        page.evaluate(f"stopping({{ ...motion.stop, more_s: 20, u_clock_s: 0, wanted_u_s: 1e-5 }}, {age})")
-        for age in (0, 5, 21)
-    ]
-    assert "About 20 s more" in words[0]
-    assert "About 15 s more" in words[1]
-    assert "more for" not in words[2]
-    program.end()
-
-
-def test_a_stated_law_is_named(start: Callable[..., Any], context: BrowserContext) -> None:
-    """Beside the numbers that depend on it, and in the legend of the amplitudes."""
-    import springmass
-
-    program = start("page", str(springmass.sample_data() / "damped_simulated_position.txt"), "--law", "linear")
-    page = context.new_page()
-    page.goto(program.address)
-    page.wait_for_function("() => motion && motion.stated_law === 'linear'")
-    assert page.locator("#estimates", has_text="damping rate, law linear").count() == 1
-    assert page.evaluate("amplitude.series.map((s) => s.label).includes('linear (stated)')")
     program.end()
