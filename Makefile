@@ -39,14 +39,14 @@ demo: $(VENV)/.installed
 	$(BIN)/springmass demo -o demo-output
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -m "not trials" -n $(WORKERS) --dist worksteal
+	$(BIN)/python -m pytest -m "not trials" -n $(WORKERS) --dist loadfile
 
 golden: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.golden
 
 trials: $(VENV)/.installed-dev
 	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_ENDS=200 SPRINGMASS_UNPLUGS=20 SPRINGMASS_SECOND_STOPS=30 SPRINGMASS_REPLUGS=40 \
-	SPRINGMASS_EXAMPLES=nightly $(BIN)/python -m pytest -m trials -n $(WORKERS) --dist worksteal
+	SPRINGMASS_EXAMPLES=nightly $(BIN)/python -m pytest -m trials -n $(WORKERS) --dist loadfile
 
 nightly: $(VENV)/.installed-dev
 	bash .ci/nightly
