@@ -61,23 +61,26 @@ class Sent:
         return [value for end, value in self.ends if end <= size]
 
 
-def recording(seed: int) -> tuple[Disk, Sent]:
-    """Return a file with its syncs, and what was sent: reads of a few bytes that cut the frames anywhere."""
+def recording(seed: int, log: int) -> tuple[Disk, Sent]:
+    """Return a file with its syncs, and what was sent: reads of a few frames that are cut anywhere.
+
+    Another log of the same seed has other values in the same places, so that an old block joins without a seam.
+    """
     rng = np.random.default_rng(seed)
     disk, sent = Disk(), Sent()
-    writer = WireLogWriter("run.wire", HEADER, open_file=disk, log=seed)
-    values = rng.integers(301, 5000, 600).tolist()
+    writer = WireLogWriter("run.wire", HEADER, open_file=disk, log=log)
+    values = np.random.default_rng(log).integers(301, 5000, 1500).tolist()
     stream = b"".join(b"R%04d\r" % value for value in values)
     at = done = read = 0
     while at < len(stream):
         read += 1
-        size = int(rng.integers(1, 12))
+        size = int(rng.integers(1, 60))
         writer.append(Kind.DATA, stream[at : at + size], mono_ns=read * STEP_NS)
         at = min(at + size, len(stream))
         sent.by_time[read * STEP_NS] = values[done : at // 6]
         sent.ends += [(len(disk.data), value) for value in values[done : at // 6]]
         done = at // 6
-        if rng.random() < 0.01:
+        if rng.random() < 0.02:
             writer.sync()
     return disk, sent
 
@@ -120,8 +123,8 @@ def demand_true(log: Path, sent: Sent, safe: int) -> None:
 )
 def test_power_loss_gives_no_wrong_value(tmp_path: Path, seed: int, states: int) -> None:
     """Every synced reading is in the run file; every other one is there as it was sent, at its time, or missing."""
-    disk, sent = recording(seed)
-    old = bytes(recording(seed + 100)[0].data)
+    disk, sent = recording(seed, log=100)
+    old = bytes(recording(seed, log=200)[0].data)
     rng = np.random.default_rng(seed)
     log = tmp_path / "run.wire"
     for _ in range(states):
