@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-__all__ = ["Clock", "SystemClock", "VirtualClock"]
-
 
 class Clock(Protocol):
     """A monotonic clock with a method that waits until an absolute deadline."""
@@ -38,10 +36,7 @@ class SystemClock:
 
 
 class VirtualClock:
-    """A clock that never waits: a sleep only advances its time.
-
-    It allows replays at full speed, and tests of long runs that take almost no time.
-    """
+    """A clock that never waits: a sleep only advances its time."""
 
     def __init__(self, start_ns: int = 0) -> None:
         self._now_ns = start_ns

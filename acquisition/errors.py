@@ -23,18 +23,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from acquisition.recordings.questions import Question
 
-__all__ = [
-    "AcquisitionError",
-    "CalibrationError",
-    "FormatError",
-    "NeedsAnswer",
-    "PortError",
-    "SensorError",
-    "SourceError",
-    "UnknownFormat",
-    "visible",
-]
-
 
 def visible(text: str) -> str:
     """Return a text as one line, with every unprintable character replaced by its escape sequence.

@@ -8,8 +8,6 @@ from typing import Literal, Protocol, Self
 
 from acquisition.block import Block
 
-__all__ = ["ClockKind", "Kind", "Source", "SourceInfo"]
-
 Kind = Literal["live", "replay", "simulated"]
 ClockKind = Literal["nominal", "device", "host"]
 

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
     from acquisition.decoders.framed import FramedDecoder
     from acquisition.decoders.lines import LineSplitter
-    from acquisition.decoders.replies import ReplyForm
     from acquisition.decoders.sum_frames import SumFrames, with_sum
     from acquisition.errors import FormatError, NeedsAnswer, SensorError
     from acquisition.readings import Reading, Readings
@@ -72,7 +71,6 @@ __all__ = [
     "Reading",
     "Readings",
     "Recording",
-    "ReplyForm",
     "SensorError",
     "Sheet",
     "SourceInfo",
@@ -96,7 +94,6 @@ _WHERE = {
     "acquisition.decoders.family": ("Decoder", "Encoder", "Family", "Identity", "Poll"),
     "acquisition.decoders.framed": ("FramedDecoder",),
     "acquisition.decoders.lines": ("LineSplitter",),
-    "acquisition.decoders.replies": ("ReplyForm",),
     "acquisition.decoders.sum_frames": ("SumFrames", "with_sum"),
     "acquisition.errors": ("FormatError", "NeedsAnswer", "SensorError"),
     "acquisition.readings": ("Reading", "Readings"),

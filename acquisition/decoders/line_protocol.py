@@ -17,8 +17,6 @@ from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
 from acquisition.readings import NAN, Reading
 
-__all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "frame"]
-
 LONGEST = 96
 """Maximum length of a line without its line feed, bytes."""
 
@@ -72,8 +70,6 @@ def frame(body: bytes) -> bytes:
 class LineProtocolDecoder(FramedDecoder):
     """Decodes the line protocol.
 
-    Notes
-    -----
     The CRC detects every change of one or two bits, every burst error of up to 16 bits within the body, and all but one
     in 65536 of the other changes. Comment lines (``#``) are counted as ``comment``, and valid lines of a later version
     as ``unknown_record``. Reports that the device did not understand a command are counted as ``refused_command``.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["SumFrames", "with_sum"]
-
 
 def with_sum(body: bytes) -> bytes:
     """Return a frame that consists of the body and the low eight bits of its sum.

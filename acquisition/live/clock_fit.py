@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 
-__all__ = ["COUNTER_PPM", "ClockFit", "ClockSamples", "fit_clock"]
-
 COUNTER_PPM = 100_000.0
 """Maximum rate error of a counter, ppm: a program that waits 10 ms in a loop also needs the time of the ping."""
 
@@ -34,42 +32,27 @@ NANO = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class ClockFit:
-    """The comparison of the sensor's clock with the host's.
-
-    Parameters
-    ----------
-    rate_error_ppm : float
-        Relative rate by which the sensor's clock runs faster than the host's, ppm; NaN if the host times do not
-        determine it.
-    u_rate_error_ppm : float
-        Standard uncertainty of the rate error from the scatter of the host times, ppm; the error of the host's crystal
-        is not included.
-    jitter_s : float
-        Standard deviation of the host times about the fitted line, s.
-    readings : int
-        Number of readings given to the fit, including the excluded ones.
-    held : int
-        Number of readings that were delayed by a stall and excluded.
-    stalls : int
-        Number of stalls; the delayed readings of each stall came as a burst.
-    longest_stall_s : float
-        Maximum delay by a stall, s.
-    steps : int
-        Number of permanent jumps of one clock relative to the other, because the host slept, or the device paused or
-        restarted its counter. The readings before and after a jump are fitted with separate offsets.
-    span_s : float
-        Longest duration without a jump, s.
-    """
+    """The comparison of the sensor's clock with the host's."""
 
     rate_error_ppm: float
+    """Relative rate by which the sensor's clock runs faster than the host's; NaN if the host times do not give it."""
     u_rate_error_ppm: float
+    """Its standard uncertainty from the scatter of the host times, without the error of the host's crystal."""
     jitter_s: float
+    """Standard deviation of the host times about the fitted line."""
     readings: int
+    """Number of readings given to the fit, including the excluded ones."""
     held: int = 0
+    """Number of readings that were delayed by a stall and excluded."""
     stalls: int = 0
+    """Number of stalls; the delayed readings of each stall came as a burst."""
     longest_stall_s: float = 0.0
+    """Maximum delay by a stall."""
     steps: int = 0
+    """Number of permanent jumps of one clock relative to the other, because the host slept, or the device paused or
+    restarted its counter. The readings before and after a jump are fitted with separate offsets."""
     span_s: float = 0.0
+    """Longest duration without a jump."""
 
 
 class ClockSamples:
@@ -102,18 +85,10 @@ class ClockSamples:
 
 
 def fit_clock(t: F8, host_ns: I8) -> ClockFit:
-    """Fit a line to the host times as a function of the sensor times, and return the comparison of the clocks.
+    """Fit a line to the (n,) host times as a function of the sensor times in s, and return the comparison of clocks.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        Sensor times of the readings: the ping times, if the device sends a clock time. Reflection times are unsuitable,
-        because they vary with the position of the bob.
-    host_ns : (n,) int64, ns
-        Host times of the same readings.
+    The sensor times are those of the pings: times of reflection vary with the position of the bob.
 
-    Notes
-    -----
     A host time is never early, because transport and scheduling can only delay it. The run is divided into twelve
     stretches; the minimum delays of the stretches lie on a line whose slope gives the rate error. This determines the
     slope far better than least squares through all host times [1]_. The host times may scatter to both sides (a bridge
@@ -129,8 +104,6 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     If the minimum delay jumps permanently, the lines before and after the jump have the same slope but different
     offsets. The importers of LSL (lab streaming layer) treat restarted streams in the same way [2]_.
 
-    References
-    ----------
     .. [1] S. B. Moon, P. Skelly, D. Towsley, "Estimation and removal of clock skew from network delay measurements",
        IEEE INFOCOM 1999, doi:10.1109/INFCOM.1999.749287.
     .. [2] C. Kothe et al., "The lab streaming layer for synchronized multimodal recording", Imaging Neuroscience 3,

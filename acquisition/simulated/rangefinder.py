@@ -13,49 +13,30 @@ from acquisition.errors import SensorError
 from acquisition.readings import carried
 from acquisition.source import SourceInfo
 
-__all__ = ["Shot", "VirtualRangefinder", "VirtualSensor"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VirtualSensor:
-    """The properties and errors of a simulated rangefinder.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Readings per second by the sensor's own clock, Hz.
-    tick_s : float
-        Resolution of an echo time, s; 0.25 us corresponds to a distance of 43 um.
-    noise_m : float
-        Standard deviation of the noise of a distance, m.
-    false_echo_rate_hz : float
-        Clusters of false echoes per second, if the bob has one turning point nearest to the sensor per second; each
-        cluster follows such a turning point.
-    false_echo_m : float
-        Mean distance of the false echoes beyond the bob, m.
-    far_limit_m : float
-        Distance of a fixed object behind the bob, m; it limits all readings.
-    dead_time_s : float
-        Minimum time of flight, s; an earlier echo gives a reading without a target.
-    jitter_s : float
-        Standard deviation of the time at which a reading is taken, s; the time stated is the intended time.
-    crystal_ppm : float
-        Relative rate by which the sensor's clock runs faster than true time, ppm.
-    speed_of_sound_m_per_s : float
-        Speed of sound in the simulated air.
-    temperature_c : float
-        Temperature that the sensor sends, degC.
-    """
+    """The properties and errors of a simulated rangefinder."""
 
     rate_hz: float = 100.0
+    """Readings per second by the sensor's own clock."""
     tick_s: float = 0.25e-6
+    """Resolution of an echo time; 0.25 us corresponds to a distance of 43 um."""
     noise_m: float = 80e-6
+    """Standard deviation of the noise of a distance."""
     false_echo_rate_hz: float = 0.1
+    """Clusters of false echoes per second, if the bob has one turning point nearest to the sensor per second; each
+    cluster follows such a turning point."""
     false_echo_m: float = 5e-3
+    """Mean distance of the false echoes beyond the bob."""
     far_limit_m: float = math.inf
+    """Distance of a fixed object behind the bob; it limits all readings."""
     dead_time_s: float = 0.85e-3
+    """Minimum time of flight; an earlier echo gives a reading without a target."""
     jitter_s: float = 0.0
+    """Standard deviation of the time at which a reading is taken; the time stated is the intended time."""
     crystal_ppm: float = 0.0
+    """Relative rate by which the sensor's clock runs faster than true time."""
     speed_of_sound_m_per_s: float = 344.0
     temperature_c: float = 21.3
 
@@ -70,41 +51,22 @@ class VirtualSensor:
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One reading of the simulated sensor.
-
-    Parameters
-    ----------
-    true_s : float
-        Intended time of the reading since the start, without jitter, in true time, s.
-    sequence : int
-    device_us : int
-        Time by the sensor's clock, us, which wraps at 2^32.
-    echo_us : float
-        Time of flight, us, rounded to whole ticks; NaN for no target.
-    distance_m : float
-        Distance that a sensor would calculate from the echo time, m; NaN for no target.
-    temperature_c : float
-    """
+    """One reading of the simulated sensor; echo time and distance are NaN for no target."""
 
     true_s: float
+    """Intended time of the reading since the start, without jitter, in true time."""
     sequence: int
     device_us: int
+    """Time by the sensor's clock, which wraps at 2^32."""
     echo_us: float
+    """Time of flight, rounded to whole ticks."""
     distance_m: float
+    """Distance that a sensor would calculate from the echo time."""
     temperature_c: float
 
 
 class VirtualRangefinder:
-    """Takes readings of a moving bob.
-
-    Parameters
-    ----------
-    position : callable
-        Function that returns the distance of the bob from the sensor, m, at a time, s.
-    sensor : VirtualSensor
-    rng : numpy.random.Generator
-        Generator of all random numbers.
-    """
+    """Takes readings of a bob whose distance in m is a function of the time in s; ``rng`` gives all random numbers."""
 
     def __init__(self, position: Callable[[float], float], sensor: VirtualSensor, rng: np.random.Generator) -> None:
         self.sensor = sensor

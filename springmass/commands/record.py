@@ -150,7 +150,7 @@ def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: C
             "springmass: the disk is full or broken and ended the recording; the run holds everything before that"
         )
         return SENSOR
-    if any(run.gone for run in report.runs):
+    if ended.absent:
         return SENSOR
     if ended.by in (EndReason.SECONDS, EndReason.PAGE):
         return OK
@@ -348,7 +348,7 @@ def _sensors(options: RecordOptions, scene: Scene | None, bench: Release) -> Ite
         yield sensors, "live"
     finally:
         for sensor in sensors:
-            sensor.transport.close()
+            sensor.port.close()
 
 
 @contextlib.contextmanager
@@ -376,14 +376,8 @@ def _simulated(
     rng = np.random.default_rng(options.seed)
     # The simulated sensor must keep sending while the session listens, waits and closes.
     seconds = (options.seconds or UNLIMITED_S) + (options.still or 0.0) + 60.0
-    with VirtualPort(
-        family,
-        VirtualRangefinder(position, model, rng),
-        SystemClock(),
-        seconds=seconds,
-        rng=rng.spawn(1)[0],
-        options=family_options,
-    ) as virtual:
+    finder = VirtualRangefinder(position, model, rng)
+    with VirtualPort(family, finder, SystemClock(), seconds=seconds, options=family_options) as virtual:
         port = SerialPort(virtual.path, family.baud)
         virtual.start()
         bench.begin()

@@ -62,9 +62,8 @@ class LogFeed:
         if self.view.error or self.view.ended:
             return
         try:
-            self._take(self._decoder.blocks(self._log.records(), growing=True))
+            self._take(self._decoder.blocks(self._log.records()))
             if self._log.ended:
-                self._take(self._decoder.blocks((), growing=False))
                 self.view.provenance["decoding"] = self._decoder.chains[0].report()
         except (StorageError, OSError) as error:
             self.view.error = str(error)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from acquisition.block import Block
@@ -87,7 +87,7 @@ class SensorRun:
             self._chain.info(self._sensor.port, header.kind),
             scene=header.scene,
             title=header.title,
-            traps=(*_traps(damage), *_counter_traps(decoding), *losses.traps()),
+            traps=(*_traps(damage), *losses.traps()),
             malformed_rows=sum(count for name, count in faults.items() if not name.endswith("bytes")),
             format="wire",
             provenance={
@@ -108,15 +108,6 @@ class SensorRun:
             },
         )
         return RecoveredRun(self._sensor, self._writer.path, self._samples, faults, decoding, losses)
-
-
-def _counter_traps(decoding: Mapping[str, Any]) -> Iterator[Trap]:
-    if joins := decoding["joins"]:
-        yield Trap(
-            "counter_changed",
-            "The connection broke and the sensor's counter started again; the computer's clock times the gap.",
-            joins,
-        )
 
 
 def _traps(damage: Damage) -> tuple[Trap, ...]:

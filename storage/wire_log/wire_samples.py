@@ -74,15 +74,8 @@ class LogDecoder:
         self.last_ns = 0
         self._held: list[list[tuple[int, bytes]]] = [[] for _ in self.sensors]
 
-    def blocks(self, log: Iterable[Record], *, growing: bool = False) -> Iterator[tuple[int, Block]]:
-        """Yield the index of a sensor and its samples, as they are decoded.
-
-        Parameters
-        ----------
-        log : iterable of Record
-        growing : bool
-            Whether a later call will pass more records.
-        """
+    def blocks(self, log: Iterable[Record]) -> Iterator[tuple[int, Block]]:
+        """Yield the index of a sensor and its samples, as they are decoded; a later call may pass more records."""
         places = {sensor.channel: (number, held) for number, (sensor, held) in enumerate(self._places())}
         size = mono_ns = 0
         for record in log:
@@ -94,7 +87,7 @@ class LogDecoder:
             if kind is not Kind.DATA:
                 self._noted(record)
                 if place is not None and kind is Kind.EVENT and event_content(payload)["kind"] in BREAKS:
-                    self._break(place[0], returned=event_content(payload)["kind"] == "reopened")
+                    self._break(place[0])
             elif place is not None:
                 place[1].append((mono_ns, payload))
                 size += len(payload)
@@ -102,15 +95,14 @@ class LogDecoder:
                     size = 0
                     yield from self._samples()
         self.last_ns = mono_ns
-        yield from self._samples(final=not growing)
+        yield from self._samples()
 
     def _places(self) -> Iterator[tuple[SensorEntry, list[tuple[int, bytes]]]]:
         return zip(self.sensors, self._held, strict=True)
 
-    def _break(self, number: int, *, returned: bool = False) -> None:
+    def _break(self, number: int) -> None:
         self._hand_over(number)
-        chain = self.chains[number]
-        (chain.returned if returned else chain.lost)()
+        self.chains[number].lost()
 
     def _hand_over(self, number: int) -> None:
         held = self._held[number]
@@ -118,11 +110,11 @@ class LogDecoder:
         self.reads[number] += len(held)
         held.clear()
 
-    def _samples(self, *, final: bool = False) -> Iterator[tuple[int, Block]]:
+    def _samples(self) -> Iterator[tuple[int, Block]]:
         for number, chain in enumerate(self.chains):
             self._hand_over(number)
             if len(chain):
-                yield number, chain.block(final=final)
+                yield number, chain.block()
 
 
 def decode_log(

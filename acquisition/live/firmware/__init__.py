@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["BAUDS", "HEX", "MODEL", "VERSION", "WIRING", "avrdude_arguments"]
-
 MODEL = "springmass-rangefinder"
 VERSION = "2.0.0"
 HEX = Path(__file__).with_name("springmass_rangefinder.hex")
