@@ -60,7 +60,8 @@ def speaking(family: str, seconds: float = 30.0, rate_hz: float = 100.0) -> Virt
     finder = VirtualRangefinder(
         lambda t: 0.4 + 0.05 * np.cos(OMEGA * t), VirtualSensor(rate_hz=rate_hz), np.random.default_rng(5)
     )
-    return VirtualPort(get_family(family), finder, SystemClock(), seconds=seconds)
+    spoken = replace(get_family(family), encoder=ENCODERS[family])
+    return VirtualPort(spoken, finder, SystemClock(), seconds=seconds)
 
 
 @pytest.fixture(scope="module")

@@ -61,8 +61,8 @@ class Case:
 
     @property
     def member(self) -> Family:
-        """The family; the template's is in no registry."""
-        return EXAMPLE if self.family == "example" else get_family(self.family)
+        """The family."""
+        return get_family(self.family)
 
     def decoder(self) -> Decoder:
         """Return a fresh decoder."""
@@ -126,7 +126,6 @@ CASES = [
         lead=1,
         known={b"t=70 d=10\n": 0.254, b"t: 70, d: 10 in\n": 0.254},
     ),
-    Case("example", 0.001, "detected", known={b":0253,CA\n": 0.253}, no_target=(b":0000,C0\n",)),
 ]
 
 
@@ -171,7 +170,7 @@ def flushes(case: Case) -> bool:
 
 def test_every_family_of_the_registry_has_a_case() -> None:
     """A family without a case is not held to the rules."""
-    assert {family.name for family in families()} | {"example"} == {case.family for case in CASES}
+    assert {family.name for family in families()} == {case.family for case in CASES}
 
 
 @every_case
@@ -186,8 +185,8 @@ def test_what_was_encoded_is_decoded(case: Case) -> None:
 
 
 @every_case
-def test_device_time_and_counter_come_back(case: Case) -> None:
-    """Where the family has them; -1 where it has none."""
+def test_what_else_was_sent_comes_back(case: Case) -> None:
+    """Clock, counter and temperature where the wire carries them; -1 and NaN where it does not."""
     readings, _ = run(case, b"".join(case.frames()))
     own = case.member.has_device_time
     if own or "sequence" in case.options:
@@ -290,7 +289,6 @@ def test_back_in_step_within_two_frames_of_garbage(case: Case, at: int, seeds: i
         decoder.feed(1, garbage(seed))
         if flushes(case):
             decoder.flush()
-            # A flush begins the cycle of requests anew, as the poller does.
             clean, _ = run(case, b"".join(frames[:at]))
             after = decoder.feed(2, b"".join(case.frames()[: N - at]))
             sent, _ = run(case, b"".join(case.frames()[: N - at]))
@@ -381,7 +379,7 @@ def test_memory_is_bounded_on_a_stream_without_frame_ends(case: Case, filler: by
 def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:
     """A surplus byte shifts every reply; two impossible distances in a row give it away."""
     distances = 0.300 + 0.001 * np.arange(20)
-    encoder = get_family("us100").encoder()
+    encoder = ENCODERS["us100"]()
     data = b"".join(
         encoder.encode(sequence=0, device_us=0, echo_us=math.nan, distance_m=d, temperature_c=20.0) for d in distances
     )

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from acquisition.clock import VirtualClock
-from acquisition.live.line import Sink
+from acquisition.live.reader import Sink
 from storage.disk import DiskNearlyFull, check_disk
 from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
