@@ -9,6 +9,7 @@ import contextlib
 import json
 import os
 import pty
+import re
 import socket
 import subprocess
 import threading
@@ -161,14 +162,14 @@ def test_a_connection_that_says_nothing_any_more_is_a_sensor_gone(bench: Any, tm
 
 
 @pytest.fixture
-def terminals() -> Iterator[Callable[[], str]]:
-    """Return a function that makes a port."""
+def terminals() -> Iterator[Callable[[], tuple[str, int]]]:
+    """Return a function that makes a port, and a descriptor that writes to it."""
     open_: list[int] = []
 
-    def make() -> str:
+    def make() -> tuple[str, int]:
         master, slave = pty.openpty()
         open_.extend((master, slave))
-        return os.ttyname(slave)
+        return os.ttyname(slave), master
 
     yield make
     for descriptor in open_:
@@ -176,7 +177,7 @@ def terminals() -> Iterator[Callable[[], str]]:
 
 
 def test_an_adapter_is_known_by_its_serial_number(
-    monkeypatch: pytest.MonkeyPatch, terminals: Callable[[], str]
+    monkeypatch: pytest.MonkeyPatch, terminals: Callable[[], tuple[str, int]]
 ) -> None:
     """Another on its name is refused; itself is found under whatever name it came back."""
     plugged: list[SimpleNamespace] = []
