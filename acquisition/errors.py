@@ -1,18 +1,4 @@
-"""The exception hierarchy of acquisition.
-
-::
-
-    AcquisitionError
-    |-- FormatError          a recording cannot be read        springmass exits with 3
-    |   |-- UnknownFormat    no family recognises the content
-    |   `-- NeedsAnswer      the file lacks something that must not be guessed (rate, unit, channel)
-    |-- SourceError          a source failed during delivery
-    |-- SensorError          an unknown family of rangefinders, or an option that the family lacks
-    |-- PortError            a port that cannot be opened: absent, busy, no permission   springmass exits with 4
-    `-- CalibrationError     numbers that cannot be a calibration
-
-Every message is one line: ``where: what is wrong, got VALUE; what to do``.
-"""
+"""The exceptions of acquisition; every message is one line: ``where: what is wrong, got VALUE; what to do``."""
 
 from __future__ import annotations
 

@@ -145,8 +145,7 @@ class SensorChain:
 
     def report(self) -> dict[str, Any]:
         """Return faults, gaps, temperature and the clock comparison as plain data, for the provenance of the run."""
-        clock, status = fit_clock(*self._clock.columns()), self.status
-        known, left_out = np.isfinite(clock.rate_error_ppm), self.timebase.gaps_left_out
+        status, left_out = self.status, self.timebase.gaps_left_out
         return {
             "faults": dict(self.decoder.faults),
             **({"conditions": dict(status.conditions)} if status.conditions else {}),
@@ -158,15 +157,8 @@ class SensorChain:
             "clock": {
                 "kind": self.timebase.clock,
                 "moment": "reflection" if self._at_reflection else "reading",
-                "rate_error_ppm": clock.rate_error_ppm if known else None,
-                "u_rate_error_ppm": clock.u_rate_error_ppm if known else None,
-                "host_jitter_s": clock.jitter_s if known else None,
                 "limit_ppm": self.clock_ppm,
-                "stalls": clock.stalls,
-                "held_readings": clock.held,
-                "longest_stall_s": clock.longest_stall_s,
-                "steps": clock.steps,
-                "span_s": clock.span_s,
+                **fit_clock(*self._clock.columns()).to_mapping(),
             },
         }
 

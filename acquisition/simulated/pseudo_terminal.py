@@ -17,6 +17,9 @@ from acquisition.decoders.family import Family
 from acquisition.errors import SensorError
 from acquisition.simulated.rangefinder import VirtualRangefinder
 
+TEMPERATURE_C = 21.3
+"""Temperature that the sensor sends, at which sound has the usual 344 m/s."""
+
 
 class VirtualPort:
     """A simulated sensor that is available as a port, at ``path``, and sends for a number of seconds."""
@@ -69,7 +72,7 @@ class VirtualPort:
                 device_us=shot.device_us,
                 echo_us=shot.echo_us,
                 distance_m=shot.distance_m,
-                temperature_c=shot.temperature_c,
+                temperature_c=TEMPERATURE_C,
             )
             self._send(frame)
 

@@ -13,6 +13,9 @@ from acquisition.errors import SensorError
 from acquisition.readings import carried
 from acquisition.source import SourceInfo
 
+FALSE_ECHO_M = 5e-3
+"""Mean distance of the false echoes beyond the bob, m."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VirtualSensor:
@@ -27,24 +30,17 @@ class VirtualSensor:
     false_echo_rate_hz: float = 0.1
     """Clusters of false echoes per second, if the bob has one turning point nearest to the sensor per second; each
     cluster follows such a turning point."""
-    false_echo_m: float = 5e-3
-    """Mean distance of the false echoes beyond the bob."""
-    far_limit_m: float = math.inf
-    """Distance of a fixed object behind the bob; it limits all readings."""
     dead_time_s: float = 0.85e-3
     """Minimum time of flight; an earlier echo gives a reading without a target."""
-    jitter_s: float = 0.0
-    """Standard deviation of the time at which a reading is taken; the time stated is the intended time."""
     crystal_ppm: float = 0.0
     """Relative rate by which the sensor's clock runs faster than true time."""
     speed_of_sound_m_per_s: float = 344.0
-    temperature_c: float = 21.3
 
     def __post_init__(self) -> None:
         for name in ("rate_hz", "tick_s", "speed_of_sound_m_per_s"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise SensorError(f"a simulated sensor's {name} must be positive and finite, got {getattr(self, name)}")
-        for name in ("noise_m", "false_echo_rate_hz", "jitter_s"):
+        for name in ("noise_m", "false_echo_rate_hz"):
             if not getattr(self, name) >= 0:
                 raise SensorError(f"a simulated sensor's {name} must not be negative, got {getattr(self, name)}")
 
@@ -54,7 +50,7 @@ class Shot:
     """One reading of the simulated sensor; echo time and distance are NaN for no target."""
 
     true_s: float
-    """Intended time of the reading since the start, without jitter, in true time."""
+    """Time of the reading since the start, in true time."""
     sequence: int
     device_us: int
     """Time by the sensor's clock, which wraps at 2^32."""
@@ -62,7 +58,6 @@ class Shot:
     """Time of flight, rounded to whole ticks."""
     distance_m: float
     """Distance that a sensor would calculate from the echo time."""
-    temperature_c: float
 
 
 class VirtualRangefinder:
@@ -85,19 +80,17 @@ class VirtualRangefinder:
     def shot(self, sequence: int) -> Shot:
         """Take the reading with a given sequence number; the numbers of successive calls must not decrease."""
         sensor = self.sensor
-        intended_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
-        moment = intended_s + (self._rng.normal(0.0, sensor.jitter_s) if sensor.jitter_s else 0.0)
+        true_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
         # The sound is reflected by the bob half the time of flight later.
-        met_s = moment + self._position(moment) / sensor.speed_of_sound_m_per_s
-        distance_m = self._position(met_s) + self._false_echo(moment) + self._rng.normal(0.0, sensor.noise_m)
-        distance_m = min(distance_m, sensor.far_limit_m)
+        met_s = true_s + self._position(true_s) / sensor.speed_of_sound_m_per_s
+        distance_m = self._position(met_s) + self._false_echo(true_s) + self._rng.normal(0.0, sensor.noise_m)
         flight_s = 2.0 * distance_m / sensor.speed_of_sound_m_per_s
         device_us = round(sequence / sensor.rate_hz * 1e6) % (1 << 32)
         if flight_s < sensor.dead_time_s:
-            return Shot(intended_s, sequence, device_us, math.nan, math.nan, sensor.temperature_c)
+            return Shot(true_s, sequence, device_us, math.nan, math.nan)
         echo_us = round(flight_s / sensor.tick_s) * sensor.tick_s * 1e6
         distance = 0.5e-6 * echo_us * sensor.speed_of_sound_m_per_s
-        return Shot(intended_s, sequence, device_us, echo_us, distance, sensor.temperature_c)
+        return Shot(true_s, sequence, device_us, echo_us, distance)
 
     def block(self, seconds: float) -> Block:
         """Return the readings of the first ``seconds`` of true time, for :class:`acquisition.replay.Replay`."""
@@ -128,5 +121,5 @@ class VirtualRangefinder:
         # There is about one such turning point per second, so the rate is used as the probability at each.
         if now <= before and now < after and self._rng.random() < self.sensor.false_echo_rate_hz:
             self._cluster_remaining = int(self._rng.integers(3, 18))
-            self._cluster_m = self.sensor.false_echo_m * float(self._rng.uniform(0.5, 1.5))
+            self._cluster_m = FALSE_ECHO_M * float(self._rng.uniform(0.5, 1.5))
         return 0.0
