@@ -15,11 +15,6 @@ def visible(text: str) -> str:
 
     Titles, names and units come from files. A control sequence in them could clear the screen or fake a line, and
     a direction mark could reverse a name.
-
-    Examples
-    --------
-    >>> visible("Bob\\x1b[2J 3\\n")
-    'Bob\\\\x1b[2J 3\\\\n'
     """
     return text if text.isprintable() else "".join(c if c.isprintable() else _escaped(c) for c in text)
 

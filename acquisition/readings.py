@@ -46,12 +46,9 @@ class Reading(NamedTuple):
 
 
 class Readings(tuple[Reading, ...]):
-    """Consecutive readings of one rangefinder: a tuple of rows, with the columns of the samples as arrays.
+    """Consecutive readings of one rangefinder: a tuple of rows, with the columns of the samples as arrays on demand.
 
-    Notes
-    -----
-    During a recording, a read of the port usually completes one frame. Arrays for one row would take longer than
-    decoding it, so the arrays are created only on demand.
+    During a recording, a read usually completes one frame. Arrays for one row would take longer than decoding it.
     """
 
     __slots__ = ()

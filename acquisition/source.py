@@ -44,11 +44,7 @@ class SourceInfo:
 
 
 class Source(Protocol):
-    """An iterable of blocks, used inside a ``with`` statement.
-
-    The iteration ends when the source ends. A fault raises :class:`acquisition.errors.SourceError`; ``None`` is never
-    delivered.
-    """
+    """An iterable of blocks, used inside a ``with`` statement; the iteration ends when the source ends."""
 
     @property
     def info(self) -> SourceInfo:

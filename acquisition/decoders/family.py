@@ -48,12 +48,6 @@ class DeviceStatus:
     conditions: dict[str, int] = field(default_factory=dict)
     complaint: str = ""
 
-    @staticmethod
-    def of(decoder: Decoder) -> DeviceStatus:
-        """Return the status of the device of a decoder; it is empty if the device sends none."""
-        status = getattr(decoder, "status", None)
-        return status if isinstance(status, DeviceStatus) else DeviceStatus()
-
 
 class Decoder(Protocol):
     """Turns bytes into readings; it never raises on any bytes and resynchronises within two frames after garbage."""

@@ -39,13 +39,7 @@ _ENOUGH = 0.5
 
 
 def families() -> tuple[Family, ...]:
-    """Return all families, with those of this package first.
-
-    Examples
-    --------
-    >>> families()[0].name
-    'line-protocol'
-    """
+    """Return all families, with those of this package first."""
     added = [_load(entry) for name, entry in entry_points_of(GROUP).items() if name not in _TABLE]
     return (*map(_built_in, _TABLE), *added)
 
@@ -66,11 +60,6 @@ def probe(data: bytes) -> list[str]:
 
     A family recognises bytes if at least half of them are in valid frames. A family without marker or checksum is
     returned only if no other family is recognised, and the bytes give at least two replies, all in range.
-
-    Examples
-    --------
-    >>> probe(bytes.fromhex("ff07a1a7 ff07a2a8"))
-    ['ffhls']
     """
     all_families = families()
     shares = {family.name: _share(family, data) for family in all_families if family.self_framing}
@@ -81,13 +70,7 @@ def probe(data: bytes) -> list[str]:
 
 
 def describe_bytes(data: bytes) -> str:
-    """Return a one-line description of bytes from a port, for the user.
-
-    Examples
-    --------
-    >>> describe_bytes(b"Ready.\\r\\nwaiting\\r\\n")
-    "looks like text lines without a distance ('Ready.')"
-    """
+    """Return a one-line description of bytes from a port, for the user."""
     if not data:
         return "silence"
     if names := probe(data):

@@ -95,8 +95,7 @@ def from_still(distance: F8) -> StillPoint:
     total = MAD_TO_SIGMA * float(np.median(np.abs(known - rest_m)))
     # First differences contain the noise, but almost no slow motion.
     steps = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(known)))) / math.sqrt(2.0)
-    floor = max(steps, 1e-6)
-    if total > 5.0 * floor and total > 5e-4:
+    if total > max(5.0 * steps, 5e-4):
         raise CalibrationError(
             f"the bob moves: its positions scatter by {total * 1e3:.2g} mm, but the noise is {steps * 1e3:.2g} mm; "
             "wait until it hangs still"

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -133,13 +133,12 @@ class SensorChain:
 
     @property
     def status(self) -> DeviceStatus:
-        """The information that the device sent besides its readings."""
-        return DeviceStatus.of(self.decoder)
+        """The information that the device sent besides its readings; it is empty if its decoder has none."""
+        status = getattr(self.decoder, "status", None)
+        return status if isinstance(status, DeviceStatus) else DeviceStatus()
 
     def info(self, name: str, kind: Kind = "live") -> SourceInfo:
         """Return the description of the source; its kind of clock is determined by the first reading."""
-        if kind not in get_args(Kind):
-            raise ValueError(f"kind must be live, simulated or replay, got {kind!r}")
         rate_hz, clock = self.timebase.rate_hz, self.timebase.clock
         return SourceInfo(kind, name, rate_hz, quantum_m=self.family.resolution_m, clock=clock)
 

@@ -57,13 +57,15 @@ class PortReader:
         self._sink = sink
         self._clock = clock
         self._stop = threading.Event()
-        self._threads = [threading.Thread(target=self._guarded, args=(line,), daemon=True) for line in lines]
+        self._threads: list[threading.Thread] = []
         self.failure: BaseException | None = None
 
     def start(self) -> None:
         """Start the reading threads."""
-        for thread in self._threads:
+        for line in self._lines:
+            thread = threading.Thread(target=self._guarded, args=(line,), name="springmass-io", daemon=True)
             thread.start()
+            self._threads.append(thread)
 
     def stop(self) -> None:
         """Stop reading, close the ports and raise the last error of a thread, if any; further calls do nothing."""

@@ -31,20 +31,11 @@ OTHER_TRIES = 10
 in, its ports may get each other's names for a moment."""
 
 
-@dataclass(frozen=True, slots=True)
-class PortFacts:
-    """One port of this computer: its address, and its name in the operating system."""
-
-    device: str
-    description: str
-
-
-def list_ports() -> tuple[PortFacts, ...]:
-    """Return the serial ports of this computer, sorted by address."""
+def list_ports() -> list[Any]:
+    """Return the serial ports of this computer as pyserial describes them, sorted by ``device``, their address."""
     from serial.tools.list_ports import comports
 
-    ports = (PortFacts(p.device, p.description or "") for p in comports())
-    return tuple(sorted(ports, key=lambda port: port.device))
+    return sorted(comports(), key=lambda port: port.device)
 
 
 class SerialPort:
@@ -155,11 +146,8 @@ class SerialPort:
         self._port, self._descriptor = None, -1
         if port is not None:
             _claim(descriptor, release=True)
-            try:
+            with contextlib.suppress(OSError):  # a disconnected device has nothing to release
                 port.close()
-            except OSError:
-                # The device is already disconnected, so there is nothing to release.
-                return
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,11 +165,9 @@ class _Device:
 
 def _devices() -> dict[str, _Device]:
     """Return the USB devices among the ports, by port name with symbolic links resolved."""
-    from serial.tools.list_ports import comports
-
     return {
         os.path.realpath(port.device): _Device(port.vid, port.pid or 0, port.serial_number or "")
-        for port in comports()
+        for port in list_ports()
         if port.vid is not None
     }
 

@@ -69,10 +69,9 @@ class Timebase:
         self._anchor_s = 0.0
         self._ticks = 0
         self._latest_s = 0.0
+        # The first reading determines the origin of the times, and whether they are a counter divided by the rate.
         self.clock: ClockKind = "host"
-        """Origin of the times; it is determined by the first reading."""
         self.counts = False
-        """Whether times are a counter divided by the nominal rate; this is determined by the first reading."""
 
     def push(self, reading: Reading) -> tuple[float, int]:
         """Return the sensor time of a reading, s, and its flag: 0, a gap before it, a repeated time or a step back."""

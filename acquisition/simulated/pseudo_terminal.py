@@ -5,6 +5,7 @@ It works on POSIX only. A pseudo-terminal ignores the baud rate, so the clock de
 
 from __future__ import annotations
 
+import itertools
 import os
 import pty
 import threading
@@ -63,7 +64,7 @@ class VirtualPort:
 
     def _run(self) -> None:
         start_ns = self._clock.now_ns()
-        for shot in self._rangefinder.shots():
+        for shot in map(self._rangefinder.shot, itertools.count()):
             if shot.true_s >= self._seconds or self._stop.is_set():
                 return
             self._clock.sleep_until_ns(start_ns + round(shot.true_s * 1e9))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,13 +69,6 @@ class VirtualRangefinder:
         self._rng = rng
         self._cluster_remaining = 0
         self._cluster_m = 0.0
-
-    def shots(self) -> Iterator[Shot]:
-        """Yield consecutive readings, without end."""
-        sequence = 0
-        while True:
-            yield self.shot(sequence)
-            sequence += 1
 
     def shot(self, sequence: int) -> Shot:
         """Take the reading with a given sequence number; the numbers of successive calls must not decrease."""
