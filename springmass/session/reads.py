@@ -62,6 +62,7 @@ class Tee:
         self._kept: deque[Read] | None = None
         self._heard = [bytearray() for _ in chains]
         self._channels = list(range(len(chains)))  # current channel of each port
+        self._begun: set[int] = set()  # ports that sent something in the current run
         self._returns: dict[int, Return] = {}
         self._last: list[Reading | None] = [None for _ in chains]  # of each port
         self.gone: dict[int, str] = {}
@@ -82,6 +83,7 @@ class Tee:
         if self._kept is not None:
             self._kept += reads
         channel = self._channels[port]
+        self._begun.add(port)
         reads = [(channel, host_ns, data) for _, host_ns, data in reads]
         if self._recorder is not None:
             self._recorder.reads(reads)
@@ -115,8 +117,9 @@ class Tee:
                     # The coming run must not contain earlier reads, for they may be from another sensor.
                     self._kept = deque(read for read in self._kept if read[0] != port)
                 if self._parts:
-                    sensor = self._sensors[port]
-                    self._returns[port] = Return(host_ns, facts, sensor.family.decoder(**sensor.options))
+                    if port in self._begun:  # else what it sends is the first part
+                        sensor = self._sensors[port]
+                        self._returns[port] = Return(host_ns, facts, sensor.family.decoder(**sensor.options))
                     return
             self._interrupt(port, host_ns, kind, facts)
 
@@ -222,7 +225,7 @@ class Tee:
             kept = [read for read in self._kept or () if read[1] >= since_ns]
             self._kept = None
             self._recorder, self._chains, self._parts = recorder, chains, not preview
-            self._channels = list(range(len(chains)))
+            self._channels, self._begun = list(range(len(chains))), {port for port, _, _ in kept}
             recorder.reads(kept)
             for read in kept:
                 self._decode(read[0], read)

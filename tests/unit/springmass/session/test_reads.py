@@ -238,3 +238,13 @@ def test_what_a_returned_port_sent_before_the_end_is_recorded() -> None:
         assert bench.log.taken[1:] == [(1, 101 * STEP_NS, b"half a li")]
         assert bench.kinds == ["0 lost", "0 replaced", "1 continues", *(["1 lost"] if lost else [])]
         assert bench.tee.absent(103 * STEP_NS) == ([0] if lost else [])
+
+
+def test_a_sensor_that_was_away_when_the_run_began_has_one_part() -> None:
+    """Nothing of it is in the run before, so what it sends is the first part."""
+    bench = Bench("/dev/ttyUSB0")
+    bench.away(0, 100)
+    bench.send(101, frame(7))
+    assert bench.kinds == ["0 lost"]
+    assert bench.log.taken == [(0, 101 * STEP_NS, frame(7))]
+    assert bench.tee.gone == {}
