@@ -14,10 +14,11 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from acquisition.decoders.example import FAMILY as EXAMPLE
 from acquisition.decoders.family import Decoder, Family
 from acquisition.decoders.registry import families, get_family
+from acquisition.errors import SensorError
 from acquisition.readings import Reading
+from tests.encoders import ENCODERS
 from tests.sampling import sampled
 
 N = 24
@@ -70,7 +71,7 @@ class Case:
 
     def frames(self, distance: np.ndarray[Any, np.dtype[np.float64]] = DISTANCE) -> list[bytes]:
         """Return the bytes of each reading."""
-        encoder = self.member.encoder(**self.options)
+        encoder = ENCODERS[self.family](**self.options)
         return [
             encoder.encode(
                 sequence=int(SEQUENCE[i]),
@@ -185,8 +186,8 @@ def test_what_was_encoded_is_decoded(case: Case) -> None:
 
 
 @every_case
-def test_what_else_was_sent_comes_back(case: Case) -> None:
-    """Clock, counter and temperature where the wire carries them; -1 and NaN where it does not."""
+def test_device_time_and_counter_come_back(case: Case) -> None:
+    """Where the family has them; -1 where it has none."""
     readings, _ = run(case, b"".join(case.frames()))
     own = case.member.has_device_time
     if own or "sequence" in case.options:
@@ -374,6 +375,27 @@ def test_memory_is_bounded_on_a_stream_without_frame_ends(case: Case, filler: by
     for size in [1] * 600 + [4096] * 16:
         decoder.feed(0, (filler * size)[:size])
         assert decoder.pending <= MOST_PENDING
+
+
+TEMPERATURES = {
+    "us100": hexed("07a1 07a2 42 07a3"),
+    "urm37": hexed("22007b9d 22007c9e 1100d5e6 22007d9f"),
+    "sen0149": hexed("55aa110202 07a1 bc 55aa110202 07a2 bd 55aa110203 00d5 ea 55aa110202 07a3 be"),
+}
+"""Replies of 0.2.0's recordings with a temperature after every two distances."""
+
+
+@pytest.mark.parametrize("name", TEMPERATURES)
+def test_polled_temperatures_of_old_logs_are_no_distances(name: str) -> None:
+    """A decoder with the option of 0.2.0 gives the three distances in order, and a recording cannot ask for it."""
+    family = get_family(name)
+    decoder = family.decoder(temperature_every=2)
+    distances = decoder.feed(0, TEMPERATURES[name]).distance_m
+    expected = [1.23, 1.24, 1.25] if name == "urm37" else [1.953, 1.954, 1.955]
+    np.testing.assert_allclose(distances, expected, atol=1e-9)
+    assert not any(decoder.faults.values())
+    with pytest.raises(SensorError, match="temperature_every"):
+        family.demand_options({"temperature_every": 2})
 
 
 def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:

@@ -22,7 +22,7 @@ from acquisition.simulated.pseudo_terminal import VirtualPort
 from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from springmass.cli import main
 from storage.run_file.reading import open_run
-from tests.sampling import sampled
+from tests.faults.test_ports import on_a_terminal, us100
 
 # pyserial 3.5 starts its reading thread in the old way.
 pytestmark = pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\) is deprecated:DeprecationWarning")
@@ -127,14 +127,10 @@ def bridged(path: str) -> Iterator[Bridge]:
         bridge.close()
 
 
-@pytest.mark.parametrize(("family", "rate_hz"), sampled([("line-protocol", 100.0), ("us100", 20.0)], 1))
-def test_a_sensor_behind_rfc2217_is_recorded_like_one_on_a_cable(family: str, rate_hz: float, tmp_path: Path) -> None:
-    """A sender's and a polled sensor's readings come through the telnet wrapping, at the baud rate asked for."""
-    out = tmp_path / "run.h5"
-    with bridged(family, rate_hz) as bridge:
-        options = ["--port", bridge.address, "--sensor", family, "--rate-hz", f"{rate_hz:g}", "--seconds", "2"]
-        assert main(["record", *options, "-o", str(out)]) == 0
-        assert bridge.baud == get_family(family).baud
+def recorded(bridge: Bridge, family: str, out: Path) -> Block:
+    """Record two seconds through the server, at the baud rate of the family."""
+    assert main(["record", "--port", bridge.address, "--sensor", family, "--seconds", "2", "-o", str(out)]) == 0
+    assert bridge.baud == get_family(family).baud
     with open_run(out) as run:
         return run.samples()
 
@@ -150,6 +146,7 @@ def test_a_sensor_behind_rfc2217_is_recorded_like_one_on_a_cable(tmp_path: Path)
     np.testing.assert_allclose(np.diff(samples.t), 0.01, atol=1e-4)
 
 
+@pytest.mark.trials
 def test_a_polled_sensor_behind_rfc2217_is_asked(tmp_path: Path) -> None:
     """Requests go out and replies come back; how many do so in time depends on how busy the machine is."""
     with on_a_terminal(us100, polled=True) as port, bridged(port) as bridge:

@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.readings import Reading
+from tests.encoders import ENCODERS
 from tests.hunt import hunt
 
 FAMILIES = {family.name: family for family in families()}
