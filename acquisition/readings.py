@@ -76,7 +76,6 @@ class Readings(tuple[Reading, ...]):
 
 
 NO_READINGS = Readings()
-"""The result of a decoder if the bytes complete no frame."""
 
 
 def carried(values: F8, known: B1, before: float) -> F8:

@@ -17,8 +17,7 @@ from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
 from acquisition.readings import NAN, Reading
 
-LONGEST = 96
-"""Maximum length of a line without its line feed, bytes."""
+LONGEST = 96  # maximum length of a line without its line feed, bytes
 
 SETTINGS = ("rate_hz", "near_us", "far_us", "spread_us", "thermometer")
 """Settings in an identity line, after model, version and name: rate, gate limits, ping spread, thermometer."""

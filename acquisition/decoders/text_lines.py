@@ -17,8 +17,7 @@ from acquisition.decoders.lines import LineSplitter
 from acquisition.errors import SensorError
 from acquisition.readings import NAN, Reading
 
-LONGEST = 256
-"""Maximum length of a line, bytes."""
+LONGEST = 256  # maximum length of a line, bytes
 
 LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}

@@ -93,8 +93,7 @@ class VirtualRangefinder:
         distance = np.array([shot.distance_m for shot in shots], np.float64)
         flags = np.isnan(distance) * np.uint8(Flag.MISSING)
         host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)
-        # The time of a sample is that of the reflection, by the sensor's clock. Without an echo, the last travel time
-        # is used.
+        # The time of a sample is that of the reflection; without an echo, the last travel time is used.
         ways_s = np.array([0.5e-6 * shot.echo_us for shot in shots], np.float64)
         t = np.arange(len(shots)) / self.sensor.rate_hz + carried(ways_s, np.isfinite(ways_s), 0.0)
         return Block(0, t, distance, flags, host_ns)

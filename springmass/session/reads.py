@@ -156,10 +156,9 @@ class Tee:
         return False
 
     def _settle(self, port: int) -> None:
-        """Record what a port sent that came back and went, or the recording ended, before its channel was known."""
+        """Record in the channel before what a port sent that came back and went, or the recording ended, undecided."""
         back = self._returns.pop(port, None)
         if back is not None and back.reads:
-            self._begin_part(port, back)
             self._take(port, back.reads)
 
     def _begin_part(self, port: int, back: Return) -> None:
