@@ -1,5 +1,1 @@
-"""Read ports and turn their bytes into samples.
-
-``timebase`` and ``decoding`` also reconstruct every recorded run from its log, so future versions must give
-bit-identical results.
-"""
+"""Read ports and turn their bytes into samples; runs are rebuilt from logs by this code, so it must stay bit-exact."""
