@@ -39,6 +39,8 @@ TOLERANCE, EXACT = 0.02, 1e-9
 GROW = float(os.environ.get("VALUES", TOLERANCE)) / TOLERANCE
 GROW_U = float(os.environ.get("US", TOLERANCE)) / TOLERANCE
 KEPT = ("quality", "estimates", "spring", "joint_damping", "comparison", "classic", "equation", "method", "amplitude_m")
+STANDARDISED = ("pull", "chi2", "excess_chi2")
+"""Numbers in units of a standard uncertainty, or squares of such: ten thousandths of it are rounding."""
 COURSE_LEFT_OUT = ("path", "error", "messages", "correlations", "drag_points")
 
 Table = dict[str, list[Any]]
@@ -199,6 +201,8 @@ def differences(key: str, before: Table, now: Table) -> tuple[list[str], list[st
             a, b, tolerance = 0.0 if a == "absent" else a, 0.0 if b == "absent" else b, 0.02
         elif tolerance is not None:
             tolerance *= GROW_U if path.endswith(" u") else GROW
+            if path.rpartition(".")[2] in STANDARDISED:
+                tolerance = max(tolerance, 1e-4)
         numbers = all(isinstance(each, (int, float)) and not isinstance(each, bool) for each in (a, b))
         if a == b:
             continue
