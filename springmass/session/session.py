@@ -69,21 +69,6 @@ class Ended:
     absent: list[int]
 
 
-@dataclass(frozen=True, slots=True)
-class GivenUp:
-    """The state of a recording that the user ended without waiting for the disk.
-
-    Parameters
-    ----------
-    counted : bool
-        Whether the log contains the counts.
-    status : RecorderStatus
-    """
-
-    counted: bool
-    status: RecorderStatus
-
-
 class Session:
     """Records one run.
 
@@ -103,8 +88,8 @@ class Session:
     ----------
     failures : Failures
         Failures during the recording that did not end it.
-    given_up : GivenUp or None
-        State of the recording if the user did not wait for the disk.
+    given_up : (int, int) or None
+        Number of reads that the disk has not taken, and their bytes, if the user did not wait for it.
     shown : LiveState or None
         State derived from the samples shown so far.
     """
@@ -132,7 +117,7 @@ class Session:
         self.stops = stops or Stops()
         self._marks: list[tuple[int, str]] = []
         self.shown: LiveState | None = None
-        self.given_up: GivenUp | None = None
+        self.given_up: tuple[int, int] | None = None
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Start reading, and wait until every sensor has been heard.
@@ -248,7 +233,7 @@ class Session:
             If ``listeners.changed`` returned true during the wait for the trigger.
         storage.errors.WriteFailed
             If the log cannot be created.
-        storage.wire_log.window.NotALog
+        storage.errors.NotALog
             If the log cannot be read at the end.
         KeyboardInterrupt
             If the user did not wait until all queued data were written; the log is kept, without its end.
@@ -285,7 +270,7 @@ class Session:
             with contextlib.suppress(WriteFailed):  # the status states the error
                 recorder.close()
         except KeyboardInterrupt:
-            self.given_up = GivenUp(recorder.give_up(), recorder.status)
+            self.given_up = recorder.unwritten()
             raise
         status = recorder.status
         return Ended(EndReason.DISK if status.error else by, status, recorder.contents(), self._tee.absent(end_ns))

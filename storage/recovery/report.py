@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,33 +11,19 @@ from storage.recovery.losses import Losses
 from storage.wire_log.records import SensorEntry
 from storage.wire_log.scanning import Damage
 
-__all__ = ["RecoverReport", "RecoveredRun"]
-
 
 @dataclass(frozen=True, slots=True)
 class RecoveredRun:
-    """One sensor's run file.
+    """The run file of one part of a sensor's data, verified against the log.
 
-    Parameters
-    ----------
-    sensor : SensorEntry
-    path : Path
-        The file, verified against the log.
-    samples : int
-    faults : mapping of str to int
-        Number of faults of each kind, as counted by the decoder.
-    decoding : mapping
-        The chain's report: gaps, restarts, the clock's rate error.
-    losses : Losses
-        The losses of the run.
-    existed : bool
-        Whether the file already existed and contained the whole log.
+    ``decoding`` is the chain's report: faults, gaps, restarts, the clock's rate error. ``existed`` states whether the
+    file already existed and contained the whole log.
     """
 
     sensor: SensorEntry
+    part: int
     path: Path
     samples: int
-    faults: Mapping[str, int]
     decoding: Mapping[str, Any]
     losses: Losses
     existed: bool = False
@@ -49,7 +35,8 @@ class RecoveredRun:
 
     def describe(self, log: Path) -> Iterator[str]:
         """Yield lines for the user."""
-        faults = "".join(f", {count} {name.replace('_', ' ')}" for name, count in self.faults.items() if count)
+        counts = self.decoding["faults"].items()
+        faults = "".join(f", {count} {name.replace('_', ' ')}" for name, count in counts if count)
         existed = "; it existed already and holds the whole log" if self.existed else ""
         yield f"{self.path}: {self.samples} samples from {log}{faults}{existed}"
         gaps, left_out = self.decoding.get("gaps", []), self.decoding.get("gaps_left_out", {})
@@ -73,22 +60,8 @@ class RecoveredRun:
 class RecoverReport:
     """The result of the recovery of one log.
 
-    Parameters
-    ----------
-    log : Path
-    runs : tuple of RecoveredRun
-        One for each sensor.
-    damage : Damage
-        Damage of the log.
-    marks, events : int
-        Numbers of marks and events in the log.
-    log_removed : bool
-    parts : int
-        Number of files of the log.
-    parts_of : mapping of int to int
-        For each channel of a sensor that replaced another, the channel of the replaced sensor.
-    leftovers : tuple of Path
-        Temporary files of killed builds, which were removed from the folder.
+    ``runs`` has the parts of every sensor in order. ``short_parts`` has the duration of the parts that are too short
+    for a run file of their own, s.
     """
 
     log: Path
@@ -97,28 +70,26 @@ class RecoverReport:
     marks: int
     events: int
     log_removed: bool
-    parts: int = 1
-    leftovers: tuple[Path, ...] = ()
-    parts_of: Mapping[int, int] = field(default_factory=dict)
+    short_parts: tuple[float, ...] = ()
 
     @property
     def main(self) -> RecoveredRun:
-        """The run to analyse: that of the first sensor, or the longest part if other sensors replaced it."""
-        root = self.runs[0].sensor.channel
-        return max((run for run in self.runs if self._root(run.sensor.channel) == root), key=lambda run: run.samples)
+        """The run to analyse: the longest part of the first sensor."""
+        return max(self.parts_of(self.runs[0].sensor.channel), key=lambda run: run.samples)
 
-    def _root(self, channel: int) -> int:
-        while channel in self.parts_of:
-            channel = self.parts_of[channel]
-        return channel
+    def parts_of(self, channel: int) -> list[RecoveredRun]:
+        """Return the runs of one sensor."""
+        return [run for run in self.runs if run.sensor.channel == channel]
 
     def describe(self) -> Iterator[str]:
-        """Yield lines for the user: about removed temporary files, about each run file, and one about the log."""
-        for path in self.leftovers:
-            yield f"{path}: removed, left by a killed build"
+        """Yield lines for the user: about each run file and the parts of each sensor, and one about the log."""
         for run in self.runs:
             yield from run.describe(self.log)
-        if self.parts_of:
-            yield f"{self.log}: another sensor came back on the port; the longest part is in {self.main.path}"
-        files = f" in {self.parts} files" if self.parts > 1 else ""
-        yield f"{self.log}: {self.damage.describe()}{files}"
+        for channel in dict.fromkeys(run.sensor.channel for run in self.runs):
+            if len(parts := self.parts_of(channel)) > 1:
+                longest = max(parts, key=lambda run: run.samples)
+                yield f"{self.log}: the sensor came back, so it has {len(parts)} parts; the longest is {longest.path}"
+        if count := len(self.short_parts):
+            are = "1 short part" if count == 1 else f"{count} short parts"
+            yield f"{self.log}: {are} of {sum(self.short_parts):.1f} s in total, after the sensor came back, have no file"
+        yield f"{self.log}: {self.damage.describe()}"
