@@ -1,22 +1,4 @@
-"""The error tree of storage.
-
-::
-
-    StorageError
-    |-- NotARun        no file, not HDF5, or HDF5 of another layout           springmass exits with 3
-    |-- RunDamaged     a run file that is damaged or was edited               springmass exits with 3
-    |-- RunOpen        a run file that another program has open for writing   springmass exits with 3
-    |-- RunClosed      a run that is used outside its ``with``
-    |-- QueryRefused   an invalid search of a catalog
-    |-- NotALog        no file, or no wire log                                springmass exits with 3
-    |-- LogGrowing     a log that a recording still writes                    springmass exits with 3
-    |-- OutOfMemory    too little memory; the file may be sound               springmass exits with 3
-    `-- WriteFailed    a file could not be written; an earlier file of that name is unchanged
-        |-- RunExists  a file of that name exists and may not be replaced
-        `-- DiskNearlyFull   too little disk space for the run, found before it starts
-
-Every message is one line: ``where: what is wrong, got VALUE; what to do``.
-"""
+"""The errors of storage. Every message is one line: ``where: what is wrong, got VALUE; what to do``."""
 
 from __future__ import annotations
 

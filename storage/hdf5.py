@@ -19,8 +19,11 @@ if TYPE_CHECKING:
 _ERRORS = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """Errors that h5py raises on a wrong checksum, a missing object, a full disk or a value that HDF5 cannot store."""
 _NO_MEMORY = re.compile("memory alloc|alloc[a-z]* memory|out of memory|cannot allocate", re.IGNORECASE)
-_LOCKED = "unable to lock file"
-_MARKED = "file is already open for write"
+_OPEN = {
+    "unable to lock file": "on a disk without locks: set HDF5_USE_FILE_LOCKING=FALSE",
+    "file is already open for write": "if it has crashed: h5clear -s FILE",
+}
+"""Errors of HDF5 if another program has a file open for writing, and what else can cause each of them."""
 _LIBVER = ("v110", "v110")
 """The file format of HDF5 1.10 (2016), the oldest with checksums in all of the file's metadata."""
 
@@ -71,12 +74,9 @@ def reading_h5(path: Path, what: str) -> Iterator[None]:
         raise
     except _ERRORS as error:
         _raise_if_out_of_memory(path, error)
-        if _LOCKED in str(error):
-            remedy = "close it there (on a disk without locks: set HDF5_USE_FILE_LOCKING=FALSE)"
-            raise RunOpen(path, "is open in another program", remedy) from error
-        if _MARKED in str(error):
-            remedy = f"close it there (if that program has crashed: h5clear -s {path})"
-            raise RunOpen(path, "is open in another program", remedy) from error
+        for sign, otherwise in _OPEN.items():
+            if sign in str(error):
+                raise RunOpen(path, "is open in another program", f"close it there ({otherwise})") from error
         raise damaged(path, what, one_line(error)) from error
 
 

@@ -217,7 +217,10 @@ class Recorder:
             try:
                 self._log.extend(items)
             except Exception as error:  # a defect must also stop the recording and not go unnoticed
-                self._stop(self._one_line(error), items[self._log.extended :])
+                if not isinstance(error, WriteFailed):
+                    problem = f"a record could not be appended ({one_line(error)})"
+                    error = WriteFailed(self.path, problem, "report this defect")
+                self._stop(error, items[self._log.extended :])
                 return
 
     def _take_queued(self) -> list[Item]:
@@ -236,11 +239,6 @@ class Recorder:
                 if items or self._closing:
                     return items
             self._wakeup.get()
-
-    def _one_line(self, error: Exception) -> WriteFailed:
-        if isinstance(error, WriteFailed):
-            return error
-        return WriteFailed(self.path, f"a record could not be appended ({one_line(error)})", "report this defect")
 
     def _stop(self, error: WriteFailed, pending: list[Item]) -> None:
         """Stop recording; records that were already appended can still be synced."""

@@ -330,7 +330,7 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
         parts = report.parts_of(int(wanted[0]))
         longest = max(parts, key=lambda run: run.samples)
         if len(parts) > 1:
-            tell(f"{path}: the sensor came back; this is part {longest.part} of {len(parts)}, the longest")
+            tell(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
         loaded = _load_run(longest.path)
         originals = loaded.originals  # read while the run file exists
     return replace(

@@ -25,7 +25,7 @@ from storage.run_file.reading import open_run
 from storage.run_file.writing import run_writer
 from storage.wire_log.notes import Survey
 from storage.wire_log.parts import Part
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, SensorEntry
 from storage.wire_log.scanning import FOREIGN, LogContents, read_log
 from storage.wire_log.wire_samples import LogDecoder, chain_of
 
@@ -90,8 +90,6 @@ def recover(
         contents.path,
         tuple(runs[path] for path in paths.values()),
         contents.damage,
-        survey.counts[Kind.MARK],
-        survey.counts[Kind.EVENT],
         remove_log and contents.remove(),
         tuple(span.seconds for part, span in survey.spans.items() if part not in paths),
     )

@@ -67,8 +67,6 @@ class RecoverReport:
     log: Path
     runs: tuple[RecoveredRun, ...]
     damage: Damage
-    marks: int
-    events: int
     log_removed: bool
     short_parts: tuple[float, ...] = ()
 
@@ -91,5 +89,5 @@ class RecoverReport:
                 yield f"{self.log}: the sensor came back, so it has {len(parts)} parts; the longest is {longest.path}"
         if count := len(self.short_parts):
             are = "1 short part" if count == 1 else f"{count} short parts"
-            yield f"{self.log}: {are} of {sum(self.short_parts):.1f} s in total, after the sensor came back, have no file"
+            yield f"{self.log}: {are} ({sum(self.short_parts):.1f} s), after the sensor came back, without a run file"
         yield f"{self.log}: {self.damage.describe()}"

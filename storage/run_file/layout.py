@@ -1,25 +1,8 @@
 """Define the layout of a run file: names, types, units and attributes.
 
-::
-
-    /                     @Conventions @NX_class=NXroot @default=entry @kind; hard links to the signal's arrays, for
-                          tools that read only the root (older files have none)
-    /entry                NXentry @default=signal; title, start_time where known
-    /entry/signal         NXdata @signal=distance @axes=[time] @kind; on the dimension ``time``:
-        time              f8 s, elapsed; @epoch time of t = 0, @clock source of the times, @moment event they refer to
-        distance          f8 m @ancillary_variables @quantity
-        distance_errors   f4 m, standard deviation; only if the source knows it, NaN if unmeasured
-        quality           u1 @flag_masks @flag_meanings
-        velocity          f8 m/s; only if the recording states one
-                          (if the quantity is not a length, its unit replaces m in both)
-    /entry/instrument     name, kind, clock, rate_hz, quantum_m, sigma_m, stated_error_m
-    /entry/scene          @json: the scene's tables
-    /entry/provenance     @software @version @configuration @traps ...; header, see below
-    /raw                  host_mono_ns i8, only if a host recorded the samples
-    /wire                 bytes u1: the original files, one after the other
-
-Texts have a fixed length, as in files of the netCDF library: xarray, netCDF4 and NeXus tools return them as
-text, h5py returns ``bytes``.
+docs/reference/run-file.md has the same as a table. The root has hard links to the signal's arrays, for tools that read
+only the root. Texts have a fixed length, as in files of the netCDF library: xarray, netCDF4 and NeXus tools return
+them as text, h5py returns ``bytes``.
 
 The file states all metadata twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII) of
 everything except the arrays. It includes the SHA-256 of every array's decoded little-endian values; the SHA-256 of

@@ -3,28 +3,15 @@
 In HDF5 a name can lead outside the file: through a soft or external link, or to an array whose bytes are in other
 files. Run files never need this, so no such name is followed: opening a file from a stranger must not read other files
 of this computer or wait for a pipe.
-
-Examples
---------
->>> import tempfile
->>> import numpy as np
->>> from acquisition.block import Block
->>> from acquisition.source import SourceInfo
->>> from storage.run_file.writing import write_run
->>> block = Block(0, np.arange(3) / 100, np.array([0.30, np.nan, 0.31]), np.array([0, 1, 0], np.uint8))
->>> with tempfile.TemporaryDirectory() as folder:
-...     path = write_run(folder + "/run.h5", [block], SourceInfo("simulated", "spring.toml", 100.0))
-...     with open_run(path) as run:
-...         run.info.kind, len(run), run.samples().distance
-('simulated', 3, array([0.3 ,  nan, 0.31]))
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -54,11 +41,6 @@ _BLOCK_COLUMNS = {
 CHECKED = tuple(_BLOCK_COLUMNS)
 """The columns of a block, whose digests are checked when all blocks are read."""
 _PIECE = 16 * CHUNK
-
-
-def is_run(head: bytes) -> bool:
-    """Return whether a file's first eight bytes are those of HDF5, so that it may be a run file."""
-    return head.startswith(layout.MAGIC)
 
 
 def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
@@ -161,30 +143,32 @@ class Run:
         """Software, configuration and times, as the writer stated them."""
         return self.header.provenance
 
-    def blocks(self, size: int = 1024) -> Iterable[Block]:
-        """Return the samples in blocks, which are read on demand.
+    def blocks(self, size: int = 1024) -> Iterator[Block]:
+        """Yield the samples in blocks, which are read on demand.
 
         Parameters
         ----------
         size : int
-            Samples per block; the last may be shorter.
-
-        Returns
-        -------
-        iterable of Block
-            The blocks. They can be iterated more than once while the run is open.
+            Samples per block, at least 1; the last may be shorter.
 
         Raises
         ------
-        ValueError
-            If ``size`` is not positive.
-        RunDamaged
-            During iteration, if a chunk cannot be read; and before the blocks of the last chunk, if the checksum of a
-            whole column differs.
+        RunClosed, RunDamaged
+            If the run is closed, or a chunk cannot be read; and before the blocks of the last chunk, if the checksum of
+            a whole column differs.
         """
-        if size < 1:
-            raise ValueError(f"size must be at least 1 sample, got {size}")
-        return _Blocks(self, size)
+        digests = {name: hashlib.sha256() for name in CHECKED if name in self.header.columns}
+        step = size * max(1, CHUNK // size)  # read whole blocks, about one chunk at a time
+        for start in range(0, len(self), step):
+            values = self._rows(start, start + step)
+            for name, array in values.items():
+                digests[name].update(array.data)
+            if start + step >= len(self):
+                for name, digest in digests.items():
+                    self._compare(f"the column {name!r}", digest, self.header.columns[name], strict=False)
+            read = _block(self.header, start, values)
+            for row in range(0, len(read), size):
+                yield read[row : row + size]
 
     def samples(self) -> Block:
         """Return all samples as one block.
@@ -194,7 +178,7 @@ class Run:
         RunClosed, RunDamaged
             If the run is closed, or the samples are damaged.
         """
-        for block in _Blocks(self, max(len(self), 1)):
+        for block in self.blocks(max(len(self), 1)):
             return block
         return _block(self.header, 0, self._rows(0, 0))
 
@@ -263,18 +247,14 @@ class Run:
             raise error
 
     def _differences(self, but: Iterable[str]) -> Iterator[RunDamaged]:
-        unverified, self.unverified = self.unverified, False
-        try:
-            checks: list[tuple[Callable[..., Any], Any]] = [(self._header_text, ())]
-            checks += [(self._check_column, (name,)) for name in self.header.columns if name not in {*but}]
-            checks += [(lambda *entry: [*self._original(*entry)], entry) for entry in self._entries()]
-            for check, arguments in checks:
-                try:
-                    check(*arguments)
-                except RunDamaged as error:
-                    yield error
-        finally:
-            self.unverified = unverified
+        checks: list[Callable[[], object]] = [partial(self._header_text, strict=True)]
+        checks += [partial(self._check_column, name) for name in self.header.columns if name not in {*but}]
+        checks += [partial(deque, self._original(*entry, strict=True), maxlen=0) for entry in self._entries()]
+        for check in checks:
+            try:
+                check()
+            except RunDamaged as error:
+                yield error
 
     def _read_header(self) -> tuple[Header, str]:
         text, sha256 = self._header_text()
@@ -287,7 +267,7 @@ class Run:
             problem = f"not a run file that this version reads ({one_line(error)})"
             raise NotARun(self.path, problem, "read it with the version of springmass that wrote it") from error
 
-    def _header_text(self) -> tuple[bytes, str]:
+    def _header_text(self, *, strict: bool = False) -> tuple[bytes, str]:
         """Return the text of the header and its digest."""
         what = "the header"
         stored = self._array(layout.HEADER, what)
@@ -296,9 +276,12 @@ class Run:
             if (stored.dtype.kind, stored.shape, digest.dtype.kind, digest.shape) != ("S", (), "S", ()):
                 raise ValueError("expected a text with its digest")
             text, sha256 = bytes(stored[()]), bytes(stored.attrs["sha256"]).decode()
-        if hashlib.sha256(text).hexdigest() != sha256 and not self.unverified:
-            raise damaged(self.path, what, "checksum mismatch (SHA-256)")
+        self._compare(what, hashlib.sha256(text), sha256, strict=strict)
         return text, sha256
+
+    def _compare(self, what: str, digest: Any, sha256: str, *, strict: bool) -> None:
+        if digest.hexdigest() != sha256 and (strict or not self.unverified):
+            raise damaged(self.path, what, "checksum mismatch (SHA-256)")
 
     def _array(self, path: str, what: str) -> Any:
         """Return an array of the file after checking that its name and its bytes do not lead to another file."""
@@ -340,17 +323,13 @@ class Run:
                 values[name] = array[start:stop]
         return values
 
-    def _check(self, name: str, sha256: str) -> None:
-        if sha256 != self.header.columns[name] and not self.unverified:
-            raise damaged(self.path, f"the column {name!r}", "checksum mismatch (SHA-256)")
-
     def _check_column(self, name: str) -> None:
         digest = hashlib.sha256()
         if name not in layout.BY_NAME:
             raise damaged(self.path, f"the column {name!r}", "this version does not know it")
         for start in range(0, len(self), _PIECE):
             digest.update(self._rows(start, start + _PIECE, [name])[name].tobytes())
-        self._check(name, digest.hexdigest())
+        self._compare(f"the column {name!r}", digest, self.header.columns[name], strict=True)
 
     def _entries(self) -> Iterator[tuple[FileEntry, int]]:
         """Yield each original file in the header with the index of its first byte."""
@@ -359,7 +338,7 @@ class Run:
             yield entry, start
             start += entry.size
 
-    def _original(self, entry: FileEntry, start: int) -> Iterator[bytes]:
+    def _original(self, entry: FileEntry, start: int, *, strict: bool = False) -> Iterator[bytes]:
         """Yield an original file in pieces, and compare its digest at the end."""
         what, digest = f"the original file {entry.name!r}", hashlib.sha256()
         data = self._sized(f"{layout.WIRE}/bytes", "|u1", sum(each.size for each in self.header.originals), what)
@@ -369,31 +348,7 @@ class Run:
                 piece = data[at : min(at + _PIECE, stop)].tobytes()
             digest.update(piece)
             yield piece
-        if digest.hexdigest() != entry.sha256 and not self.unverified:
-            raise damaged(self.path, what, "checksum mismatch (SHA-256)")
-
-
-@dataclass(frozen=True, slots=True)
-class _Blocks:
-    """The samples of a run in blocks, read again in every iteration."""
-
-    run: Run
-    size: int
-
-    def __iter__(self) -> Iterator[Block]:
-        run, samples = self.run, len(self.run)
-        digests = {name: hashlib.sha256() for name in CHECKED if name in run.header.columns}
-        step = self.size * max(1, CHUNK // self.size)  # read whole blocks, about one chunk at a time
-        for start in range(0, samples, step):
-            values = run._rows(start, start + step)
-            for name, array in values.items():
-                digests[name].update(array.data)
-            if start + step >= samples:
-                for name, digest in digests.items():
-                    run._check(name, digest.hexdigest())
-            read = _block(run.header, start, values)
-            for row in range(0, len(read), self.size):
-                yield read[row : row + self.size]
+        self._compare(what, digest, entry.sha256, strict=strict)
 
 
 def _demand_hdf5(path: Path) -> None:
@@ -403,7 +358,7 @@ def _demand_hdf5(path: Path) -> None:
             head = stream.read(len(layout.MAGIC))
     except OSError as error:
         raise NotARun(path, f"the run file cannot be opened ({error.strerror or error})", remedy) from error
-    if not is_run(head):
+    if head != layout.MAGIC:
         raise NotARun(path, f"expected a run file (HDF5), got a file that begins with {head!r}", remedy)
 
 

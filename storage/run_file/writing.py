@@ -202,9 +202,6 @@ class RunWriter:
         if block.first != expected or block.first < 0:
             problem = f"expected a block that begins with sample {max(expected, 0)}, got {block.first}"
             raise WriteFailed(self.path, problem, "number blocks without gaps, and flag missing samples")
-        if expected + len(block) > 2**32:
-            problem = f"expected at most {2**32} samples, got {expected + len(block)}"
-            raise WriteFailed(self.path, problem, "write several run files")
         if block.quantity != self._quantity:
             problem = f"expected samples of {self._quantity}, got {block.quantity} from sample {block.first} on"
             raise WriteFailed(self.path, problem, "write a run file for each quantity")

@@ -1,20 +1,4 @@
-"""Write the wire log: the exact bytes from the port, one checksummed record per read, appended and never changed.
-
-Examples
---------
->>> import tempfile
->>> from storage.wire_log.records import SensorEntry
->>> from storage.wire_log.scanning import read_log
->>> header = LogHeader(sensors=(SensorEntry(0, "maxbotix", "COM3", 9600),), mono_ns=0, unix_ns=0)
->>> with tempfile.TemporaryDirectory() as folder:
-...     log = WireLogWriter(folder + "/run.wire", header)
-...     log.extend([(Kind.DATA, 0, 10_000_000, b"R0500\\r")])
-...     log.close()
-...     for record in read_log(folder + "/run.wire"):
-...         print(record.sequence, record.kind.name, len(record.payload))
-0 HEADER 265
-1 DATA 6
-"""
+"""Write the wire log: the exact bytes from the port, one checksummed record per read, appended and never changed."""
 
 from __future__ import annotations
 

@@ -15,15 +15,9 @@ A log is a sequence of records and nothing else, little-endian::
         28        payload
 
 ``log`` distinguishes the records from those of another log: an old log whose disk blocks reappear after a power cut,
-or a log that a device sends as its data.
-
-=======  ====================================================================================================
-header   JSON, see :class:`LogHeader`. Repeated once after 32 KiB, so that no lost page destroys both copies
-data     the bytes of one read of a port
-mark     UTF-8 text
-event    JSON ``{"kind": text, "facts": {...}}``: lost, reopened, continues, timeout, overflow, calibration, ...
-end      JSON, counts; its absence means that the recording was cut short
-=======  ====================================================================================================
+or a log that a device sends as its data. A header is repeated once after 32 KiB, so that no lost page destroys both
+copies. Data are the bytes of one read of a port, a mark is UTF-8 text, header, event and end are JSON. Without the end
+record, a recording was cut short.
 """
 
 from __future__ import annotations
