@@ -7,6 +7,7 @@ read. The third calls fdatasync once a second. A sync may take long, but neither
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -18,7 +19,7 @@ from typing import Any, Self
 
 from acquisition.clock import Clock
 from acquisition.readings import Read
-from storage.errors import WriteFailed, one_line
+from storage.errors import NotALog, WriteFailed, one_line
 from storage.wire_log.appending import Item, WireLogWriter
 from storage.wire_log.log_file import LogFile, open_log_file
 from storage.wire_log.records import HEAD_BYTES, HIGHEST_CHANNEL, MAX_PAYLOAD, Kind, LogHeader, event_payload
@@ -88,8 +89,10 @@ class Recorder:
     ) -> None:
         self._log = WireLogWriter(path, header, open_file=open_file)
         self.path = self._log.path
-        # Opened now, because the log may be renamed or deleted before it is read.
-        self._contents = read_log(self.path)
+        self._contents: LogContents | None = None
+        with contextlib.suppress(NotALog):
+            # Opened now, because the log may be renamed or deleted before it is read.
+            self._contents = read_log(self.path)
         self._clock = clock
         self._sync_every_ns = int(sync_every_s * 1e9)
         self._limit = queue_bytes
@@ -113,7 +116,6 @@ class Recorder:
         except RuntimeError as error:
             self._stop_sync.set()
             self._log.close()
-            self._contents.close()
             self.path.unlink()
             raise MemoryError("no memory for the threads that write the log") from error
 
@@ -186,8 +188,9 @@ class Recorder:
 
     def contents(self) -> LogContents:
         """Return the recorded log, even if it was renamed or deleted. Call this after :meth:`close`."""
-        self._contents.grow()
-        return self._contents
+        contents = self._contents or read_log(self.path)
+        contents.grow()
+        return contents
 
     def _offer(self, kind: Kind, records: Sequence[Read]) -> None:
         for channel, _, _ in records:

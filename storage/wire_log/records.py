@@ -81,14 +81,6 @@ class Record(NamedTuple):
         """Return the payload as text."""
         return self.payload.decode("utf-8", "replace")
 
-    def json(self) -> Mapping[str, Any]:
-        """Return the payload as a JSON object; empty if the payload is not a JSON object."""
-        try:
-            content = parsed(self.payload, "record")
-        except ValueRefused:
-            return {}
-        return content if isinstance(content, dict) else {}
-
 
 def frame(kind: Kind, payload: bytes, sequence: int, mono_ns: int, log: int, channel: int = 0) -> bytes:
     """Return one record with a payload of at most 65535 bytes.
