@@ -105,9 +105,11 @@ class _ErrorKeepingFile:
     def write(self, data: memoryview) -> int:
         pending = memoryview(data).cast("B")
         size = len(pending)
-        with self._recording_error():
+        try:
             while len(pending) and self.error is None:  # a nearly full disk writes only a part of the data
                 pending = pending[self._raw.write(pending) :]
+        except OSError as error:
+            self.error = error
         return size
 
     def read(self, size: int = -1) -> bytes:
@@ -120,8 +122,10 @@ class _ErrorKeepingFile:
         return len(room)
 
     def truncate(self, size: int) -> int:
-        with self._recording_error():
+        try:
             self._raw.truncate(size)
+        except OSError as error:
+            self.error = self.error or error
         return size
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
@@ -132,10 +136,3 @@ class _ErrorKeepingFile:
 
     def flush(self) -> None:
         """Nothing is buffered here."""
-
-    @contextlib.contextmanager
-    def _recording_error(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            self.error = self.error or error

@@ -21,8 +21,8 @@ SILENCE_S, SILENT_PERIODS = 1.5, 5.0
 NO_TARGET_S = 1.0
 """Minimum duration of a reported loss of the target, s; shorter ones appear only as missing samples."""
 
-Content = Mapping[str, Any]
-"""The content of an event: ``{"kind", "facts"}`` as in the log."""
+Event = tuple[int, str, Mapping[str, Any]]
+"""Time of an event on the host's monotonic clock, ns, its kind and its facts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,23 +112,25 @@ class LossCount:
         else:
             self._known_t, self._missing_since = start, True
 
-    def losses(self, events: Sequence[Content], start_ns: int, end_ns: int, *, last: bool) -> Losses:
+    def losses(self, events: Sequence[Event], start_ns: int, end_ns: int, *, last: bool) -> Losses:
         """Return the losses of a part between two times of the host's clock; ``last`` if no later part follows."""
         if self._missing_since and self._known_t is not None:
             self._add(np.array([self._last_t - self._known_t]))
             self._missing_since = False
-        facts_of = [(event["kind"], event["facts"]) for event in events]
-        gone_s = (end_ns - (start_ns if self._last_ns is None else self._last_ns)) * 1e-9
-        ports = [(kind, facts) for kind, facts in facts_of if kind in ("lost", "reopened", "continues")]
-        lost = bool(ports) and ports[-1][0] == "lost"
-        silent = gone_s > max(SILENCE_S, SILENT_PERIODS * self._period_s)
-        overflows = [facts for kind, facts in facts_of if kind == "overflow"]
+        last_ns = start_ns if self._last_ns is None else self._last_ns
+        gone_s = (end_ns - last_ns) * 1e-9
+        # A port that was lost before the first reading of a run may return without an event.
+        why = [str(facts.get("why", "")) for mono_ns, kind, facts in events if kind == "lost" and mono_ns >= last_ns]
+        gone = bool(why) or gone_s > max(SILENCE_S, SILENT_PERIODS * self._period_s)
+        begins = [facts for _, kind, facts in events if kind in ("continues", "reopened")]
+        another = [facts for facts in begins if facts.get("sensor") == "another"]
+        overflows = [facts for _, kind, facts in events if kind == "overflow"]
         return Losses(
             (end_ns - start_ns) * 1e-9,
-            max(gone_s, 0.0) if last and (lost or silent) else None,
-            str(ports[-1][1].get("why", "")) if last and lost else "",
-            tuple(_number(facts, "gap_s") for kind, facts in ports if kind == "reopened" and goes_on(facts)),
-            next((str(facts.get("why") or "by its serial number") for _, facts in ports if _is_another(facts)), ""),
+            max(gone_s, 0.0) if last and gone else None,
+            why[-1] if last and why else "",
+            tuple(_number(facts, "gap_s") for _, kind, facts in events if kind == "reopened" and goes_on(facts)),
+            str(another[0].get("why") or "by its serial number") if another else "",
             self._total,
             self._longest,
             sum(int(_number(facts, "records")) for facts in overflows),
@@ -141,11 +143,7 @@ class LossCount:
             self._longest = max(self._longest, float(stretches.max()))
 
 
-def _is_another(facts: Content) -> bool:
-    return facts.get("sensor") == "another"
-
-
-def _number(facts: Content, name: str) -> float:
+def _number(facts: Mapping[str, Any], name: str) -> float:
     """Return a number from an event's facts; 0 if a damaged or foreign log has no number there."""
     value = facts.get(name)
     return float(value) if isinstance(value, int | float) else 0.0

@@ -52,7 +52,8 @@ class Run:
     """An open run file.
 
     The header is read when the file is opened, samples on demand. Everything is checked: every chunk has a checksum,
-    and every column that is read to its end is compared with its SHA-256.
+    and every column that is read to its end is compared with its SHA-256. Every method raises RunDamaged for the first
+    damage that it finds, and RunClosed after the run was closed.
 
     ``sha256`` is the digest of the header, which contains the digests of all arrays and original files. Two files with
     the same content therefore have the same ``sha256``, even if their bytes differ.
@@ -151,11 +152,10 @@ class Run:
         size : int
             Samples per block, at least 1; the last may be shorter.
 
-        Raises
-        ------
-        RunClosed, RunDamaged
-            If the run is closed, or a chunk cannot be read; and before the blocks of the last chunk, if the checksum of
-            a whole column differs.
+        Notes
+        -----
+        A damaged chunk is found when it is read. The checksum of a whole column is compared before the blocks of the
+        last chunk.
         """
         digests = {name: hashlib.sha256() for name in CHECKED if name in self.header.columns}
         step = size * max(1, CHUNK // size)  # read whole blocks, about one chunk at a time
@@ -171,13 +171,7 @@ class Run:
                 yield read[row : row + size]
 
     def samples(self) -> Block:
-        """Return all samples as one block.
-
-        Raises
-        ------
-        RunClosed, RunDamaged
-            If the run is closed, or the samples are damaged.
-        """
+        """Return all samples as one block."""
         for block in self.blocks(max(len(self), 1)):
             return block
         return _block(self.header, 0, self._rows(0, 0))
@@ -191,11 +185,6 @@ class Run:
             On the dimension ``time``: time (s), distance (m), quality and, if the file has them, distance_errors (m)
             and velocity (m/s), with the file's attributes. The attributes of the dataset are kind, channel, title,
             format and the instrument's name, clock and numbers.
-
-        Raises
-        ------
-        RunClosed, RunDamaged
-            If the run is closed, or the samples are damaged.
         """
         import xarray as xr
 
@@ -211,23 +200,11 @@ class Run:
         return xr.Dataset(variables, attrs=instrument | layout.signal_attributes(header))
 
     def originals(self) -> tuple[Original, ...]:
-        """Return the original files, bit for bit; an empty tuple if there are none.
-
-        Raises
-        ------
-        RunClosed, RunDamaged
-            If the run is closed, or an original file is damaged.
-        """
+        """Return the original files, bit for bit; an empty tuple if there are none."""
         return tuple(Original(entry.name, b"".join(self._original(entry, at))) for entry, at in self._entries())
 
     def differences(self) -> tuple[RunDamaged, ...]:
-        """Read everything again; return an error for the header and each column or original file that differs.
-
-        Returns
-        -------
-        tuple of RunDamaged
-            The errors; empty if the file is undamaged.
-        """
+        """Read everything again; return an error for the header and each column or original file that differs."""
         return tuple(self._differences(()))
 
     def verify(self, *, but: Iterable[str] = ()) -> None:
@@ -237,11 +214,6 @@ class Run:
         ----------
         but : iterable of str
             Columns to leave out, such as those of :data:`CHECKED` after :meth:`samples` has checked them.
-
-        Raises
-        ------
-        RunClosed, RunDamaged
-            If the run is closed, or for the first difference.
         """
         for error in self._differences(but):
             raise error

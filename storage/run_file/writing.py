@@ -1,16 +1,4 @@
-"""Write run files whole: :func:`write_run`, and :func:`run_writer` for samples that arrive piece by piece.
-
-Examples
---------
->>> import tempfile
->>> import numpy as np
->>> from acquisition.block import Block
->>> from acquisition.source import SourceInfo
->>> block = Block(0, np.arange(3) / 100, np.array([0.30, np.nan, 0.31]), np.array([0, 1, 0], np.uint8))
->>> with tempfile.TemporaryDirectory() as folder:
-...     write_run(folder + "/run.h5", [block], SourceInfo("simulated", "spring.toml", 100.0)).name
-'run.h5'
-"""
+"""Write run files whole: :func:`write_run`, and :func:`run_writer` for samples that arrive piece by piece."""
 
 from __future__ import annotations
 

@@ -21,15 +21,12 @@ class LogFile(Protocol):
 
     def write(self, data: bytes | memoryview) -> int:
         """Append bytes; return how many of them were written, as ``os.write`` does. Raises OSError."""
-        ...
 
     def sync(self) -> None:
         """Sync all written bytes to the disk. Raises OSError."""
-        ...
 
     def close(self) -> None:
         """Close the file."""
-        ...
 
 
 class _NewFile(io.FileIO):

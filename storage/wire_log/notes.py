@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -45,14 +45,13 @@ class Survey:
     """
 
     def __init__(self, log: LogContents, header: LogHeader) -> None:
-        self.header, self.counts = header, Counter[Kind]()
+        self.header, self.end_ns = header, header.mono_ns
         self.calibrations: dict[int, Mapping[str, Any]] = {}
-        self._first: list[Note] = []
-        self._last: deque[Note] = deque(maxlen=LAST_NOTES)
         self._parts = Parts(sensor.channel for sensor in header.sensors)
         self.spans = {part: Span(header.mono_ns, 0) for part in self._parts.now.values()}
-        first_ns: dict[Part, int] = {}
-        now, self.end_ns = self._parts.now, header.mono_ns
+        first: list[Note] = []
+        last: deque[Note] = deque(maxlen=LAST_NOTES)
+        count, now, first_ns = 0, self._parts.now, dict[Part, int]()
         for record in log:
             _, _, mono_ns, kind, channel, _, _ = record
             if kind is Kind.DATA:
@@ -61,42 +60,37 @@ class Survey:
                     first_ns.setdefault(part, mono_ns)
                     self.spans[part].last_ns = mono_ns
             elif kind is Kind.MARK or kind is Kind.EVENT:
-                self._note(log, record)
+                content = {"text": record.text()} if kind is Kind.MARK else self._event(log, record)
+                (first if count < FIRST_NOTES else last).append(Note(kind, mono_ns, channel, now.get(channel), content))
+                count += 1
             self.end_ns = max(self.end_ns, mono_ns)
         for part, ns in first_ns.items():
             self.spans[part].seconds = (self.spans[part].last_ns - ns) * 1e-9
+        self._notes = [*first, *last]
+        self._left_out = count - len(self._notes)
         # The event "ended" states the end; after a crash, it is the last record.
-        self.end_ns = next((note.mono_ns for note in self.events("ended")), self.end_ns)
+        self.end_ns = next((note.mono_ns for note in self._notes if note.content.get("kind") == "ended"), self.end_ns)
 
     def _begin(self, part: Part | None, mono_ns: int) -> Part | None:
         if part is not None:
             self.spans[part] = Span(mono_ns, 0)
         return part
 
-    def _note(self, log: LogContents, record: Record) -> None:
-        content: dict[str, Any] = {"text": record.text()}
-        if record.kind is Kind.EVENT:
-            content = event_content(record.payload)
-            self._begin(self._parts.event(record.channel, content), record.mono_ns)
-            if content["kind"] == "calibration":
-                try:
-                    demand_calibration(content["facts"], "calibration event")
-                except ValueRefused as error:
-                    raise NotALog(log.path, str(error), FOREIGN) from error
-                self.calibrations[record.channel] = content["facts"]
-        self.counts[record.kind] += 1
-        note = Note(record.kind, record.mono_ns, record.channel, self._parts.now.get(record.channel), content)
-        (self._first if len(self._first) < FIRST_NOTES else self._last).append(note)
+    def _event(self, log: LogContents, record: Record) -> dict[str, Any]:
+        content = event_content(record.payload)
+        self._begin(self._parts.event(record.channel, content), record.mono_ns)
+        if content["kind"] == "calibration":
+            try:
+                demand_calibration(content["facts"], "calibration event")
+            except ValueRefused as error:
+                raise NotALog(log.path, str(error), FOREIGN) from error
+            self.calibrations[record.channel] = content["facts"]
+        return content
 
-    def events(self, *kinds: str) -> list[Note]:
-        """Return the events of these kinds."""
-        notes = (*self._first, *self._last)
-        return [note for note in notes if note.kind is Kind.EVENT and note.content["kind"] in kinds]
-
-    def events_of(self, part: Part) -> list[dict[str, Any]]:
-        """Return the contents of a part's events."""
-        notes = (*self._first, *self._last)
-        return [note.content for note in notes if note.kind is Kind.EVENT and note.part == part]
+    def events_of(self, part: Part) -> list[tuple[int, str, Mapping[str, Any]]]:
+        """Return time, kind and facts of a part's events."""
+        events = [note for note in self._notes if note.kind is Kind.EVENT and note.part == part]
+        return [(note.mono_ns, note.content["kind"], note.content["facts"]) for note in events]
 
     def parts_of(self, sensor: int) -> list[Part]:
         """Return the parts of a sensor in order."""
@@ -105,9 +99,8 @@ class Survey:
     def provenance(self, origin_ns: int) -> dict[str, Any]:
         """Return marks and events as plain numbers and texts, with their times relative to ``origin_ns``."""
         by_kind: dict[Kind, list[dict[str, Any]]] = {Kind.MARK: [], Kind.EVENT: []}
-        for kind, mono_ns, channel, _, content in (*self._first, *self._last):
+        for kind, mono_ns, channel, _, content in self._notes:
             t_s = (mono_ns - origin_ns) * 1e-9
             by_kind[kind].append({"mono_ns": mono_ns, "t_s": t_s, "channel": channel, **content})
-        left_out = self.counts.total() - len(self._first) - len(self._last)
         provenance: dict[str, Any] = {"marks": by_kind[Kind.MARK], "events": by_kind[Kind.EVENT]}
-        return provenance | ({"notes_left_out": left_out} if left_out else {})
+        return provenance | ({"notes_left_out": self._left_out} if self._left_out else {})

@@ -151,12 +151,9 @@ class LogContents:
     @property
     def header(self) -> LogHeader | None:
         """The first header; None if both copies are lost. Raises NotALog for a value that is not allowed."""
-        return next((self.header_of(record) for record in self if record.kind is Kind.HEADER), None)
-
-    def header_of(self, record: Record) -> LogHeader:
-        """Return the header in a record. Raises NotALog for a value that is not allowed."""
+        payload = next((record.payload for record in self if record.kind is Kind.HEADER), None)
         try:
-            return LogHeader.decode(record.payload)
+            return None if payload is None else LogHeader.decode(payload)
         except ValueRefused as error:
             raise NotALog(self.path, str(error), FOREIGN) from error
 
@@ -181,15 +178,11 @@ class LogContents:
         """
         try:
             import fcntl
-        except ImportError:
-            return False
-        try:
+
             fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)
             fcntl.flock(self._file, fcntl.LOCK_UN)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return False
+        except (ImportError, OSError) as error:
+            return isinstance(error, BlockingIOError)
         return False
 
     def remove(self) -> bool:

@@ -264,6 +264,32 @@ def test_a_read_that_is_larger_than_the_queue_is_an_overflow_at_once() -> None:
     recording.close()
 
 
+def test_reads_that_a_hanging_disk_has_not_taken_are_counted() -> None:
+    """Those of the write that hangs and those that wait, but no marks: a user who waits no longer is told."""
+    disk = Disk()
+    recording = recorder(disk)
+    disk.writes_pass.clear()
+    recording.put(0, 0, b"first")
+    assert disk.held.wait(WAIT_S)
+    recording.reads([(0, number, b"x") for number in range(10)])
+    recording.mark("let go")
+    assert recording.unwritten() == (11, 15)
+    disk.writes_pass.set()
+    recording.close()
+    assert recording.unwritten() == (0, 0)
+
+
+def test_a_read_longer_than_a_record_is_divided() -> None:
+    """A record has 65535 bytes at most."""
+    disk, long = Disk(), bytes(range(256)) * 1000
+    recording = recorder(disk)
+    recording.put(1, 5, long)
+    recording.close()
+    records = [record for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA]
+    assert b"".join(record.payload for record in records) == long
+    assert {(record.channel, record.mono_ns) for record in records} == {(1, 5)}
+
+
 def test_a_full_disk_stops_the_recording_and_says_so() -> None:
     """The status shows the error immediately, further puts do no harm, closing raises it, and the log is whole."""
     disk = Disk()

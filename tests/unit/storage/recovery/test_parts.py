@@ -67,7 +67,7 @@ def test_each_long_part_has_a_run_file_with_a_time_of_its_own(tmp_path: Path) ->
     log = tmp_path / "run.wire"
     with recording(log) as recorder:
         send(recorder, 0, 1.0, 15.0)
-        comes_back(recorder, 0, 1, 20.0)
+        comes_back(recorder, 0, 1, 20.0, "another")
         send(recorder, 1, 20.0, 3.0)
         comes_back(recorder, 1, 2, 30.0, "another")
         send(recorder, 2, 30.0, 40.0)
@@ -122,6 +122,18 @@ def test_a_port_that_came_back_in_its_channel(tmp_path: Path, port: str, sensor:
         if len(samples) == 1:
             (gap,) = np.flatnonzero(run.samples().flags & Flag.GAP_BEFORE)
             assert run.samples().t[gap] - run.samples().t[gap - 1] == pytest.approx(5.01, abs=0.01)
+
+
+def test_a_sensor_that_was_away_at_the_start_is_not_lost(tmp_path: Path) -> None:
+    """Its first part begins when it comes; a sensor that is lost at the end is."""
+    for name, lost_s in (("early", 0.5), ("late", 20.0)):
+        log = tmp_path / f"{name}.wire"
+        with recording(log) as recorder:
+            event(recorder, 0, lost_s, "lost", {"why": "unplugged"})
+            send(recorder, 0, 5.0, 15.0)
+            event(recorder, 0, 20.5, "ended", {"by": "seconds"})
+        (run,) = recover(log).runs
+        assert run.gone == (name == "late")
 
 
 def test_a_short_recording_has_its_run_file(tmp_path: Path) -> None:

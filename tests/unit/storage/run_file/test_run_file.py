@@ -18,7 +18,7 @@ from acquisition.block import Block, concatenate
 from acquisition.errors import SourceError
 from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
-from storage.errors import NotARun, RunClosed, RunDamaged, RunExists, WriteFailed
+from storage.errors import NotARun, RunClosed, RunDamaged, RunExists, RunOpen, WriteFailed
 from storage.run_file.layout import CHUNK, HEADER
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
@@ -350,3 +350,17 @@ def test_equal_content_has_an_equal_digest(path: Path, tmp_path: Path) -> None:
         with open_run(each) as run:
             digests.append(run.sha256)
     assert digests[0] == digests[1] != digests[2]
+
+
+def test_a_run_that_another_program_writes_is_not_called_damaged(path: Path) -> None:
+    """The file is whole: the line says to close it there, and afterwards it opens."""
+    code = "import sys, h5py; file = h5py.File(sys.argv[1], 'r+'); print('open', flush=True); sys.stdin.read()"
+    command = [sys.executable, "-c", code, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as second:
+        assert second.stdout is not None
+        assert second.stdout.readline() == "open\n"
+        with pytest.raises(RunOpen, match=r"run\.h5 is open in another program; close it there"):
+            open_run(path)
+        second.communicate("")
+    with open_run(path) as run:
+        run.verify()
