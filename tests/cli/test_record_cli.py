@@ -111,9 +111,9 @@ def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Callable, tmp
     np.testing.assert_allclose(second.distance, first.distance * 350 / 344, rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["run.h5", "run.wire"])
+@pytest.mark.parametrize("name", ["run.h5", "run.wire", "run.part2.h5"])
 def test_nothing_is_ever_recorded_over(cli: Callable, tmp_path: Path, scene: Path, name: str) -> None:
-    """Where the run file or its log exists the command ends before it opens anything."""
+    """Where a run file or its log exists the command ends before it opens anything."""
     (tmp_path / name).write_bytes(b"precious")
     done = cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / "run.h5")
     assert done.code == 2
