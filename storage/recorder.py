@@ -70,7 +70,7 @@ class _Overflow:
 
 
 class Recorder:
-    """Records to a new wire log. It implements :class:`acquisition.live.line.Sink`.
+    """Records to a new wire log. It implements :class:`acquisition.live.reader.Sink`.
 
     The log is synced every ``sync_every_s``. Reads that arrive while the queue is full are dropped, and an event in the
     log counts them. Tests replace ``open_file``, which creates the log's file. Raises RunExists or WriteFailed if the

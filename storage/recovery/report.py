@@ -28,11 +28,6 @@ class RecoveredRun:
     losses: Losses
     existed: bool = False
 
-    @property
-    def gone(self) -> bool:
-        """Whether the sensor was disconnected or silent at the end."""
-        return self.losses.gone_s is not None
-
     def describe(self, log: Path) -> Iterator[str]:
         """Yield lines for the user."""
         counts = self.decoding["faults"].items()

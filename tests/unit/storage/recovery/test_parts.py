@@ -133,7 +133,7 @@ def test_a_sensor_that_was_away_at_the_start_is_not_lost(tmp_path: Path) -> None
             send(recorder, 0, 5.0, 15.0)
             event(recorder, 0, 20.5, "ended", {"by": "seconds"})
         (run,) = recover(log).runs
-        assert run.gone == (name == "late")
+        assert (run.losses.gone_s is not None) == (name == "late")
 
 
 def test_a_short_recording_has_its_run_file(tmp_path: Path) -> None:
