@@ -15,31 +15,28 @@ Examples
 
 from __future__ import annotations
 
-from pipeline.dynamics.equation import Equation
-from pipeline.dynamics.exact import EXACT
-from pipeline.dynamics.integrator import Integrator, Trajectory
+from pipeline.dynamics.equation import Equation as Equation
+from pipeline.dynamics.flow import EXACT
+from pipeline.dynamics.integrator import Integrator as Integrator
+from pipeline.dynamics.integrator import Trajectory as Trajectory
 from pipeline.dynamics.methods import FORWARD_EULER, RK4, SYMPLECTIC_EULER, VERLET, YOSHIDA4
-from pipeline.dynamics.problem import Problem, effective_mass_kg
-from pipeline.dynamics.solve_ivp import DOP853, LSODA
+from pipeline.dynamics.problem import Problem as Problem
+from pipeline.dynamics.problem import effective_mass_kg as effective_mass_kg
+from pipeline.dynamics.solve_ivp import DOP853
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 
-__all__ = [
-    "INTEGRATORS",
-    "Equation",
-    "Integrator",
-    "Problem",
-    "Trajectory",
-    "effective_mass_kg",
-    "get_integrator",
-]
-
-_EACH = (FORWARD_EULER, SYMPLECTIC_EULER, VERLET, YOSHIDA4, RK4, EXACT, STRANG, DOP853, LSODA)
+_EACH = (FORWARD_EULER, SYMPLECTIC_EULER, VERLET, YOSHIDA4, RK4, EXACT, STRANG, DOP853)
 INTEGRATORS: dict[str, Integrator] = {each.name: each for each in _EACH}
 
 
 def get_integrator(name: str) -> Integrator:
     """Return an integrator by name.
+
+    Parameters
+    ----------
+    name : str
+        As on the command line, for example "strang".
 
     Raises
     ------

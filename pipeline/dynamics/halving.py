@@ -3,10 +3,7 @@
 1. Solve with a step h and with h / 2. The maximum difference of the two runs is the stated error of the finer one.
 2. Halve the step until the stated error is within the tolerance.
 3. If two halvings do not reduce the difference, only rounding remains, and the tolerance is refused.
-4. Methods of scipy choose their own steps; for them the tolerance is divided by ten instead of halving the step.
-
-:func:`auto` evaluates the exact flow of a linear scene. It solves every other scene by Strang splitting. If that cannot
-reach the tolerance and there is no friction, it uses DOP853.
+4. DOP853 chooses its own steps; there the tolerance is divided by ten instead of halving the step.
 """
 
 from __future__ import annotations
@@ -17,19 +14,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.dynamics.exact import EXACT
+from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
 from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.rounding import least_tolerance, rounding_error
 from pipeline.dynamics.solve_ivp import DOP853, LEAST_RTOL, SolveIvp
 from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
 
-__all__ = ["Solution", "auto", "demand_tolerance", "halved", "solved_once"]
-
 LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
 MOST_STEPS = 2**25  # maximum number of steps of one run, about ten seconds; the finest run takes half of the total time
+LEAST_TOLERANCE = 1e-13
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +72,9 @@ def auto(
 ) -> Solution:
     """Solve a motion to a tolerance, with only the terms that the tolerance requires.
 
+    The exact flow solves a linear scene, Strang splitting every other one. If that cannot reach the tolerance and there
+    is no friction, it is DOP853.
+
     Parameters
     ----------
     problem : Problem
@@ -105,10 +103,9 @@ def auto(
     demand_tolerance(problem, spacing_s, count, tolerance)
     less, terms = required(problem, spacing_s * count, tolerance)
     left_out = sum(term.size for term in terms if not term.included)
-    room = tolerance - left_out
 
     def by(integrator: Integrator) -> Solution:
-        found = halved(less, integrator, spacing_s, count, room, timer)
+        found = halved(less, integrator, spacing_s, count, tolerance - left_out, timer)
         assert found.error is not None
         assert found.velocity_error is not None
         return replace(found, error=found.error + left_out, velocity_error=found.velocity_error + left_out, terms=terms)
@@ -137,28 +134,12 @@ def halved(
 ) -> Solution:
     """Solve a motion by one method and halve its step until the stated error is within a tolerance.
 
-    Parameters
-    ----------
-    problem, spacing_s, count, tolerance, timer
-        As in :func:`auto`.
-    integrator : Integrator
-
-    Raises
-    ------
-    DynamicsError
-        If the method cannot solve this problem or has no error estimate, if the difference no longer decreases, or if
-        too many steps are needed.
-
-    Notes
-    -----
-    With an error of :math:`c h^p` the difference is :math:`2^p - 1` times the error of the finer run. The rounding
-    error of the phase is common to both runs and is therefore added.
+    With an error of :math:`c h^p` the difference of two runs is :math:`2^p - 1` times the error of the finer run. The
+    rounding error of the phase is common to both runs and is therefore added.
     """
     demand_times(spacing_s, spacing_s * count)
-    if integrator.refusal(problem):
-        raise DynamicsError(f"{integrator.name} cannot solve this: {integrator.refusal(problem)}")
-    why = integrator.no_estimate(problem)
     refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here: "
+    why = integrator.refusal(problem) or integrator.no_estimate(problem)
     if why:
         raise DynamicsError(refused + why)
     rounding = rounding_error(problem, spacing_s * count)
@@ -166,16 +147,11 @@ def halved(
         started = timer()
         run = EXACT.run(problem, spacing_s, count)
         return Solution(EXACT, 1, problem, run, rounding, rounding, running_s=timer() - started)
-    coarse, moving = None, count
-    errors = [math.inf]
+    coarse, errors = None, [math.inf]
     for setting, parts in _settings(integrator, problem, spacing_s, count, tolerance):
-        if parts * moving > MOST_STEPS:
-            break
         started = timer()
         fine = _run(setting, problem, spacing_s, count, parts)
         running_s = timer() - started
-        if fine is not None:
-            moving = 1 + int(np.count_nonzero(fine.v))  # number of states before friction holds the bob
         if coarse is not None and fine is not None:
             error, velocity_error = (each + rounding for each in _difference(fine, coarse))
             if error <= tolerance:
@@ -185,7 +161,7 @@ def halved(
                 raise DynamicsError(
                     f"{refused}rounding leaves {min(errors):.2g}; take a larger tolerance or a shorter run"
                 )
-            if _needed(setting, parts * moving, error / tolerance) > MOST_STEPS:
+            if integrator.order and parts * count * (error / tolerance) ** (1.0 / integrator.order) > MOST_STEPS:
                 break
         coarse = fine
     why = "it needs too many steps" if integrator.order else f"at its least tolerance {min(errors):.2g} is left"
@@ -197,18 +173,6 @@ def solved_once(
 ) -> Solution:
     """Solve a motion with the spacing as the step, and estimate the error from a second run with half this step.
 
-    Parameters
-    ----------
-    problem, integrator, spacing_s, count, timer
-        As in :func:`halved`; the integrator must be a method of fixed step.
-
-    Raises
-    ------
-    DynamicsError
-        If the method cannot solve this problem, or the solution overflows.
-
-    Notes
-    -----
     With an error of :math:`c h^p` the error of the run with the longer step h is :math:`2^p / (2^p - 1)` times the
     difference.
     """
@@ -226,18 +190,17 @@ def solved_once(
     return Solution(integrator, 1, problem, run, error, velocity_error, running_s=running_s)
 
 
-def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: float) -> None:
-    """Refuse a tolerance that no integrator can reach.
+def rounding_error(problem: Problem, seconds: float) -> float:
+    """Return the error of the displacement by rounding of the phase :math:`\\omega t`, relative to the amplitude."""
+    return float(np.finfo(np.float64).eps) * (4.0 + problem.equation.angular_frequency_per_s * seconds)
 
-    Raises
-    ------
-    DynamicsError
-        If the tolerance is not finite or is below the limit of double precision, or if a time is out of range.
-    """
+
+def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: float) -> None:
+    """Refuse a tolerance that double precision cannot reach: below twice the rounding of the phase, or 1e-13."""
     seconds = spacing_s * count
     demand_times(spacing_s, seconds)
-    least = least_tolerance(problem, seconds)
-    if not (math.isfinite(tolerance) and tolerance >= least):
+    least = max(LEAST_TOLERANCE, 2.0 * rounding_error(problem, seconds))
+    if not least <= tolerance < math.inf:
         raise DynamicsError(
             f"the tolerance must be finite and at least {least:.1e}, what double precision can reach in {seconds:g} s, "
             f"got {tolerance:g}"
@@ -258,9 +221,9 @@ def _settings(
         return
     # Drag stronger than the spring has its own, shorter time scale, which the step must resolve.
     fast = omega * (1.0 + problem.equation.drag_per_m * problem.amplitude_m())
-    limit = integrator.stable_step(problem) or math.inf
-    parts = math.floor(min(max(spacing_s * fast / LONGEST_STEP, spacing_s / limit), MOST_STEPS)) + 1
-    while True:
+    longest = min(LONGEST_STEP / fast, integrator.stable_step(problem) or math.inf)
+    parts = math.floor(min(spacing_s / longest, MOST_STEPS)) + 1
+    while parts * count <= MOST_STEPS:
         yield integrator, parts
         parts *= 2
 
@@ -277,13 +240,6 @@ def _run(integrator: Integrator, problem: Problem, spacing_s: float, count: int,
 
 def _difference(one: Trajectory, other: Trajectory) -> tuple[float, float]:
     """Return the maximum differences of displacement and velocity, relative to amplitude and speed at the start."""
-    size = one.problem.amplitude_m()
-    if size == 0.0:
-        return 0.0, 0.0
+    size = one.problem.amplitude_m() or 1.0
     speed = size * one.problem.equation.angular_frequency_per_s
     return float(np.max(np.abs(one.y - other.y))) / size, float(np.max(np.abs(one.v - other.v))) / speed
-
-
-def _needed(integrator: Integrator, steps: int, times: float) -> float:
-    """Return the number of steps that the order of the method requires for an error smaller by a factor ``times``."""
-    return float(steps * times ** (1.0 / integrator.order)) if integrator.order else 0.0
