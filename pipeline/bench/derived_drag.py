@@ -1,15 +1,9 @@
 """Drag of a disc derived from its size and the air where a scene states no damping: vortices shed by the disc's edge.
 
 Friction of the air along disc and bob, 3 % of this drag at a usual bench, is left out, as are losses in suspension and
-spring, which cannot be derived.
-
-References
-----------
-.. [1] J. M. R. Graham, "The forces on sharp-edged cylinders in oscillatory flow at low Keulegan-Carpenter numbers",
-   J. Fluid Mech. 97 (1980) 331: measured coefficients of a flat plate follow 8.0 KC^(-1/3).
-.. [2] P. de Bernardinis, J. M. R. Graham, K. H. Parker, "Oscillatory flow around disks and through orifices",
-   J. Fluid Mech. 102 (1981) 279: the same law for each piece of a disc's edge.
-.. [3] H. Lamb, "Hydrodynamics", 6th ed., Cambridge 1932, art. 71 and 108: the flow at the edges of plate and disc.
+spring, which cannot be derived. Measured coefficients of a flat plate follow 8.0 KC^(-1/3) (J. M. R. Graham, J. Fluid
+Mech. 97 (1980) 331); the law is the same for each piece of a disc's edge (P. de Bernardinis, J. M. R. Graham, K. H.
+Parker, J. Fluid Mech. 102 (1981) 279); the flow at the edges is in H. Lamb, "Hydrodynamics", 6th ed., art. 71 and 108.
 """
 
 from __future__ import annotations
@@ -19,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
-from pipeline.bench.air import air_viscosity
+from pipeline.bench.added_mass import added_mass_kg, scene_air_density
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import SceneError
@@ -57,12 +50,9 @@ def disc_drag_coefficient(keulegan_carpenter: float) -> float:
     """Return the drag coefficient of a thin disc oscillating broadside on, for its area and maximum speed.
 
     The vortices of a sharp edge do not depend on the body, and their force is proportional to the velocity at the edge
-    to the power 8/3 [1]. The velocity at a disc's edge is :math:`2/\\pi` of that at a plate's [3]. A disc has
-    twice as much edge per area. So the coefficient is :math:`8.0\\,(2/\\pi)^{8/3}\\,2\\,KC^{-1/3} = 4.8\\,KC^{-1/3}`,
+    to the power 8/3. The velocity at a disc's edge is :math:`2/\\pi` of that at a plate's. A disc has twice as much
+    edge per area. So the coefficient is :math:`8.0\\,(2/\\pi)^{8/3}\\,2\\,KC^{-1/3} = 4.8\\,KC^{-1/3}`,
     until it reaches the steady value 1.17 at KC near 70.
-
-    >>> round(disc_drag_coefficient(3.0), 2)
-    3.33
     """
     if keulegan_carpenter <= 0.0:
         return math.inf
@@ -94,10 +84,9 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     rates = np.array([rate(each) for each in amplitudes.tolist()])
     columns = np.stack([np.ones_like(amplitudes), amplitudes / amplitude_m], axis=1) / rates[:, None]
     (gamma, beta), *_ = np.linalg.lstsq(columns, np.ones(rates.size), rcond=None)
-    number, viscosity = math.pi * amplitude_m / a, air_viscosity(*(each.value for each in scene_air(scene)[:2]))
+    number = math.pi * amplitude_m / a
     words = (
-        f"disc at Re {rho * omega * amplitude_m * 2.0 * a / viscosity:.3g}, KC {number:.3g}: "
-        f"C = {disc_drag_coefficient(number):.3g}, {first:.2g} 1/s at the start "
+        f"disc at KC {number:.3g}: C = {disc_drag_coefficient(number):.3g}, {first:.2g} 1/s at the start "
         "(u 20 %; Graham 1980, de Bernardinis et al. 1981)"
     )
     return DerivedDrag(max(float(gamma), 0.0), max(float(beta) / amplitude_m, 0.0), words)

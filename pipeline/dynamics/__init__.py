@@ -3,14 +3,6 @@
 Input: a scene, or an equation with an initial state. Output: a trajectory with its stated error (``halving.py``). To
 add an integrator, add one entry to ``methods.py`` and one to ``INTEGRATORS``; it must pass
 tests/conformance/test_integrators.py under its name.
-
-Examples
---------
->>> from pipeline.dynamics import Equation, Problem, get_integrator
->>> problem = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
->>> trajectory = get_integrator("strang").run(problem, 0.01, 12000)
->>> trajectory.y.shape, f"{trajectory.relative_energy()[-1]:.4f}"
-((12001,), '0.0461')
 """
 
 from __future__ import annotations

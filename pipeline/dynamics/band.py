@@ -37,29 +37,14 @@ POSITIVE = ("bob_mass_kg", "spring_constant_n_per_m")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Band:
-    """Quantiles of an ensemble, relative to the motion for the scene's values.
+    """Quantiles (4, n) of an ensemble at :data:`LEVELS`, relative to the motion for the scene's values."""
 
-    Parameters
-    ----------
-    quantities : tuple of str
-        The scene's attributes that are uncertain.
-    members, seed : int
-        Number of members and random seed of the ensemble.
-    t : (n,) float64, s
-    middle : (n,) complex128, m
-        :math:`A e^{i\\varphi}` for the scene's values.
-    of_log : (k, n) complex128
-        Change of :math:`\\ln A + i\\varphi` when each quantity changes by its standard uncertainty.
-    of_displacement, of_amplitude, of_phase : (4, n) float64, m, m and rad
-        The quantiles at :data:`LEVELS` minus the result for the scene's values.
-    """
-
-    quantities: tuple[str, ...]
+    quantities: tuple[str, ...]  # the scene's attributes that are uncertain
     members: int
     seed: int
     t: F8
-    middle: C16
-    of_log: C16
+    middle: C16  # A e^(i phi) for the scene's values
+    of_log: C16  # (k, n): change of ln A + i phi when each quantity changes by its standard uncertainty
     of_displacement: F8
     of_amplitude: F8
     of_phase: F8
@@ -69,11 +54,6 @@ class Band:
         """Maximum half width of the displacement's 68 % band, relative to the starting amplitude; 0 if that is 0."""
         half, start = 0.5 * float(np.max(self.of_displacement[2] - self.of_displacement[1])), float(abs(self.middle[0]))
         return half / start if start > 0.0 else 0.0
-
-    @property
-    def words(self) -> str:
-        """Description of the method and of the uncertain quantities."""
-        return f"{self.members} motions drawn from the uncertainties of {', '.join(self.quantities)}"
 
     def displacement_at(self, t: F8) -> F8:
         """Return quantiles (4, k) in m of the displacement minus that for the scene's values, at times t (k,) in s."""
@@ -174,10 +154,7 @@ def spread(
     step_s = RADIANS / ensemble[0].equation.angular_frequency_per_s
     steps = max(1, math.ceil(seconds / step_s))
     if steps > MOST_STEPS:
-        raise DynamicsError(
-            f"a band of {seconds:g} s takes {steps} states, more than {MOST_STEPS}; ask for at most "
-            f"{MOST_STEPS * step_s:.3g} s"
-        )
+        raise DynamicsError(f"a band of {seconds:g} s is too long; ask for at most {MOST_STEPS * step_s:.3g} s")
     t = step_s * np.arange(steps + 1.0)
     parts = [_quantiles(*stretch, members) for stretch in _motions(ensemble, t)]
     middle, of_log, *levels = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
@@ -204,8 +181,7 @@ def _motions(problems: Sequence[Problem], t: F8) -> Iterator[tuple[F8, F8, F8]]:
     The amplitude is that of :math:`y = A\\cos\\varphi` with :math:`A\\sin\\varphi = -(v + \\lambda y)/\\omega_d`,
     :math:`\\lambda = \\gamma + \\beta A + \\mu/A` and :math:`\\omega_d^2 = \\omega^2 - \\lambda^2` at the start. It
     falls by :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)`. The phase turns by :math:`\\sqrt{\\omega^2-\\gamma^2}`
-    and, with a cubic term, by the frequency of Duffing's oscillator. Friction holds the bob from the first turning
-    point within :math:`\\pi\\mu/2\\omega` of rest.
+    :math:`+ 3cA^2/8\\omega`. Friction holds the bob from the first turning point within :math:`\\pi\\mu/2\\omega`.
     """
     omega = np.array([each.equation.angular_frequency_per_s for each in problems])
     gamma, beta, mu = np.array([each.equation.laws() for each in problems]).T
@@ -216,15 +192,15 @@ def _motions(problems: Sequence[Problem], t: F8) -> Iterator[tuple[F8, F8, F8]]:
         raise DynamicsError("a band is that of an oscillation, and this drag is too strong for one")
     side = -(v + rate * y) / np.sqrt(omega**2 - rate**2)
     laws, phase = np.stack([np.hypot(y, side), mu, gamma, beta], axis=1), np.arctan2(side, y)[:, None]
+    phase -= 2.0 * np.pi * np.round((phase - phase[0]) / (2.0 * np.pi))
     speed, stuck = np.sqrt(omega**2 - gamma**2)[:, None], (0.5 * math.pi * mu / omega)[:, None]
-    bend = (np.array([each.equation.cubic_per_m2_s2 for each in problems]) / omega**2)[:, None]
+    bend = (0.375 / omega * [each.equation.cubic_per_m2_s2 for each in problems])[:, None]
     stop, rest = np.full_like(phase, np.inf), np.zeros_like(phase)
     passed = np.diff(t, prepend=0.0)
     for row in range(0, t.size, STRETCH):
         rows = slice(row, row + STRETCH)
         amplitude = amplitudes(t[rows], laws)
-        turns = np.broadcast_to(speed, amplitude.shape)
-        phase = phase[:, -1:] + np.cumsum(turns * _faster(bend * amplitude**2) * passed[rows], axis=1)
+        phase = phase[:, -1:] + np.cumsum((speed + bend * amplitude**2) * passed[rows], axis=1)
         near = amplitude <= stuck
         first = np.argmax(near, axis=1)[:, None]
         stops = near.any(axis=1, keepdims=True) & (mu[:, None] > 0.0) & np.isinf(stop)
@@ -236,13 +212,3 @@ def _motions(problems: Sequence[Problem], t: F8) -> Iterator[tuple[F8, F8, F8]]:
         held = phase >= stop
         amplitude, phase = np.where(held, np.abs(rest), amplitude), np.minimum(phase, stop)
         yield np.where(held, rest, amplitude * np.cos(phase)), amplitude, phase
-
-
-def _faster(e: F8) -> F8:
-    """Return the frequency of Duffing's oscillator over that of its linear part, at :math:`e = cA^2/\\omega^2`.
-
-    It is :math:`\\pi\\sqrt{1+e}/2K(m)` with the elliptic integral K at :math:`m = e/2(1+e)`.
-    """
-    from scipy.special import ellipk
-
-    return np.asarray(0.5 * np.pi * np.sqrt(1.0 + e) / ellipk(0.5 * e / (1.0 + e))) if np.any(e) else np.ones_like(e)

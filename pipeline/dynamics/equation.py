@@ -92,18 +92,10 @@ class Equation:
     ) -> Equation:
         """Return the equation whose averaged amplitude law is dA/dt = -(mu + gamma A + beta A^2).
 
-        Notes
-        -----
         In each cycle a force F per mass takes :math:`\\oint F\\,dy` from the energy per mass :math:`\\omega^2A^2/2`.
         For the forces :math:`2\\gamma\\dot y`, :math:`b\\dot y^2` and :math:`f` the resulting law is
-        :math:`\\dot A = -(2f/\\pi\\omega + \\gamma A + (4\\omega/3\\pi)\\,b A^2)` [1]_.
+        :math:`\\dot A = -(2f/\\pi\\omega + \\gamma A + (4\\omega/3\\pi)\\,b A^2)` (Lelas, Pezer, arXiv:2502.07458).
 
-        References
-        ----------
-        .. [1] K. Lelas, R. Pezer, arXiv:2502.07458.
-
-        Examples
-        --------
         >>> round(Equation.from_laws(8.66, beta_per_m_s=0.235).laws()[1], 12)
         0.235
         """

@@ -27,9 +27,6 @@ def flow(omega: float, gamma: float, t: Any, of: Any = math) -> Any:
     :math:`\\kappa = \\sqrt{(\\gamma-\\omega)(\\gamma+\\omega)}`, the fast rate :math:`\\gamma + \\kappa` and the slow
     rate :math:`\\omega^2/(\\gamma+\\kappa)`, without differences of nearly equal numbers. The functions are those of
     ``math``, twenty times as fast for a single time, or with ``of=np`` those for an array of times.
-
-    >>> flow(2.0, 2.0, 0.5)[1] == 0.5 * math.exp(-1.0)
-    True
     """
     if gamma < omega:
         damped = math.sqrt((omega - gamma) * (omega + gamma))

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -31,35 +32,19 @@ LEAST_TOLERANCE = 1e-13
 class Solution:
     """A solved motion with its stated error.
 
-    Parameters
-    ----------
-    integrator : Integrator
-    parts : int
-        Number of steps from one kept state to the next.
-    problem : Problem
-        The problem that was solved; from :func:`auto` it has only the terms that the tolerance requires.
-    trajectory : Trajectory
-    error, velocity_error : float or None
-        Stated error of the displacement relative to the starting amplitude, and of the velocity relative to that
-        amplitude times the angular frequency. They include the effect of omitted terms; None if halving cannot
-        estimate them.
-    no_estimate : str
-        Why there is no estimate; empty if there is one.
-    running_s : float
-        Running time of the returned run, s.
-    terms : tuple of Term
-        The decision on each term; empty for a method selected by name, which solves all terms.
+    The errors of displacement and velocity are relative to the starting amplitude and its product with the angular
+    frequency, and include the effect of omitted terms; they are None if halving cannot estimate them.
     """
 
     integrator: Integrator
-    parts: int
-    problem: Problem
+    parts: int  # steps from one kept state to the next
+    problem: Problem  # from auto with the terms that the tolerance requires only
     trajectory: Trajectory
     error: float | None
     velocity_error: float | None
     no_estimate: str = ""
-    running_s: float = 0.0
-    terms: tuple[Term, ...] = ()
+    running_s: float = 0.0  # of the returned run
+    terms: tuple[Term, ...] = ()  # the decision on each; empty for a method by name, which solves all terms
 
     @property
     def step_s(self) -> float:
@@ -91,37 +76,21 @@ def auto(
     ------
     DynamicsError
         If the tolerance is below the limit of double precision, or no method reaches it.
-
-    Examples
-    --------
-    >>> from pipeline.dynamics.equation import Equation
-    >>> mixed = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
-    >>> solution = auto(mixed, 0.01, 1200, 1e-6)
-    >>> solution.integrator.name, solution.error <= 1e-6
-    ('strang', True)
     """
     demand_tolerance(problem, spacing_s, count, tolerance)
     less, terms = required(problem, spacing_s * count, tolerance)
     left_out = sum(term.size for term in terms if not term.included)
 
-    def by(integrator: Integrator) -> Solution:
-        found = halved(less, integrator, spacing_s, count, tolerance - left_out, timer)
-        assert found.error is not None
-        assert found.velocity_error is not None
-        return replace(found, error=found.error + left_out, velocity_error=found.velocity_error + left_out, terms=terms)
-
-    if less.equation.is_linear:
-        return by(EXACT)
+    chosen = EXACT if less.equation.is_linear else STRANG
     try:
-        return by(STRANG)
+        found = halved(less, chosen, spacing_s, count, tolerance - left_out, timer)
     except DynamicsError:
-        if less.equation.friction_m_per_s2:
+        if less.equation.friction_m_per_s2 or less.equation.is_linear:
             raise
-    try:
-        return by(DOP853)
-    except DynamicsError as error:
-        refused = f"neither strang nor dop853 keeps a tolerance of {tolerance:.3g} here"
-        raise DynamicsError(f"{refused}; take a larger tolerance or a shorter run") from error
+        found = halved(less, DOP853, spacing_s, count, tolerance - left_out, timer)
+    assert found.error is not None
+    assert found.velocity_error is not None
+    return replace(found, error=found.error + left_out, velocity_error=found.velocity_error + left_out, terms=terms)
 
 
 def halved(
@@ -138,19 +107,19 @@ def halved(
     rounding error of the phase is common to both runs and is therefore added.
     """
     demand_times(spacing_s, spacing_s * count)
-    refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here: "
+    refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here"
     why = integrator.refusal(problem) or integrator.no_estimate(problem)
     if why:
-        raise DynamicsError(refused + why)
+        raise DynamicsError(f"{refused}: {why}")
     rounding = rounding_error(problem, spacing_s * count)
     if integrator is EXACT:
-        started = timer()
-        run = EXACT.run(problem, spacing_s, count)
+        started, run = timer(), EXACT.run(problem, spacing_s, count)
         return Solution(EXACT, 1, problem, run, rounding, rounding, running_s=timer() - started)
     coarse, errors = None, [math.inf]
     for setting, parts in _settings(integrator, problem, spacing_s, count, tolerance):
-        started = timer()
-        fine = _run(setting, problem, spacing_s, count, parts)
+        started, fine = timer(), None
+        with contextlib.suppress(DynamicsError):  # too long a step may overflow
+            fine = setting.run(problem, spacing_s / parts, count * parts, every=parts)
         running_s = timer() - started
         if coarse is not None and fine is not None:
             error, velocity_error = (each + rounding for each in _difference(fine, coarse))
@@ -158,14 +127,13 @@ def halved(
                 return Solution(setting, parts, problem, fine, error, velocity_error, running_s=running_s)
             errors.append(error)
             if error >= errors[-3:][0]:
-                raise DynamicsError(
-                    f"{refused}rounding leaves {min(errors):.2g}; take a larger tolerance or a shorter run"
-                )
+                refused += f": rounding leaves {min(errors):.2g}"
+                break
             if integrator.order and parts * count * (error / tolerance) ** (1.0 / integrator.order) > MOST_STEPS:
+                refused += ": it needs too many steps"
                 break
         coarse = fine
-    why = "it needs too many steps" if integrator.order else f"at its least tolerance {min(errors):.2g} is left"
-    raise DynamicsError(f"{refused}{why}; take a larger tolerance or a shorter run")
+    raise DynamicsError(f"{refused}; take a larger tolerance or a shorter run")
 
 
 def solved_once(
@@ -182,11 +150,11 @@ def solved_once(
     why = integrator.no_estimate(problem)
     if why:
         return Solution(integrator, 1, problem, run, None, None, why, running_s)
-    finer = _run(integrator, problem, spacing_s, count, 2)
-    if finer is None:
-        return Solution(integrator, 1, problem, run, math.inf, math.inf, running_s=running_s)
+    apart = (math.inf, math.inf)
+    with contextlib.suppress(DynamicsError):  # too long a step may overflow
+        apart = _difference(run, integrator.run(problem, 0.5 * spacing_s, 2 * count, every=2))
     share, rounding = 2.0**integrator.order / (2.0**integrator.order - 1.0), rounding_error(problem, spacing_s * count)
-    error, velocity_error = (share * each + rounding for each in _difference(run, finer))
+    error, velocity_error = (share * each + rounding for each in apart)
     return Solution(integrator, 1, problem, run, error, velocity_error, running_s=running_s)
 
 
@@ -201,10 +169,8 @@ def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: 
     demand_times(spacing_s, seconds)
     least = max(LEAST_TOLERANCE, 2.0 * rounding_error(problem, seconds))
     if not least <= tolerance < math.inf:
-        raise DynamicsError(
-            f"the tolerance must be finite and at least {least:.1e}, what double precision can reach in {seconds:g} s, "
-            f"got {tolerance:g}"
-        )
+        reach = f"at least {least:.1e}, what double precision can reach in {seconds:g} s"
+        raise DynamicsError(f"the tolerance must be finite and {reach}, got {tolerance:g}")
 
 
 def _settings(
@@ -215,9 +181,9 @@ def _settings(
     if isinstance(integrator, SolveIvp):
         # The errors of all steps accumulate, and a step is about one radian.
         rtol = max(min(tolerance / (1.0 + omega * spacing_s * count), 1e-3), 10.0 * LEAST_RTOL)
-        while rtol >= LEAST_RTOL:
-            yield replace(integrator, rtol=rtol), 1
-            rtol *= 0.1
+        yield from (
+            (replace(integrator, rtol=rtol / tens), 1) for tens in 10.0 ** np.arange(14) if rtol / tens >= LEAST_RTOL
+        )
         return
     # Drag stronger than the spring has its own, shorter time scale, which the step must resolve.
     fast = omega * (1.0 + problem.equation.drag_per_m * problem.amplitude_m())
@@ -226,16 +192,6 @@ def _settings(
     while parts * count <= MOST_STEPS:
         yield integrator, parts
         parts *= 2
-
-
-def _run(integrator: Integrator, problem: Problem, spacing_s: float, count: int, parts: int) -> Trajectory | None:
-    """Return a run; None if a method of fixed step fails, as it may overflow with too long a step."""
-    try:
-        return integrator.run(problem, spacing_s / parts, count * parts, every=parts)
-    except DynamicsError:
-        if not integrator.order:
-            raise
-        return None
 
 
 def _difference(one: Trajectory, other: Trajectory) -> tuple[float, float]:

@@ -77,18 +77,15 @@ class Integrator(ABC):
         why = self.refusal(problem)
         if why:
             raise DynamicsError(f"{self.name} cannot solve this: {why}")
-        limit = self.stable_step(problem)
-        remedy = f"take a step of at most {limit:.3g} s, or " if 0.0 < limit < math.inf else "take a shorter step, or "
-        remedy += "auto" if self.name == "strang" else "strang"
+        ran_away, remedy = f"{self.name} ran beyond the range of numbers", "take a shorter step, or auto"
         with np.errstate(all="ignore"):
             try:
                 y, v = self.march(problem, step_s, steps, every)
             except (OverflowError, ZeroDivisionError) as error:
-                raise DynamicsError(f"{self.name} ran beyond the range of numbers ({error}); {remedy}") from error
+                raise DynamicsError(f"{ran_away} ({error}); {remedy}") from error
         fine = np.isfinite(y) & np.isfinite(v)
         if not fine.all():
-            first = step_s * every * int(np.argmin(fine))
-            raise DynamicsError(f"{self.name} ran beyond the range of numbers by t = {first:g} s; {remedy}")
+            raise DynamicsError(f"{ran_away} by t = {step_s * every * int(np.argmin(fine)):g} s; {remedy}")
         return Trajectory(problem, step_s * every, y, v)
 
 

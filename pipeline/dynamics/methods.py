@@ -1,10 +1,7 @@
 """Explicit methods of fixed step: both Euler methods, velocity Verlet, Yoshida's composition, classical Runge-Kutta.
 
-They repeat one step and do not locate turning points.
-
-References
-----------
-.. [1] H. Yoshida, Phys. Lett. A 150 (1990) 262, doi:10.1016/0375-9601(90)90092-3.
+They repeat one step and do not locate turning points. Yoshida's weights: Phys. Lett. A 150 (1990) 262,
+doi:10.1016/0375-9601(90)90092-3.
 """
 
 from __future__ import annotations
@@ -12,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 
 from pipeline.dynamics.equation import Equation
 from pipeline.dynamics.integrator import Integrator, kept
@@ -54,9 +52,7 @@ class OneStep(Integrator):
         """Return, with friction, that the order drops because the method does not locate turning points; else empty."""
         if not problem.equation.friction_m_per_s2:
             return ""
-        return (
-            f"no error estimate with friction: the order of {self.name} drops at turning points that it does not locate"
-        )
+        return f"with friction, as the order of {self.name} drops at turning points that it does not locate"
 
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
         """Solve by repeating the step."""
@@ -72,21 +68,12 @@ class OneStep(Integrator):
         return kept(problem, states(problem.displacement_m, problem.velocity_m_per_s), steps // every)
 
 
-def _forward(eq: Equation, h: float) -> Step:
+def _euler(eq: Equation, h: float, *, symplectic: bool) -> Step:
     a = acceleration(eq)
 
     def step(y: float, v: float) -> tuple[float, float]:
-        return y + h * v, v + h * a(y, v)
-
-    return step
-
-
-def _symplectic(eq: Equation, h: float) -> Step:
-    a = acceleration(eq)
-
-    def step(y: float, v: float) -> tuple[float, float]:
-        v = v + h * a(y, v)
-        return y + h * v, v
+        after = v + h * a(y, v)
+        return y + h * (after if symplectic else v), after
 
     return step
 
@@ -111,7 +98,12 @@ def _rk4(eq: Equation, h: float) -> Step:
 def _composed(eq: Equation, h: float, weights: tuple[float, ...] = (1.0,)) -> Step:
     """Compose symmetric steps of some lengths: half the drag by its exact flow, a Verlet step, half the drag."""
     stiffness, cubic, friction = eq.angular_frequency_per_s**2, eq.cubic_per_m2_s2, eq.friction_m_per_s2
-    parts = [(0.5 * weight * h, *_drag_flow(eq, 0.5 * weight * h)) for weight in weights]
+    parts = []
+    for half in (0.5 * weight * h for weight in weights):
+        # The flow of the drag is v s / (1 + r |v|); viscous drag shortens the time in which quadratic drag acts.
+        gone = -math.expm1(-2.0 * eq.gamma_per_s * half)
+        acts = gone / (2.0 * eq.gamma_per_s) if eq.gamma_per_s else half
+        parts.append((half, 1.0 - gone, eq.drag_per_m * acts))
 
     def step(y: float, v: float) -> tuple[float, float]:
         # Friction keeps one direction per step, because Yoshida's parts go forward, backward and forward in time.
@@ -125,18 +117,6 @@ def _composed(eq: Equation, h: float, weights: tuple[float, ...] = (1.0,)) -> St
         return y, v
 
     return step
-
-
-def _yoshida(eq: Equation, h: float) -> Step:
-    return _composed(eq, h, _YOSHIDA)
-
-
-def _drag_flow(eq: Equation, t: float) -> tuple[float, float]:
-    """Return s and r of the flow v s / (1 + r |v|) of linear and quadratic drag over a time t in s."""
-    shrink = math.exp(-2.0 * eq.gamma_per_s * t)
-    # Viscous drag reduces the speed meanwhile, and with it the time during which quadratic drag acts.
-    acts = -math.expm1(-2.0 * eq.gamma_per_s * t) / (2.0 * eq.gamma_per_s) if eq.gamma_per_s else t
-    return shrink, eq.drag_per_m * acts
 
 
 def acceleration(eq: Equation) -> Callable[[float, float], float]:
@@ -173,8 +153,10 @@ def _symplectic_euler_limit(omega: float, gamma: float) -> float:
     return 2.0 / (gamma + math.hypot(gamma, omega))
 
 
-FORWARD_EULER = OneStep("forward-euler", "forward Euler", 1, _forward, _forward_euler_limit)
-SYMPLECTIC_EULER = OneStep("symplectic-euler", "symplectic Euler", 1, _symplectic, _symplectic_euler_limit)
+FORWARD_EULER = OneStep("forward-euler", "forward Euler", 1, partial(_euler, symplectic=False), _forward_euler_limit)
+SYMPLECTIC_EULER = OneStep(
+    "symplectic-euler", "symplectic Euler", 1, partial(_euler, symplectic=True), _symplectic_euler_limit
+)
 VERLET = OneStep("verlet", "velocity Verlet", 2, _composed, lambda omega, _: 2.0 / omega)
-YOSHIDA4 = OneStep("yoshida4", "Yoshida's fourth-order composition", 4, _yoshida)
+YOSHIDA4 = OneStep("yoshida4", "Yoshida's fourth-order composition", 4, partial(_composed, weights=_YOSHIDA))
 RK4 = OneStep("rk4", "classical Runge-Kutta", 4, _rk4)

@@ -44,7 +44,17 @@ class Problem:
     def __post_init__(self) -> None:
         for name in ("displacement_m", "velocity_m_per_s"):
             object.__setattr__(self, name, demand_number(getattr(self, name), name))
-        self._demand_bound()
+        eq = self.equation
+        if eq.cubic_per_m2_s2 >= 0.0:
+            return
+        reach = eq.angular_frequency_per_s / math.sqrt(-eq.cubic_per_m2_s2)
+        y, v = abs(self.displacement_m) / reach, abs(self.velocity_m_per_s) / eq.angular_frequency_per_s / reach
+        # Within reach, and without the energy to leave it.
+        if not (y < 1.0 and v * v + y * y * (1.0 - 0.5 * y * y) < 0.5):
+            raise DynamicsError(
+                f"a softening spring holds its bob within {reach:g} m of rest, the start at {self.displacement_m:g} m "
+                "is too far or too fast; start nearer, or take a smaller cubic term"
+            )
 
     def amplitude_m(self) -> float:
         """Return the amplitude of the undamped linear oscillation with this initial state, m."""
@@ -52,34 +62,11 @@ class Problem:
 
     @classmethod
     def from_scene(cls, scene: Scene, *, where: str = "scene") -> Problem:
-        """Return the problem that a scene describes.
+        """Return the problem that a scene describes; ``where`` names the scene in errors.
 
-        Parameters
-        ----------
-        scene : Scene
-            Must give bob mass, spring constant and starting displacement; other missing values count as zero.
-        where : str
-            Name of the source of the scene for error messages.
-
-        Raises
-        ------
-        SceneError
-            If a required value is missing; the message names it.
-        DynamicsError
-            If the values of the scene give no valid problem.
-
-        Notes
-        -----
         :math:`\\omega_0^2 = k/(m + m_s/3 + m_a)` with the mass :math:`m_s` of the spring and the mass :math:`m_a` of
-        the air that the disc carries along. The coefficients of ``[damping]`` are those of the amplitude laws; see
-        :meth:`Equation.from_laws`.
-
-        Examples
-        --------
-        >>> scene = Scene.from_mapping({"bob": {"mass_kg": 0.2}, "spring": {"constant_n_per_m": 20.0},
-        ...                             "start": {"displacement_m": 0.05}})
-        >>> Problem.from_scene(scene).equation.angular_frequency_per_s
-        10.0
+        the air that the disc carries along. The coefficients of ``[damping]`` are those of the amplitude laws. Missing
+        values count as zero, except bob mass, spring constant and starting displacement.
         """
         needed = {
             "[bob] mass_kg": scene.bob_mass_kg,
@@ -101,20 +88,6 @@ class Problem:
             return cls(equation, _value(scene.start_displacement_m), _value(scene.start_velocity_m_per_s))
         except DynamicsError as error:
             raise DynamicsError(f"{where}: {error}") from error
-
-    def _demand_bound(self) -> None:
-        """Refuse a start outside the range omega / sqrt(-c) of a softening spring, or with energy to leave it."""
-        eq = self.equation
-        if eq.cubic_per_m2_s2 >= 0.0:
-            return
-        reach = eq.angular_frequency_per_s / math.sqrt(-eq.cubic_per_m2_s2)
-        y = abs(self.displacement_m) / reach
-        v = abs(self.velocity_m_per_s) / eq.angular_frequency_per_s / reach
-        if not (y < 1.0 and v * v + y * y * (1.0 - 0.5 * y * y) < 0.5):
-            raise DynamicsError(
-                f"a softening spring holds its bob within {reach:g} m of rest, the start at {self.displacement_m:g} m "
-                "is too far or too fast; start nearer, or take a smaller cubic term"
-            )
 
 
 def effective_mass_kg(scene: Scene) -> float:

@@ -55,10 +55,7 @@ class Strang(Integrator):
             return y, v
         radians = eq.angular_frequency_per_s * step_s
         if radians > LONGEST_WITH_FRICTION:
-            raise DynamicsError(
-                f"with friction a step of strang is at most {LONGEST_WITH_FRICTION:g} radians, as each of them is "
-                f"looked at for turning points, got {radians:.3g}; take a shorter step"
-            )
+            raise DynamicsError(f"strang with friction takes {radians:.3g} radians at once; take a shorter step")
         parts = max(1, math.ceil(radians))  # so that a step contains at most one turning point
         return kept(problem, _rubbing(problem, step_s / parts, every * parts), steps // every)
 
@@ -88,54 +85,48 @@ def _states(problem: Problem, h: float, every: int) -> Iterator[float]:
 def _rubbing(problem: Problem, h: float, every: int) -> Iterator[float]:
     """Yield displacement and velocity after every ``every``-th step of a bob with friction, which may come to rest."""
     eq, y, v = problem.equation, problem.displacement_m, problem.velocity_m_per_s
-    half = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
+    half = _half(eq, h)
     way = eq.direction(y, v)
     while True:
         for _ in range(every):
             if not way:
                 break
             y1, v1 = _step(eq, y, v, way, h, half)
-            if v1 * way > 0.0:
-                y, v = y1, v1
-                continue
-            turns = _turning(eq, (y, v), (y1, v1), way, h)
-            y, _ = _step(eq, y, v, way, turns, flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * turns))
-            v, way, left = 0.0, eq.direction(y, 0.0), h - turns
-            if way and left > 0.0:
-                y, v = _step(eq, y, v, way, left, flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * left))
+            if v1 * way <= 0.0:
+                turns = _turning(eq, y, v, v1, way, h)
+                y1, v1 = _step(eq, y, v, way, turns, _half(eq, turns))[0], 0.0
+                way = eq.direction(y1, 0.0)
+                if way and turns < h:
+                    y1, v1 = _step(eq, y1, 0.0, way, h - turns, _half(eq, h - turns))
+            y, v = y1, v1
         yield y
         yield v
+
+
+def _half(eq: Equation, h: float) -> Entries:
+    entries: Entries = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
+    return entries
 
 
 def _step(eq: Equation, y: float, v: float, way: int, h: float, half: Entries) -> tuple[float, float]:
     """Return the state after a step in one direction; ``half`` is the oscillator's flow over h / 2."""
     a, b, c, d = half
     rest = -way * eq.friction_m_per_s2 / eq.angular_frequency_per_s**2
-    kick = 0.5 * h * eq.cubic_per_m2_s2
     y, v = a * (y - rest) + b * v + rest, c * (y - rest) + d * v
-    push = kick * y * y * y
+    push = 0.5 * h * eq.cubic_per_m2_s2 * y * y * y
     v -= push
     v = v / (1.0 + eq.drag_per_m * h * abs(v)) - push
     return a * (y - rest) + b * v + rest, c * (y - rest) + d * v
 
 
-def _turning(eq: Equation, before: tuple[float, float], after: tuple[float, float], way: int, h: float) -> float:
-    """Return the time of v = 0 within a step h: that of a cubic t(v) through both ends, then by one Newton step."""
-    v0, v1 = before[1], after[1]
-    a0, a1 = _pull(eq, *before, way), _pull(eq, *after, way)
-    if not (a0 and a1) or v0 == v1:
-        return 0.5 * h
-    s = v0 / (v0 - v1)
-    t = h * s * s * (3.0 - 2.0 * s) + (v1 - v0) * s * (1.0 - s) * ((1.0 - s) / a0 - s / a1)
-    t = min(max(t, 0.0), h)
-    y, v = _step(eq, *before, way, t, flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * t))
-    slope = _pull(eq, y, v, way)
-    return min(max(t - v / slope, 0.0), h) if slope else t
-
-
-def _pull(eq: Equation, y: float, v: float, way: int) -> float:
-    """Return the acceleration for motion in one direction."""
-    return float(-eq.spring(y) - (2.0 * eq.gamma_per_s + eq.drag_per_m * abs(v)) * v - way * eq.friction_m_per_s2)
+def _turning(eq: Equation, y: float, v: float, after: float, way: int, h: float) -> float:
+    """Return the time within a step h at which the velocity, v before and ``after`` it, is zero, by Newton's method."""
+    t = h * v / (v - after) if v != after else 0.5 * h
+    for _ in range(2):  # each squares the error of the chord
+        y1, v1 = _step(eq, y, v, way, t, _half(eq, t))
+        slope = -eq.spring(y1) - way * eq.friction_m_per_s2
+        t = min(max(t - v1 / slope, 0.0), h) if slope else t
+    return t
 
 
 STRANG = Strang()

@@ -18,14 +18,10 @@ COEFFICIENTS = {
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """One force of the equation of motion: whether it is solved, and why.
-
-    Its size is the maximum change of the displacement that its omission could cause, relative to the starting
-    amplitude.
-    """
+    """One force of the equation of motion: whether it is solved, and why."""
 
     name: str
-    size: float
+    size: float  # maximum change of the displacement without it, relative to the starting amplitude
     included: bool
     why: str
 
@@ -47,17 +43,12 @@ def required(problem: Problem, seconds: float, tolerance: float) -> tuple[Proble
     for name in sorted(sizes, key=sizes.__getitem__):
         if sum(sizes[each] for each in (*left_out, name)) <= SHARE * tolerance:
             left_out.add(name)
-    terms = []
-    for name in COEFFICIENTS:
-        if name not in sizes:
-            terms.append(Term(name, 0.0, False, "the scene has none"))
-            continue
-        size, less = min(sizes[name], 1.0), "less" if name in left_out else "more"
-        why = (
-            f"it changes the motion by up to {size:.1g} of the amplitude, {less} than its share of the tolerance "
-            f"{tolerance:g}"
-        )
-        terms.append(Term(name, size, name not in left_out, why))
+    terms = [Term(name, 0.0, False, "the scene has none") for name in COEFFICIENTS]
+    for row, name in enumerate(COEFFICIENTS):
+        if name in sizes:
+            size, less = min(sizes[name], 1.0), "less" if name in left_out else "more"
+            why = f"up to {size:.1g} of the amplitude, {less} than its share of the tolerance {tolerance:g}"
+            terms[row] = Term(name, size, name not in left_out, why)
     omitted = {COEFFICIENTS[name]: 0.0 for name in left_out}
     return replace(problem, equation=replace(problem.equation, **omitted)), tuple(terms)
 

@@ -112,8 +112,7 @@ def simulated_effects(
 
     u_kelvin, length = scene_air(scene)[0].u, 4.0 * GRAVITY / omega**2
     softer = (
-        f"an air temperature uncertain by {u_kelvin:g} K makes a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}; "
-        "the scene's k is taken to be that of its temperature"
+        f"{u_kelvin:g} K, the u of the air's temperature, make a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
     )
     swings = (
         f"the scene gives no length; suspended {length:.3g} m +- {1.5 * start:.2g} m below its point the bob would "
@@ -196,17 +195,16 @@ def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[
 
 
 def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
-    name, unit = "amplitude_dependent_frequency", "1"
+    name = "amplitude_dependent_frequency"
     if phase.backbone is None:
-        why = "a constant frequency describes the phase: an ideal spring needs no more"
-        return Effect(name, None, None, unit, False, why)
+        return Effect(name, None, None, "1", False, "a constant frequency describes the phase: an ideal spring's")
     start = damping.best.joint["A0"].value
     shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
     why = (
         f"the phase bends: the frequency shifts by {shift:.2g} of itself from rest to the first amplitude, "
         f"with {words_on_exponent(phase.exponent)}, far beyond its uncertainty"
     )
-    return Effect(name, None, shift, unit, True, why)
+    return Effect(name, None, shift, "1", True, why)
 
 
 def _rest_drift(rest: Rest, noise_m: float) -> Effect:
@@ -236,14 +234,10 @@ def _modes(disturbances: Disturbances | None, unit: str) -> Iterator[Effect]:
             size = math.sqrt(sum(mode.amplitude.value**2 for mode in members))
             verdict = "more" if disturbances.modelled else "less"
             why = (
-                f"{_count(len(members), what)}, together of this amplitude; the strongest line found would leave up to "
+                f"{len(members)} times a {what}, together of this amplitude; the strongest line would leave up to "
                 f"{amount(disturbances.leak_m, unit)} in the main amplitude, {verdict} than a tenth of its uncertainty"
             )
             yield Effect(name, None, size, unit, disturbances.modelled, why)
-
-
-def _count(number: int, what: str) -> str:
-    return f"one {what}" if number == 1 else f"{number} times a {what}"
 
 
 def _buoyancy(scene: Scene, omega: float, length_m: float, unit: str) -> Effect:
@@ -264,10 +258,9 @@ def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
         why = f"the scene gives no air temperature, so {counts}: {why}"
         return Effect("speed_of_sound", None, None, "1", False, why)
     actual = speed_of_sound(*(each.value for each in scene_air(scene)))
-    whose = "of the record" if instrument.speed_of_sound_m_per_s else "that old recordings take for granted"
-    why += f"; relative to the {record:g} m/s {whose}; the air's uncertainty stands in theirs"
-    if instrument.speed_of_sound_m_per_s:
-        why += ", and so does the difference, which is not corrected"
+    why += (
+        f"; relative to the {record:g} m/s of the record, uncorrected; the air's uncertainty stands in the distances'"
+    )
     return Effect("speed_of_sound", actual / record - 1.0, None, "1", True, why)
 
 

@@ -121,7 +121,7 @@ def _band(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
         band = spread(ready.solved, seconds, ready.measured)
     except DynamicsError as error:
         return None, f"none: {error}"
-    return band, band.words
+    return band, f"{band.members} motions drawn from the uncertainties of {', '.join(band.quantities)}"
 
 
 def _tolerance(options: SimulateOptions, band: Band | None) -> tuple[float | None, str]:

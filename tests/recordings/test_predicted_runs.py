@@ -74,4 +74,4 @@ def test_the_disc_takes_what_the_law_of_its_edge_says() -> None:
         disc_diameter_m=Estimate(0.102, 0.0, "m"),
     )
     drag = derive_drag(scene, start, 120.0)
-    assert rates["disc"] - rates["bare"] == pytest.approx(drag.shed_per_s + drag.layer_per_s, rel=0.2)
+    assert rates["disc"] - rates["bare"] == pytest.approx(drag.gamma_per_s + drag.beta_per_m_s * start, rel=0.2)
