@@ -84,9 +84,8 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     rates = np.array([rate(each) for each in amplitudes.tolist()])
     columns = np.stack([np.ones_like(amplitudes), amplitudes / amplitude_m], axis=1) / rates[:, None]
     (gamma, beta), *_ = np.linalg.lstsq(columns, np.ones(rates.size), rcond=None)
-    number = math.pi * amplitude_m / a
     words = (
-        f"disc at KC {number:.3g}: C = {disc_drag_coefficient(number):.3g}, {first:.2g} 1/s at the start "
+        f"disc at KC {math.pi * amplitude_m / a:.3g}, {first:.2g} 1/s at the start "
         "(u 20 %; Graham 1980, de Bernardinis et al. 1981)"
     )
     return DerivedDrag(max(float(gamma), 0.0), max(float(beta) / amplitude_m, 0.0), words)

@@ -50,12 +50,12 @@ class Equation:
 
     def __post_init__(self) -> None:
         for name in self.__slots__:
-            object.__setattr__(self, name, demand_number(getattr(self, name), name))
+            value = demand_number(getattr(self, name), name)
+            if value < 0.0 and name != "cubic_per_m2_s2":
+                raise DynamicsError(f"{name} must be 0 or more, got {value:g}")
+            object.__setattr__(self, name, value)
         if not self.angular_frequency_per_s > 1.0 / LARGEST:
             raise DynamicsError(f"angular_frequency_per_s must be positive, got {self.angular_frequency_per_s:g}")
-        for name in ("gamma_per_s", "drag_per_m", "friction_m_per_s2"):
-            if getattr(self, name) < 0.0:
-                raise DynamicsError(f"{name} must be 0 or more, got {getattr(self, name):g}")
 
     @property
     def is_linear(self) -> bool:

@@ -15,6 +15,8 @@ from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
+RANAWAY = 1e100  # m or m/s, below which an energy is still a number
+
 
 @dataclass(frozen=True, slots=True)
 class Integrator(ABC):
@@ -51,23 +53,10 @@ class Integrator(ABC):
         """Return displacements and velocities (n,) at the start and after every ``every`` steps, m and m/s."""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem, with checks of the arguments and of the result.
+        """Solve a problem by some steps of a length in s, of which every n-th is kept.
 
-        Parameters
-        ----------
-        problem : Problem
-        step_s : float
-            Step, s.
-        steps : int
-            Number of steps.
-        every : int
-            Number of steps from one kept state to the next; it must divide ``steps``.
-
-        Raises
-        ------
-        DynamicsError
-            If the step or the number of steps is invalid, the method cannot solve this problem, or the solution
-            overflows.
+        A :class:`DynamicsError` says what is wrong with the step or the number of steps, why the method cannot solve
+        this problem, or that the solution overflows.
         """
         demand_times(step_s, step_s * steps)
         if steps < 1 or every < 1 or steps % every:
@@ -83,7 +72,7 @@ class Integrator(ABC):
                 y, v = self.march(problem, step_s, steps, every)
             except (OverflowError, ZeroDivisionError) as error:
                 raise DynamicsError(f"{ran_away} ({error}); {remedy}") from error
-        fine = np.isfinite(y) & np.isfinite(v)
+        fine = (np.abs(y) < RANAWAY) & (np.abs(v) < RANAWAY)
         if not fine.all():
             raise DynamicsError(f"{ran_away} by t = {step_s * every * int(np.argmin(fine)):g} s; {remedy}")
         return Trajectory(problem, step_s * every, y, v)
@@ -130,14 +119,15 @@ class Trajectory:
         return np.asarray((1.0 - rise) * y[row] + rise * y[row + 1] + bends)
 
     def relative_energy(self) -> F8:
-        """Return the mechanical energy (n,) relative to that at the start; 1 if the start has no energy."""
+        """Return the mechanical energy (n,) relative to that at the start; 1 if the start has none, inf on overflow."""
         size, eq = self.problem.amplitude_m(), self.problem.equation
         if size == 0.0:
             return np.ones(len(self.y))
-        # In units of the amplitude, so that no square leaves the range of numbers.
+        # In units of the amplitude, so that no small one is lost in its square.
         y, v = self.y / size, self.v / (size * eq.angular_frequency_per_s)
         cubic = 0.5 * eq.cubic_per_m2_s2 * (size / eq.angular_frequency_per_s) ** 2
-        energy = v**2 + y**2 + cubic * y**4
+        with np.errstate(over="ignore"):
+            energy = v**2 + y**2 * (1.0 + cubic * y**2)
         return np.asarray(energy / energy[0])
 
 

@@ -92,10 +92,9 @@ def simulated_effects(
     drag: DerivedDrag | None,
     without: Sequence[str],
 ) -> tuple[Effect, ...]:
-    """Return the effects table of a simulation.
+    """Return the effects table of a simulation, whose terms are empty for a named method, which solves all of them.
 
-    The terms are empty for a named method, which solves all of them; the drag is None unless it is derived; the user
-    left out the effects in ``without``: "drag", "disc", "spring-mass". Leaving out a share s of the mass shifts the
+    Leaving out a share s of the mass shifts the
     phase by :math:`s\\omega T/2` over a run of duration T, which changes the displacement by up to twice the sine of
     half of it. If the suspended length l is within 1.5 amplitudes of :math:`4g/\\omega^2`, any small sideways motion
     grows at the rate :math:`3\\omega A/8l` (P. Lynch, Int. J. Non-Linear Mech. 37 (2002) 345).
@@ -111,9 +110,7 @@ def simulated_effects(
         return Effect(name, turned(share), None, "1", included, why)
 
     u_kelvin, length = scene_air(scene)[0].u, 4.0 * GRAVITY / omega**2
-    softer = (
-        f"{u_kelvin:g} K, the u of the air's temperature, make a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
-    )
+    softer = f"the air's u of {u_kelvin:g} K makes a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
     swings = (
         f"the scene gives no length; suspended {length:.3g} m +- {1.5 * start:.2g} m below its point the bob would "
         f"swing sideways at half the frequency (2:1), growing by {0.375 * omega * start / length:.2g} 1/s"
@@ -136,7 +133,9 @@ def _masses(scene: Scene, judge: Callable[[str, float, str], Effect]) -> Iterato
         return
     mass = scene.bob_mass_kg.value
     if scene.spring_mass_kg is None:
-        why = f"the scene gives no spring mass, so none swings along; it may be up to {HEAVIEST_SHARE:g} of the bob's"
+        why = (
+            f"the scene gives no spring mass: none is counted, and an analysis allows for {HEAVIEST_SHARE:g} of the bob"
+        )
         yield Effect("spring_mass", None, None, "1", False, why)
     else:
         share = oscillating_mass_kg(scene.spring_mass_kg.value, mass) / mass - 1.0
@@ -156,11 +155,9 @@ def _disc(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | No
         left_out = needs_drag(scene)
         why = "left out by --without" if left_out else "[damping] is stated, the disc's drag with it"
         return Effect("disc_drag", None, None, "1", not left_out, why)
-    gamma, beta, mu = problem.equation.laws()
     start = problem.amplitude_m() or 1.0
-    laws = [[start, mu, gamma, beta], [start, mu, gamma - drag.gamma_per_s, beta - drag.beta_per_m_s]]
-    damped, free = amplitudes(np.linspace(0.0, seconds, 200), np.array(laws))
-    size = float(np.max(free - damped)) / start
+    law = np.array([[start, 0.0, drag.gamma_per_s, drag.beta_per_m_s]])  # it is derived where nothing else damps
+    size = 1.0 - float(amplitudes(np.array([0.0, seconds]), law)[0, 1]) / start
     return Effect("disc_drag", size, None, "1", True, f"no [damping] is stated: derived, {drag.words}")
 
 
@@ -247,21 +244,20 @@ def _buoyancy(scene: Scene, omega: float, length_m: float, unit: str) -> Effect:
 
 
 def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
-    record = instrument.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD
-    why = "it scales every distance alike: amplitude and beta, not the spring constant"
+    record, shift = instrument.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD, None
     if instrument.u_scale > 0:
-        why += "; the distances were calibrated, so the calibration's uncertainty stands in its place"
-        return Effect("speed_of_sound", None, None, "1", False, why)
-    if scene.air_temperature_c is None:
+        why = "the distances were calibrated, so the calibration's uncertainty stands in its place"
+    elif scene.air_temperature_c is None:
         bench = scene.tells_of_bench or instrument.speed_of_sound_m_per_s is not None
         counts = "a room's 20 +- 3 degC count, 0.5 % in the scale" if bench else "its 0.18 %/K stand in no uncertainty"
-        why = f"the scene gives no air temperature, so {counts}: {why}"
-        return Effect("speed_of_sound", None, None, "1", False, why)
-    actual = speed_of_sound(*(each.value for each in scene_air(scene)))
-    why += (
-        f"; relative to the {record:g} m/s of the record, uncorrected; the air's uncertainty stands in the distances'"
-    )
-    return Effect("speed_of_sound", actual / record - 1.0, None, "1", True, why)
+        why = f"the scene gives no air temperature, so {counts}"
+    else:
+        shift = speed_of_sound(*(each.value for each in scene_air(scene))) / record - 1.0
+        why = (
+            f"relative to the {record:g} m/s of the record, uncorrected; the air's uncertainty stands in the distances'"
+        )
+    why += "; it scales every distance alike: amplitude and beta, not the spring constant"
+    return Effect("speed_of_sound", shift, None, "1", shift is not None, why)
 
 
 def _clock_rate(instrument: Instrument) -> Effect:
