@@ -15,7 +15,7 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from pipeline.dynamics.equation import Equation
@@ -25,6 +25,7 @@ from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
+Stepper = Callable[[float, float, int, float, Entries], tuple[float, float]]
 LONGEST_WITH_FRICTION = 1e6  # maximum step with friction, rad
 
 
@@ -69,13 +70,13 @@ def _states(problem: Problem, h: float, every: int) -> Iterator[float]:
     a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)
     y, v = a * y + b * v, c * y + d * v
     a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, h)
-    slow, kick, count, done = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2, every, 0
+    slow, kick, done = eq.drag_per_m * h, 0.5 * h * eq.cubic_per_m2_s2, 0
     while True:
-        push = kick * y * y * y
+        push = kick * y * y * y if kick else 0.0
         v -= push
         v = (v / (1.0 + slow * v) if v > 0.0 else v / (1.0 - slow * v)) - push
         done += 1
-        if done == count:
+        if done == every:
             yield y
             yield v
             done = 0
@@ -85,19 +86,18 @@ def _states(problem: Problem, h: float, every: int) -> Iterator[float]:
 def _rubbing(problem: Problem, h: float, every: int) -> Iterator[float]:
     """Yield displacement and velocity after every ``every``-th step of a bob with friction, which may come to rest."""
     eq, y, v = problem.equation, problem.displacement_m, problem.velocity_m_per_s
-    half = _half(eq, h)
-    way = eq.direction(y, v)
+    step, half, way = _stepper(eq), _half(eq, h), eq.direction(y, v)
     while True:
         for _ in range(every):
             if not way:
                 break
-            y1, v1 = _step(eq, y, v, way, h, half)
+            y1, v1 = step(y, v, way, h, half)
             if v1 * way <= 0.0:
-                turns = _turning(eq, y, v, v1, way, h)
-                y1, v1 = _step(eq, y, v, way, turns, _half(eq, turns))[0], 0.0
+                turns = _turning(step, eq, y, v, v1, way, h)
+                y1, v1 = step(y, v, way, turns, _half(eq, turns))[0], 0.0
                 way = eq.direction(y1, 0.0)
                 if way and turns < h:
-                    y1, v1 = _step(eq, y1, 0.0, way, h - turns, _half(eq, h - turns))
+                    y1, v1 = step(y1, 0.0, way, h - turns, _half(eq, h - turns))
             y, v = y1, v1
         yield y
         yield v
@@ -108,22 +108,28 @@ def _half(eq: Equation, h: float) -> Entries:
     return entries
 
 
-def _step(eq: Equation, y: float, v: float, way: int, h: float, half: Entries) -> tuple[float, float]:
-    """Return the state after a step in one direction; ``half`` is the oscillator's flow over h / 2."""
-    a, b, c, d = half
-    rest = -way * eq.friction_m_per_s2 / eq.angular_frequency_per_s**2
-    y, v = a * (y - rest) + b * v + rest, c * (y - rest) + d * v
-    push = 0.5 * h * eq.cubic_per_m2_s2 * y * y * y
-    v -= push
-    v = v / (1.0 + eq.drag_per_m * h * abs(v)) - push
-    return a * (y - rest) + b * v + rest, c * (y - rest) + d * v
+def _stepper(eq: Equation) -> Stepper:
+    """Return a step in one direction: of y, v, that direction, the step h, and the oscillator's flow over h / 2."""
+    shift, drag, cubic = eq.friction_m_per_s2 / eq.angular_frequency_per_s**2, eq.drag_per_m, eq.cubic_per_m2_s2
+
+    def step(y: float, v: float, way: int, h: float, half: Entries) -> tuple[float, float]:
+        a, b, c, d = half
+        rest = -way * shift
+        y -= rest
+        y, v = a * y + b * v, c * y + d * v
+        push = 0.5 * h * cubic * (y + rest) ** 3 if cubic else 0.0
+        v -= push
+        v = v / (1.0 + drag * h * abs(v)) - push
+        return a * y + b * v + rest, c * y + d * v
+
+    return step
 
 
-def _turning(eq: Equation, y: float, v: float, after: float, way: int, h: float) -> float:
+def _turning(step: Stepper, eq: Equation, y: float, v: float, after: float, way: int, h: float) -> float:
     """Return the time within a step h at which the velocity, v before and ``after`` it, is zero, by Newton's method."""
     t = h * v / (v - after) if v != after else 0.5 * h
     for _ in range(2):  # each squares the error of the chord
-        y1, v1 = _step(eq, y, v, way, t, _half(eq, t))
+        y1, v1 = step(y, v, way, t, _half(eq, t))
         slope = -eq.spring(y1) - way * eq.friction_m_per_s2
         t = min(max(t - v1 / slope, 0.0), h) if slope else t
     return t
