@@ -65,7 +65,7 @@ def cases() -> list[tuple[str, str, float, float, Callable[[], object], Callable
         (
             "exact propagator, linear, 120 s",
             "scipy lfilter, the same recurrence",
-            3.0,
+            8.0,
             1.0,
             lambda: exact.run(LINEAR, STEP_S, COUNT),
             lambda: lfilter([1.0, -d], [1.0, -(a + d), a * d - b * c], pulse),

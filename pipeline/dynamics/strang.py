@@ -1,6 +1,6 @@
 """Strang splitting with exact sub-flows: half a step of the oscillator, a step of quadratic drag, another half step.
 
-It is implemented here because drag is weak and the oscillation fast: at equal error it takes a fiftieth of the time of
+It is implemented here because drag is weak and the oscillation fast: at equal error it takes a hundredth of the time of
 scipy's DOP853 (``python benchmarks/dynamics.py``). Spring and viscous drag are advanced by their exact flow, so that a
 linear scene is solved exactly in steps of any length. The flow of quadratic drag is exact too, :math:`v/(1 + b|v|h)`,
 and cannot overflow. A cubic term gives half a kick before and after it. Between turning points friction is a constant

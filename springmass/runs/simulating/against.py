@@ -157,7 +157,7 @@ def _moves(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> t
     from scipy.optimize import minimize_scalar
 
     found = []
-    # Evaluated at the times of the band, whose states are a fifth of a radian apart.
+    # Evaluated at the times of the band, whose states are two fifths of a radian apart.
     rows = np.unique(np.searchsorted(band.t, since).clip(max=band.t.size - 1))
     at = np.interp(band.t[rows], since, left)
     middle = band.middle[rows]
