@@ -26,18 +26,10 @@ DOWN_TO = 1e-3  # smallest amplitude at which the disc's law is matched, over th
 
 @dataclass(frozen=True, slots=True)
 class DerivedDrag:
-    """Coefficients of dA/dt = -(gamma A + beta A^2) of a disc, in 1/s and 1/(m s), and the sentence on their origin."""
+    """Coefficients of dA/dt = -(gamma A + beta A^2), named as the scene's attributes, and words on their origin."""
 
-    gamma_per_s: float
-    beta_per_m_s: float
+    joint: Joint
     words: str
-
-    @property
-    def joint(self) -> Joint:
-        """Both coefficients with their covariance, named as the scene's attributes; the law's u moves both alike."""
-        values = np.array([self.gamma_per_s, self.beta_per_m_s])
-        covariance = np.outer(U_SHED * values, U_SHED * values)
-        return Joint(("gamma_per_s", "beta_per_m_s"), values, covariance, ("1/s", "1/(m s)"))
 
 
 def needs_drag(scene: Scene) -> bool:
@@ -71,21 +63,20 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     mass = oscillating_mass_kg(spring, scene.bob_mass_kg.value + added_mass_kg(scene))
     omega = math.sqrt(scene.spring_constant_n_per_m.value / mass)
     a, rho = 0.5 * scene.disc_diameter_m.value, scene_air_density(scene)
-    if amplitude_m <= 0.0:
-        return DerivedDrag(0.0, 0.0, "a disc at rest sheds nothing")
 
     def rate(amplitude: float) -> float:
         drag_per_m = 0.5 * rho * disc_drag_coefficient(math.pi * amplitude / a) * math.pi * a * a / mass
         return 4.0 * drag_per_m * omega * amplitude / (3.0 * math.pi)
 
-    first = rate(amplitude_m)
-    left = max((1.0 + first * seconds / 1.5) ** -1.5, DOWN_TO)
-    amplitudes = amplitude_m * np.geomspace(min(left, 0.9), 1.0, 40)
-    rates = np.array([rate(each) for each in amplitudes.tolist()])
-    columns = np.stack([np.ones_like(amplitudes), amplitudes / amplitude_m], axis=1) / rates[:, None]
-    (gamma, beta), *_ = np.linalg.lstsq(columns, np.ones(rates.size), rcond=None)
-    words = (
-        f"disc at KC {math.pi * amplitude_m / a:.3g}, {first:.2g} 1/s at the start "
-        "(u 20 %; Graham 1980, de Bernardinis et al. 1981)"
-    )
-    return DerivedDrag(max(float(gamma), 0.0), max(float(beta) / amplitude_m, 0.0), words)
+    values, first = np.zeros(2), 0.0
+    if amplitude_m > 0.0:
+        first = rate(amplitude_m)
+        left = max((1.0 + first * seconds / 1.5) ** -1.5, DOWN_TO)
+        amplitudes = amplitude_m * np.geomspace(min(left, 0.9), 1.0, 40)
+        rates = np.array([rate(each) for each in amplitudes.tolist()])
+        columns = np.stack([np.ones(40), amplitudes / amplitude_m], axis=1) / rates[:, None]
+        values = np.maximum(np.linalg.lstsq(columns, np.ones(40), rcond=None)[0], 0.0) / [1.0, amplitude_m]
+    covariance = np.outer(U_SHED * values, U_SHED * values)  # the law's uncertainty moves both alike
+    joint = Joint(("gamma_per_s", "beta_per_m_s"), values, covariance, ("1/s", "1/(m s)"))
+    number = f"KC {math.pi * amplitude_m / a:.3g}, {first:.2g} 1/s at the start"
+    return DerivedDrag(joint, f"disc at {number} (u 20 %; Graham 1980, de Bernardinis et al. 1981)")

@@ -30,11 +30,6 @@ class Problem:
     DynamicsError
         If a start value is no number or too large, or if the start lets a softening spring stretch beyond the point up
         to which it pulls back.
-
-    Examples
-    --------
-    >>> Problem(Equation(angular_frequency_per_s=8.0), 0.03, 0.32).amplitude_m()
-    0.05
     """
 
     equation: Equation

@@ -5,11 +5,7 @@ scipy's DOP853 (``python benchmarks/dynamics.py``). Spring and viscous drag are 
 linear scene is solved exactly in steps of any length. The flow of quadratic drag is exact too, :math:`v/(1 + b|v|h)`,
 and cannot overflow. A cubic term gives half a kick before and after it. Between turning points friction is a constant
 force, which shifts the rest position of the oscillator. Turning points are located; there the bob sticks if the pull of
-the spring is not greater than the friction.
-
-References
-----------
-.. [1] G. Strang, SIAM J. Numer. Anal. 5 (1968) 506, doi:10.1137/0705041.
+the spring is not greater than the friction. (G. Strang, SIAM J. Numer. Anal. 5 (1968) 506, doi:10.1137/0705041.)
 """
 
 from __future__ import annotations

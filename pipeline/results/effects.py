@@ -118,7 +118,7 @@ def simulated_effects(
     return (
         *_masses(scene, moved),
         _disc(scene, problem, seconds, drag),
-        *_terms(problem, terms, seconds, drag),
+        *_terms(problem, terms, seconds),
         Effect("temperature", turned(SOFTER_PER_K * u_kelvin), None, "1", False, softer),
         Effect("sideways_mode", None, None, "1", False, swings),
         _buoyancy(scene, omega, start, "1"),
@@ -156,18 +156,16 @@ def _disc(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | No
         why = "left out by --without" if left_out else "[damping] is stated, the disc's drag with it"
         return Effect("disc_drag", None, None, "1", not left_out, why)
     start = problem.amplitude_m() or 1.0
-    law = np.array([[start, 0.0, drag.gamma_per_s, drag.beta_per_m_s]])  # it is derived where nothing else damps
+    law = np.array([[start, 0.0, *drag.joint.values]])  # it is derived where nothing else damps
     size = 1.0 - float(amplitudes(np.array([0.0, seconds]), law)[0, 1]) / start
     return Effect("disc_drag", size, None, "1", True, f"no [damping] is stated: derived, {drag.words}")
 
 
-def _terms(problem: Problem, terms: Sequence[Term], seconds: float, drag: DerivedDrag | None) -> Iterator[Effect]:
+def _terms(problem: Problem, terms: Sequence[Term], seconds: float) -> Iterator[Effect]:
     for term in terms or required(problem, seconds, 1.0)[1]:
         why, included = term.why, term.included
         if not terms and term.size > 0.0:
             why, included = "a method by name solves all terms", True
-        elif drag is not None and included and term.name in ("viscous_drag", "quadratic_drag"):
-            why += "; the coefficient is the derived one"
         yield Effect(term.name, term.size, None, "1", included, why)
 
 
