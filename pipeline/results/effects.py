@@ -150,7 +150,8 @@ def _masses(scene: Scene, judge: Callable[[str, float, str], Effect]) -> Iterato
 def _disc(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | None) -> Effect:
     """Return the effect of the disc's drag: the largest change of the amplitude without it."""
     if scene.disc_diameter_m is None:
-        return Effect("disc_drag", None, None, "1", False, "the scene names no disc")
+        hint = "" if any(problem.equation.laws()) else "; nothing damps the motion: add [disc] or [damping]"
+        return Effect("disc_drag", None, None, "1", False, f"the scene names no disc{hint}")
     if drag is None:
         left_out = needs_drag(scene)
         why = "left out by --without" if left_out else "[damping] is stated, the disc's drag with it"
