@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.findings.registry import FINDINGS
+from pipeline.findings.finding import kinds
 from springmass.report.words import typeset
 
 __all__ = ["LAW_CODES", "STANDING", "Harm", "Notice", "by_harm", "harm_of", "lab_report_line", "notices_of"]
@@ -190,7 +190,7 @@ def notices_of(findings: Iterable[Mapping[str, Any]], figures: Sequence[str]) ->
             if code not in groups["law"]:
                 groups["law"].append(code)
             continue
-        figure = FINDINGS[code].figure
+        figure = kinds()[code].figure
         notice = Notice(
             code,
             severity,
