@@ -47,6 +47,7 @@ class Kind:
     details: tuple[str, ...] = ()
     advice: tuple[str, ...] = ("",)
     figure: str = ""
+    harm: str = "uncertainty"
 
 
 @dataclass(frozen=True, slots=True)
