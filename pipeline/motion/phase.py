@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.damping.select import Damping, LawFit
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.quantity import Unit
 from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
 from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
@@ -282,15 +283,15 @@ def _widening(line: Line, u: F8, spread: Scatter, params: Params) -> tuple[float
     return length * (line.chi2 / free if too_large else 1.0), length
 
 
-def backbone_unit(exponent: float) -> str:
-    """Return the unit of the backbone's coefficient.
+def backbone_unit(exponent: float, unit: str = "m") -> str:
+    """Return the unit of the backbone's coefficient for a recording in a unit.
 
     Examples
     --------
-    >>> backbone_unit(2.0), backbone_unit(1.0), backbone_unit(0.5)
-    ('rad/(s m^2)', 'rad/(s m)', 'rad/(s m^0.5)')
+    >>> backbone_unit(2.0), backbone_unit(1.0), backbone_unit(2.0, "V")
+    ('rad/(m^2 s)', 'rad/(m s)', 'rad/(V^2 s)')
     """
-    return "rad/(s m)" if exponent == 1.0 else f"rad/(s m^{exponent:g})"
+    return Unit(-exponent, -1, radian=1).of(unit)
 
 
 def words_on_exponent(exponent: float) -> str:

@@ -25,7 +25,7 @@ from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
 from pipeline.motion.phase import PhaseFit, words_on_exponent
 from pipeline.motion.waveform import Rest
-from pipeline.numerics.quantity import amount, in_unit
+from pipeline.numerics.quantity import Unit, amount
 from pipeline.registry.effects import check_effect
 from pipeline.windows.disturbances import Disturbances
 
@@ -184,10 +184,10 @@ def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[
         share = {"m": 1.0, "m/s": omega**-1, "m/s^2": omega**-2}.get(unit)
         predicted_beta = None if share is None else 4.0 * b * omega / (3.0 * math.pi * mass) * share
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
-    yield Effect("quadratic_drag", predicted_beta, beta, in_unit("1/(m s)", unit), beta is not None, chosen)
+    yield Effect("quadratic_drag", predicted_beta, beta, Unit(-1, -1).of(unit), beta is not None, chosen)
     tried = any(fit.drag_term("mu") is not None for fit in damping.fits.values())
     why = chosen if tried else "no law with friction is among those tried"
-    yield Effect("friction", None, mu, in_unit("m/s", unit), mu is not None, why)
+    yield Effect("friction", None, mu, Unit(1, -1).of(unit), mu is not None, why)
 
 
 def _backbone(phase: PhaseFit, damping: Damping) -> Effect:

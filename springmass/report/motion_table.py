@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
 from pipeline.motion.smoother import Smoothed
-from pipeline.numerics.quantity import in_unit, noun
+from pipeline.numerics.quantity import Unit, noun
 from pipeline.track import UNUSABLE
 
 __all__ = ["COLUMNS", "columns_of", "motion_csv", "row_step", "smoothed_or_why"]
@@ -39,8 +39,8 @@ def columns_of(unit: str) -> tuple[str, ...]:
     if unit == "m":
         return COLUMNS
     word = noun(unit).replace(" ", "_")
-    names = {f"smooth_{word}": "m", "derivative": "m/s", "second_derivative": "m/s^2"}
-    smooth = [f"{name}{_spelt(in_unit(form, unit))}" for name, form in names.items()]
+    names = (f"smooth_{word}", "derivative", "second_derivative")
+    smooth = [f"{name}{_spelt(Unit(1, -order).of(unit))}" for order, name in enumerate(names)]
     own = f"{word}{_spelt(unit)}"
     return ("time_s", own, "used", *(x for each in smooth for x in (each, f"u_{each}")))
 
