@@ -9,28 +9,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.extensions import entry_points_of, load_entry
-from acquisition.recordings.base import (
-    HEAD_BYTES,
-    Format,
-    PairFormat,
-    SurveyFormat,
-    dialect_folder,
-    read_bytes,
-    read_head,
-)
+from acquisition.recordings.base import Format, PairFormat, Survey, SurveyFormat, dialect_folder, read_bytes, read_head
 from acquisition.recordings.foreign import unknown_format
-from acquisition.recordings.inspection import Inspection
 from acquisition.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
-
-__all__ = ["formats", "get_format", "inspect", "open_recording", "sniff"]
 
 GROUP = "springmass.formats"
 
@@ -40,19 +30,27 @@ _TABLE = {
     "tdms": "tdms",
     "workbook": "workbook",
     "zip": "archive",
-    "capstone": "capstone",
-    "datastudio": "datastudio",
-    "vernier": "vernier",
+    "capstone": "dialects:CAPSTONE",
+    "datastudio": "dialects:DATASTUDIO",
+    "vernier": "dialects:VERNIER",
     "logger-pro": "logger_pro",
     "phyphox": "phyphox",
     "cassy": "cassy",
     "tracker": "tracker",
-    "csv": "csv_units",
-    "bare": "bare",
     "table": "any_table",
 }
-"""The module in ``families`` for each name of a format."""
+"""For each name of a format its module in ``families``, and the format's name there if it is not FORMAT."""
 _LAST = "table"  # accepts any rows of numbers, so all other formats are tried first
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """The family of a file and the evidence for it, and its channels; none if the family cannot list them."""
+
+    format: str
+    title: str
+    why: str
+    surveys: tuple[Survey, ...]
 
 
 def formats() -> tuple[Format, ...]:
@@ -67,13 +65,7 @@ def formats() -> tuple[Format, ...]:
 
 
 def get_format(name: str) -> Format:
-    """Return the format with a given name.
-
-    Raises
-    ------
-    UnknownFormat
-        If no format has this name.
-    """
+    """Return the format with a given name."""
     if name in _TABLE:
         return _built_in(name)
     declared = {each.name: each for each in _declared()}
@@ -117,7 +109,7 @@ def open_recording(
     format : str, optional
         Name of the format; by default it is identified by content.
     channel, rate_hz, unit, run, time, time_unit : optional
-        Information that the file does not state or leaves open; see :meth:`acquisition.recordings.base.Format.read`.
+        Information that the file does not state or leaves open; see :meth:`springmass.extend.Format.read`.
     velocity_path : path, optional
         The velocity file that belongs to the position file; the two are joined by time.
 
@@ -145,13 +137,7 @@ def open_recording(
 
 
 def inspect(path: str | os.PathLike[str]) -> Inspection:
-    """Return the format and the content of a file, before a channel is chosen.
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be opened, no format recognises it, or its content cannot be read.
-    """
+    """Return the format and the content of a file, before a channel is chosen."""
     name = os.fspath(path)
     head = read_head(path)
     reader = _recognise(name, head)
@@ -163,7 +149,7 @@ def inspect(path: str | os.PathLike[str]) -> Inspection:
 def _recognise(path: str, head: bytes) -> Format:
     names = []
     for candidate in _every():
-        if candidate.recognises(head[:HEAD_BYTES]):
+        if candidate.recognises(head):
             return candidate
         names.append(candidate.name)
     raise unknown_format(path, head, tuple(names))
@@ -196,7 +182,8 @@ def _declared() -> Iterator[Format]:
 
 
 def _built_in(name: str) -> Format:
-    return cast(Format, import_module(f"acquisition.recordings.families.{_TABLE[name]}").FORMAT)
+    module, _, variable = _TABLE[name].partition(":")
+    return cast(Format, getattr(import_module(f"acquisition.recordings.families.{module}"), variable or "FORMAT"))
 
 
 def _entry_points() -> dict[str, EntryPoint]:

@@ -6,13 +6,17 @@ videos and similar files are skipped and listed.
 
 from __future__ import annotations
 
-from acquisition.recordings.parts import contents_of_parts, members
-from acquisition.recordings.tables.contents import Contents
-from acquisition.recordings.tables.sheet import ColumnFormat
+from collections.abc import Callable
+from functools import partial
 
-__all__ = ["FORMAT"]
+from acquisition.recordings.identify import formats
+from acquisition.recordings.parts import members, tables_of_parts
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.table import Table
+from acquisition.recordings.tables.text import HEAD_BYTES
 
 _MAGIC = b"PK\x03\x04"
+_CONTAINERS = ("workbook", "zip")
 
 
 def _evidence(head: bytes) -> str:
@@ -20,8 +24,14 @@ def _evidence(head: bytes) -> str:
     return "it begins with the bytes of a zip archive" if head.startswith(_MAGIC) and not others else ""
 
 
-def _contents(path: str, data: bytes) -> Contents:
-    return contents_of_parts(path, members(path, data), "file")
+def _tables(path: str, data: bytes) -> list[Table]:
+    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in _CONTAINERS]
+
+    def reader(name: str, data: bytes) -> Callable[[], list[Table]] | None:
+        family = next((each for each in families if each.recognises(data[:HEAD_BYTES])), None)
+        return None if family is None else partial(family.tables, f"{path}, file {name}", data)
+
+    return tables_of_parts(path, ((name, reader(name, part)) for name, part in members(path, data)), "file")
 
 
-FORMAT = ColumnFormat("zip", "a zip archive of recordings, each a run: phyphox's CSV export", _evidence, _contents)
+FORMAT = ColumnFormat("zip", "a zip archive of recordings, each a run: phyphox's CSV export", _evidence, _tables)

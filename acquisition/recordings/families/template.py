@@ -2,14 +2,12 @@
 
 1. Copy this file to ``acquisition/recordings/families/NAME.py``. The docstring describes a file, with a few real lines,
    and what is easy to misread.
-2. ``_evidence`` takes the head of a file and returns a few words on why the file belongs to this family, or an empty
-   text if it does not. It uses the content, never the file's name, and never raises.
-3. ``_contents`` finds the headers and describes the layout: runs, channels, units, times. It reads no numbers:
-   :class:`acquisition.recordings.tables.sheet.ColumnFormat` does that and handles all faults of rows.
-4. Leave empty each item that the file does not state (unit, times). The reader then asks the user for it.
-5. Add one line to ``_TABLE`` of ``acquisition/recordings/identify.py``, or, in a separate package, an entry point in
+2. ``header`` takes the first lines of a text and says what they mean, or returns None for lines of another family. It
+   uses the content, never the file's name, and never raises. Everything else is shared by all families.
+3. Leave out each item that the file does not state (unit, times). The reader then asks the user for it.
+4. Add one line to ``_TABLE`` of ``acquisition/recordings/identify.py``, or, in a separate package, an entry point in
    the group ``springmass.formats``.
-6. Add one ``Case`` to ``tests/conformance/test_formats.py``.
+5. Add one ``Case`` to ``tests/conformance/test_formats.py``.
 
 The logger of this template is invented. Each line is the number of the sample and its height in millimetres::
 
@@ -21,32 +19,28 @@ The logger of this template is invented. Each line is the number of the sample a
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
-from acquisition.errors import FormatError
-from acquisition.recordings.tables.contents import Channel, Contents, Formula, Sheet
-from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import head_lines, text_of
+from acquisition.recordings.tables.dialect import Header, text_format
+from acquisition.recordings.tables.headings import Heading
+from acquisition.recordings.tables.table import Formula
 
-__all__ = ["FORMAT"]
-
-_TITLE = re.compile(r"Height log, (\d+(?:\.\d+)?) Hz")  # change: a title that only your files have
+_TITLE = re.compile(r"Height log, (\d*[1-9]\d*) Hz")  # change: a title that only your files have
 
 
-def _evidence(head: bytes) -> str:
-    first = head_lines(head)[0]
-    return f'line 1 is the title "{first}"' if _TITLE.fullmatch(first) else ""
+def header(lines: Sequence[str]) -> Header | None:
+    """Read the title."""
+    title = _TITLE.fullmatch(lines[0])
+    if title is None:
+        return None
+    return Header(
+        why=f'line 1 is the title "{lines[0]}"',
+        lines=1,
+        delimiter=";",
+        headings=[Heading("n", role="ignored"), Heading("height", "mm")],  # change: one for each column
+        formula=Formula(start_s=0.0, step_s=1 / float(title[1])),  # change: leave out if a column contains the times
+        title=lines[0],
+    )
 
 
-def _contents(path: str, data: bytes) -> Contents:
-    text = text_of(path, data)
-    first = next(text.lines(), None)
-    title = _TITLE.fullmatch(first.text) if first else None
-    if first is None or title is None or not float(title[1]) > 0:
-        raise FormatError(path, "expected the title of a height log", "export the run again", line=1)
-    rows = Sheet(text, start=first.next, stop=text.stop, first_line=2, delimiter=";")
-    # change: a channel for each column except the times. If a column contains times: time=COLUMN, time_unit="s".
-    height = Channel("height", "mm", rows, column=1, formula=Formula(start_s=0.0, step_s=1 / float(title[1])))
-    return Contents((height,), title=first.text, zeros=text.zeros)
-
-
-FORMAT = ColumnFormat("example", "height log: number;millimetres (a template)", _evidence, _contents)
+FORMAT = text_format("example", "height log: number;millimetres (a template)", header)

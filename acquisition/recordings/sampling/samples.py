@@ -60,8 +60,6 @@ class Rows:
         The first cell of the last row.
     decimals : int
         Number of printed decimals of a time.
-    behind : tuple of (n,) float64
-        The columns after the value, in a sheet whose rows have a fixed width.
     """
 
     printed: F8 | None
@@ -75,7 +73,6 @@ class Rows:
     cut: bool = False
     last_cell: str = ""
     decimals: int = 0
-    behind: tuple[F8, ...] = ()
 
     @property
     def numbers(self) -> I8:

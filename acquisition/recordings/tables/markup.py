@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError
-from acquisition.recordings.tables.contents import Arrays, Channel
-from acquisition.recordings.tables.text import decode
+from acquisition.recordings.tables.cells import parse_number
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.headings import Heading
+from acquisition.recordings.tables.table import Column, Table, side_by_side
+from acquisition.recordings.tables.text import HEAD_BYTES, decode
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
-
-__all__ = ["MOST_BYTES", "read_markup", "side_by_side"]
 
 MOST_BYTES = 1 << 26
 """Maximum size of XML, bytes. Files of school programs are smaller; parsing takes about twenty times the memory."""
 
 
 def read_markup(path: str, data: bytes, remedy: str) -> Element:
-    """Return the root of an XML file.
-
-    Raises
-    ------
-    FormatError
-        If the file is not XML, is too long, or has a document type, which may name other files or expand without limit.
-    """
+    """Return the root of an XML file without a document type, which may name other files or expand without limit."""
     from xml.etree import ElementTree
 
     if not data.lstrip(b"\xef\xbb\xbf \r\n").startswith(b"<?xml"):
@@ -44,28 +40,23 @@ def read_markup(path: str, data: bytes, remedy: str) -> Element:
         raise FormatError(path, f"expected XML, got {error}", remedy) from error
 
 
-def side_by_side(columns: Sequence[tuple[str, str, F8]], times: Sequence[int], run: str = "") -> list[Channel]:
-    """Return the channels of columns that have been read: each gets the times to its left, or else the first times.
-
-    Parameters
-    ----------
-    columns : sequence of (str, str, (n,) float64)
-        Name, unit and numbers of each column. The lengths may differ; shorter ones are filled with NaN.
-    times : sequence of int
-        Indices of the columns that are times.
-    run : str
-    """
-    channels = []
-    for column, (name, unit, values) in enumerate(columns):
-        if column in times:
-            continue
-        time = max((each for each in times if each < column), default=times[0] if times else None)
-        time_name, time_unit, t = ("", "", None) if time is None else columns[time]
-        size = max(values.size, 0 if t is None else t.size)
-        source = Arrays(None if t is None else _longer(t, size), _longer(values, size), time_name)
-        channels.append(Channel(name, unit, source, run, time_unit=time_unit))
-    return channels
+def with_markup(
+    text: ColumnFormat, evidence: Callable[[bytes], str], tables: Callable[[str, bytes], Sequence[Table]]
+) -> ColumnFormat:
+    """Return a format of text whose programs also save markup, which has separate evidence and tables."""
+    return replace(
+        text,
+        evidence=lambda head: evidence(head) or text.evidence(head),
+        tables=lambda path, data: (tables if evidence(data[:HEAD_BYTES]) else text.tables)(path, data),
+    )
 
 
-def _longer(values: F8, size: int) -> F8:
-    return np.concatenate((values, np.full(size - values.size, np.nan)))
+def numbers(cells: Iterable[str]) -> F8:
+    """Return the numbers in cells; NaN for cells that are not numbers."""
+    return np.array([np.nan if x is None else x for x in (parse_number(cell.strip()) for cell in cells)], np.float64)
+
+
+def tables_of_markup(columns: Sequence[tuple[Heading, F8]], run: str = "") -> list[Table]:
+    """Return the tables of columns that have been read; shorter ones end in NaN."""
+    read = [Column(each.name, each.unit, values) for each, values in columns]
+    return side_by_side(read, [each for each, _ in columns], run=run)

@@ -8,11 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from acquisition.block import F8
-from acquisition.recordings.tables.contents import Heading, is_time, is_uncertainty
-from acquisition.recordings.tables.text import parse_number
+from acquisition.recordings.tables.cells import parse_number
+from acquisition.recordings.tables.headings import Heading, is_time, is_uncertainty
 from acquisition.recordings.units import time_power
-
-__all__ = ["are_row_numbers", "columns_of", "is_aside", "runs_forward", "times_by_name", "times_by_steps"]
 
 _NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
@@ -53,16 +51,7 @@ def _is_even(column: F8) -> bool:
 
 
 def is_aside(heading: Heading, column: F8, others: bool) -> bool:
-    """Return whether a column is auxiliary: row numbers, an uncertainty, or nearly empty.
-
-    Parameters
-    ----------
-    heading : Heading
-    column : (n,) float64
-        Its first rows.
-    others : bool
-        Whether other columns may be the times.
-    """
+    """Return whether a column is auxiliary: row numbers (if ``others`` may be the times), uncertain, or nearly empty."""
     name = " ".join(heading.name.lower().replace("_", " ").split())
     index = others and are_row_numbers(column) and (name in _INDEX or bool(_NUMBERED.fullmatch(name)))
     return index or is_uncertainty(name) or bool(np.mean(np.isfinite(column)) < _SPARSE)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from acquisition.block import F8
+from acquisition.errors import FormatError
 from acquisition.recordings.families.motion_sensor.layout import Layout, find_layout, no_column_line
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.samples import value_traps
 from acquisition.recordings.sampling.timing import check_rate
 from acquisition.recordings.sampling.velocity import find_tick
-from acquisition.recordings.tables.channel import ChannelSamples, read_rows, to_samples
-from acquisition.recordings.tables.contents import Channel
+from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
+from acquisition.recordings.tables.channel import Samples, read_samples
+from acquisition.recordings.tables.rows import read_rows
+from acquisition.recordings.tables.table import Table
 from acquisition.recordings.tables.text import says_simulated, text_of
 from acquisition.recordings.units import LENGTHS
-
-__all__ = ["Column", "read_column"]
 
 _CONSTANT = 0.95
 
@@ -43,7 +44,7 @@ class Column:
     path: str
     data: bytes
     layout: Layout
-    samples: ChannelSamples
+    samples: Samples
     quantum: float
     stated_error_m: float | None
     traps: tuple[Trap, ...]
@@ -67,31 +68,41 @@ def read_column(path: str, data: bytes, channel: str | None, rate_hz: float | No
     """Read one file; for arguments and errors see :class:`acquisition.recordings.base.Format`."""
     check_rate(path, rate_hz)
     text = text_of(path, data)
-    layout, sheet = find_layout(path, text, channel, unit)
-    quantity, is_velocity = layout.quantity, layout.quantity == "velocity"
-    power = LENGTHS[layout.unit]
-    described = Channel(quantity, layout.unit, sheet, column=1, time=0, time_unit="s", difference=is_velocity)
-    samples = to_samples(path, described, read_rows(path, described, power), rate_hz, text.zeros)
-    traps = []
+    layout, first, delimiter = find_layout(path, text, channel, unit)
+    quantity, power = layout.quantity, LENGTHS[layout.unit]
+    read, lines, traps = read_rows(path, text, first, delimiter)
+    columns = [each.of_size(lines.rows) for each in read]
+    if len(columns) < layout.columns:
+        raise FormatError(
+            path, f"expected rows of {layout.columns} numbers, got none", "check the file", line=first.number
+        )
+    # Every cell of a row must be a number, and nothing may follow them.
+    forms = [each.decimals for each in columns if each.decimals is not None]
+    damaged = np.any([form <= EMPTY for form in forms[: layout.columns]], axis=0)
+    damaged |= np.any([form != EMPTY for form in forms[layout.columns :]], axis=0)
+    value = replace(columns[1], name=quantity, unit=layout.unit, decimals=np.where(damaged, UNREAD, forms[1]))
+    lines = replace(lines, cut=not lines.ended and bool(damaged[-1:].any()))
+    table = Table((value,), times=replace(columns[0], unit="s"), lines=lines)
+    samples = read_samples(path, table, value, power, rate_hz, difference=quantity == "velocity")
+    found = list(traps)
     if layout.assumed:
         message = f"no column line: read as time (s) and {layout.assumed}, in {layout.unit}"
-        traps.append(Trap("unit_assumed", message))
-    traps.extend(samples.traps)
+        found.append(Trap("unit_assumed", message))
+    found.extend(samples.traps)
     stated = None
-    if samples.behind:
-        stated, constant = _usual(samples.behind[0])
+    if layout.columns == 3:
+        stated, constant = _usual(scaled(columns[2].values, columns[2].decimals, power)[samples.sound])
         if constant and stated is not None:
-            message = (
-                f"the error column is a constant {stated / 10.0**power:g} {layout.unit}: a stated value, not the noise"
-            )
-            traps.append(Trap("stated_error_is_not_noise", message))
+            size = f"{stated / 10.0**power:g} {layout.unit}"
+            message = f"the error column is a constant {size}: a stated value, not the noise"
+            found.append(Trap("stated_error_is_not_noise", message))
         elif stated is not None and layout.assumed:
-            raise no_column_line(path, "three columns that all vary", sheet.first_line)
+            raise no_column_line(path, "three columns that all vary", first.number)
     quantum = samples.resolution
-    if not is_velocity:
-        quantum, value_traps_found = value_traps(samples.value, samples.flags, samples.resolution, samples.line)
-        traps.extend(value_traps_found)
-    return Column(path, data, layout, samples, quantum, stated, tuple(traps))
+    if quantity == "distance":
+        quantum, seen = value_traps(samples.value, samples.flags, samples.resolution, samples.line)
+        found.extend(seen)
+    return Column(path, data, layout, samples, quantum, stated, tuple(found))
 
 
 def _usual(stated: F8) -> tuple[float | None, bool]:

@@ -9,11 +9,10 @@ from typing import Literal, NamedTuple
 
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.questions import Missing, MissingItem, Question
-from acquisition.recordings.tables.contents import Sheet, is_time, name_and_unit
-from acquisition.recordings.tables.text import Text, guess_delimiter, parse_number, split_cells
+from acquisition.recordings.tables.cells import parse_number
+from acquisition.recordings.tables.headings import guess_delimiter, is_time, name_and_unit, split_cells
+from acquisition.recordings.tables.text import Line, Text
 from acquisition.recordings.units import LENGTHS
-
-__all__ = ["Layout", "Quantity", "evidence", "find_layout", "no_column_line"]
 
 Quantity = Literal["distance", "velocity"]
 
@@ -30,16 +29,8 @@ _REMEDY = 'put the column line "Time (s)<TAB>Distance (cm)" or "Time (s)<TAB>Vel
 class Layout(NamedTuple):
     """The title of a file and the meaning of its columns.
 
-    Parameters
-    ----------
-    quantity : {"distance", "velocity"}
-    columns : int
-        Number of cells in a row: time, the quantity, and, if there are three, the error.
-    unit : str
-        The unit of length; "cm" also for velocities in cm/s.
-    assumed : str
-        If there is no column line, the meaning that the shape of the rows or the user indicates; else empty.
-    title : str
+    A row has ``columns`` cells: time, the quantity, and, if there are three, its error. ``unit`` is a length, "cm" also
+    for velocities in cm/s. ``assumed`` is the meaning that the rows or the user indicate if there is no column line.
     """
 
     quantity: Quantity
@@ -61,16 +52,8 @@ def evidence(lines: Sequence[str]) -> str:
     return f"the rows have the shape of {shape.assumed}" if shape else ""
 
 
-def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> tuple[Layout, Sheet]:
-    """Return the meaning and the location of the rows.
-
-    Raises
-    ------
-    NeedsAnswer
-        If there is no column line above two columns, and the rows do not show their meaning.
-    FormatError
-        If there are no rows, the columns are different, or ``channel`` or ``unit`` contradict the file.
-    """
+def find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> tuple[Layout, Line, str]:
+    """Return the meaning of the rows, the first row, and the separator of cells; ask for the meaning if it is open."""
     head = text.head(_HEADER_LINES + _ROWS_BELOW)
     lines = [line.text for line in head]
     if channel is not None and channel.lower() not in _CHANNELS:
@@ -103,8 +86,7 @@ def find_layout(path: str, text: Text, channel: str | None, unit: str | None) ->
     if not rows:
         raise _no_rows(path, lines, "rows of numbers below the column line")
     delimiter = next((guess_delimiter(row) for row in rows if _is_row(row)), guess_delimiter(rows[0]))
-    sheet = Sheet(text, head[start].start, text.stop, start + 1, delimiter, layout.columns)
-    return layout._replace(title=title), sheet
+    return layout._replace(title=title), head[start], delimiter
 
 
 def no_column_line(path: str, got: str, line: int | None = None) -> FormatError:

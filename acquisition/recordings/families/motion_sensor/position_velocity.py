@@ -21,17 +21,15 @@ from acquisition.block import I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.families.motion_sensor.column import Column, read_column
 from acquisition.recordings.families.motion_sensor.layout import evidence, no_column_line
-from acquisition.recordings.inspection import Survey
+from acquisition.recordings.base import Survey
 from acquisition.recordings.questions import Missing
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.nominal import time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.recordings.sampling.velocity import find_quantum, integrate, outer_join
-from acquisition.recordings.tables.channel import ChannelSamples
+from acquisition.recordings.tables.channel import Samples
 from acquisition.recordings.tables.text import head_lines
 from acquisition.source import SourceInfo
-
-__all__ = ["FORMAT", "MotionSensor"]
 
 
 class MotionSensor:
@@ -203,7 +201,7 @@ def _velocity_traps(velocity: Column) -> Iterable[Trap]:
             yield Trap(trap.code, f"in {velocity.name}: {trap.message}", trap.count, trap.line)
 
 
-def _join_traps(p: ChannelSamples, v: ChannelSamples, from_p: I8, from_v: I8) -> Iterable[Trap]:
+def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterable[Trap]:
     alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
     if alone_v:
         message = f"{alone_v} times are only in the velocity file, so they have no distance"

@@ -1,38 +1,33 @@
 """Workbooks, xlsx and xls (python-calamine): every sheet with rows of numbers is a run.
 
-The cells of a sheet are passed to the readers of text, with one line per row and one tab between cells. Three things
-differ from text:
-
-- Cells are binary numbers without printed decimals. Each column is printed with as many decimals as its longest number
-  needs for the fifteen digits that a workbook shows, so that no number looks incomplete.
-- Times of day and dates are separate types of cells.
-- A file of a few bytes can make calamine reserve any amount of memory, and crash its process if there is not enough.
-  The file may state any size, have one cell in the last row and column, or share one long string among many cells. So
-  stated sizes are checked first, and calamine runs in a child process with limits of time and memory.
+Cells are binary numbers without printed decimals; a column has as many decimals as its longest number needs for the
+fifteen digits that a workbook shows. Times of day and dates are separate types of cells. A file of a few bytes can make
+calamine reserve any amount of memory, and crash its process if there is not enough, so calamine runs in a child process
+with limits of time and memory.
 """
 
 from __future__ import annotations
 
-import re
-import struct
+import json
+import subprocess
 import sys
-from itertools import islice
+from collections.abc import Callable
+from functools import partial
 
 from acquisition.errors import FormatError
 from acquisition.recordings.families.workbook import child
 from acquisition.recordings.foreign import foreign_format
-from acquisition.recordings.parts import contents_of_parts, members
-from acquisition.recordings.tables.contents import Contents
-from acquisition.recordings.tables.sheet import ColumnFormat
-
-__all__ = ["FORMAT"]
+from acquisition.recordings.identify import formats
+from acquisition.recordings.parts import tables_of_parts
+from acquisition.recordings.tables.dialect import tables_of_text
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.rows import Sheet
+from acquisition.recordings.tables.table import Table
 
 MOST_BYTES = 1 << 27
-"""Maximum size of an xls, or of an unpacked xlsx, bytes: a million rows of three columns take 120 MB."""
-MOST_CELLS = 1 << 23
-"""Maximum number of cells that the sheets may state: eight full columns of an xlsx."""
+"""Maximum size of a workbook, bytes."""
 MOST_LETTERS = 1 << 27
-"""Maximum number of characters of all cells as text: a million rows of three columns take 22 million."""
+"""Maximum number of characters of all cells, a number counting as eight: a million rows of three columns take 24 million."""
 MEMORY_BYTES = 1 << 30
 """Memory limit of the child process, bytes: a million rows of three columns take 600 MB."""
 TIME_LIMIT_S = 60.0
@@ -41,14 +36,7 @@ TIME_LIMIT_S = 60.0
 _ZIP = b"PK\x03\x04"
 _OLE = bytes.fromhex("d0cf11e0a1b11ae1")
 _REMEDY = "export the sheet as CSV"
-_SHEET = re.compile(r"xl/worksheets/[^/]*\.xml", re.IGNORECASE)
-_HEAD_BYTES = 1 << 14  # a sheet states its dimension in its second element
-_CORNER = rb"\$?([A-Z]{1,9})\$?(\d{1,9})"
-_DIMENSION = re.compile(rb'<(?:\w+:)?dimension\b[^>]*?\bref="' + _CORNER + rb"(?::" + _CORNER + rb')?"')
-# The first record of a worksheet in an xls: its kind BOF, its length, the version (BIFF5 or BIFF8) and "worksheet".
-_WORKSHEET = re.compile(rb"\x09\x08[\x08\x10]\x00\x00[\x05\x06]\x10\x00")
-_DIMENSIONS, _SIZES = 0x200, {10: "<4H", 14: "<IIHH"}
-_MOST_SHEETS, _MOST_RECORDS = 256, 512  # maximum number of sheets, and of records per sheet, to search
+_HEAD_LINES = 300
 
 
 def _evidence(head: bytes) -> str:
@@ -58,63 +46,21 @@ def _evidence(head: bytes) -> str:
     return "it is a zip archive with the parts of an xlsx" if head.startswith(_ZIP) and sheets else ""
 
 
-def _contents(path: str, data: bytes) -> Contents:
-    cells = _cells_of_xlsx(path, data) if data.startswith(_ZIP) else _cells_of_xls(path, data)
-    if cells > MOST_CELLS:
-        raise FormatError(path, f"expected sheets of at most {MOST_CELLS} cells, got {cells}", _REMEDY)
-    return contents_of_parts(path, _sheets(path, data), "sheet")
-
-
-def _cells_of_xlsx(path: str, data: bytes) -> int:
-    """Return the number of cells that the sheets of an xlsx state; only the heads of the sheets are unpacked."""
-    heads = [head for name, head in members(path, data, MOST_BYTES, _HEAD_BYTES) if _SHEET.fullmatch(name)]
-    if not heads:
-        problem = "expected the sheets of an xlsx workbook, got none"
-        raise FormatError(path, problem, "save it as xlsx or CSV in the program that made it")
-    cells = 0
-    for stated in filter(None, map(_DIMENSION.search, heads)):
-        left, top, right, bottom = stated.groups()
-        if right is not None:
-            cells += max(0, int(bottom) - int(top) + 1) * max(0, _number(right) - _number(left) + 1)
-    return cells
-
-
-def _number(letters: bytes) -> int:
-    """Return the number of a column from its letters; A is 1."""
-    number = 0
-    for letter in letters:
-        number = 26 * number + letter - 64
-    return number
-
-
-def _cells_of_xls(path: str, data: bytes) -> int:
-    """Return the number of cells that the sheets of an xls state (MS-XLS 2.4.90).
-
-    A file may store its records in pieces and out of order. If a size is missed for this reason, only the limits of
-    the child process apply.
-    """
+def _tables(path: str, data: bytes) -> list[Table]:
     if len(data) > MOST_BYTES:
         raise FormatError(path, f"expected a workbook of at most {MOST_BYTES} bytes, got {len(data)}", _REMEDY)
-    cells = 0
-    for worksheet in islice(_WORKSHEET.finditer(data), _MOST_SHEETS):
-        at = worksheet.start()
-        for _ in range(_MOST_RECORDS):
-            if at + 18 > len(data):
-                break
-            kind, length = struct.unpack_from("<HH", data, at)
-            if kind == _DIMENSIONS and length in _SIZES:
-                top, bottom, left, right = struct.unpack_from(_SIZES[length], data, at + 4)
-                cells += max(0, bottom - top) * max(0, right - left)
-                break
-            at += 4 + length
-    return cells
+    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.header is not None]
+
+    def reader(name: str, sheet: Sheet) -> Callable[[], list[Table]] | None:
+        lines = [line.text for line in sheet.head(_HEAD_LINES)]
+        header = next((each.header for each in families if lines and each.header and each.header(lines)), None)
+        return None if header is None else partial(tables_of_text, f"{path}, sheet {name}", sheet, header, "rows")
+
+    return tables_of_parts(path, ((name, reader(name, sheet)) for name, sheet in _sheets(path, data)), "sheet")
 
 
-def _sheets(path: str, data: bytes) -> list[tuple[str, bytes]]:
-    """Return the name and the text of every sheet, as read by the child process."""
-    import json
-    import subprocess
-
+def _sheets(path: str, data: bytes) -> list[tuple[str, Sheet]]:
+    """Return the name and the cells of every sheet, as read by the child process."""
     # With -P the folder of the script is not searched for modules. subprocess also works inside a worker of a pool.
     command = [sys.executable, "-P", child.__file__, str(MEMORY_BYTES), str(MOST_LETTERS)]
     try:
@@ -133,9 +79,9 @@ def _sheets(path: str, data: bytes) -> list[tuple[str, bytes]]:
         raise foreign_format(path, b"") or FormatError(
             path, f"calamine cannot read it ({answer['refused'][:200]})", _REMEDY
         )
-    return [(name, text.encode()) for name, text in answer["sheets"]]
+    return [(name, Sheet(tuple(map(tuple, columns)))) for name, columns in answer["sheets"]]
 
 
 FORMAT = ColumnFormat(
-    "workbook", "workbook, xlsx or xls: every sheet with rows of numbers is a run", _evidence, _contents
+    "workbook", "workbook, xlsx or xls: every sheet with rows of numbers is a run", _evidence, _tables
 )
