@@ -56,8 +56,6 @@ class Inspection:
 def formats() -> tuple[Format, ...]:
     """Return all formats, from the user's declarations, this package and other packages.
 
-    Examples
-    --------
     >>> "motion-sensor" in [each.name for each in formats()]
     True
     """
@@ -79,13 +77,7 @@ def get_format(name: str) -> Format:
 
 
 def sniff(path: str | os.PathLike[str]) -> str:
-    """Return the name of a file's format, identified by its first bytes.
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be opened, or no format recognises it.
-    """
+    """Return the name of a file's format, identified by its first bytes."""
     return _recognise(os.fspath(path), read_head(path)).name
 
 
@@ -101,26 +93,11 @@ def open_recording(
     time_unit: str | None = None,
     velocity_path: str | os.PathLike[str] | None = None,
 ) -> Recording:
-    """Read a recording of another program.
+    """Read a recording of another program; if anything is missing or faulty, the error says so in one line.
 
-    Parameters
-    ----------
-    path : path
-    format : str, optional
-        Name of the format; by default it is identified by content.
-    channel, rate_hz, unit, run, time, time_unit : optional
-        Information that the file does not state or leaves open; see :meth:`springmass.extend.Format.read`.
-    velocity_path : path, optional
-        The velocity file that belongs to the position file; the two are joined by time.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    FormatError
-        If the file is faulty; the message is one line for the user.
+    By default the format is identified by content. ``channel``, ``rate_hz``, ``unit``, ``run``, ``time`` and ``time_unit``
+    are what the file does not state or leaves open; see :meth:`springmass.extend.Format.read`. A velocity file is joined
+    with the position file by time.
     """
     name = os.fspath(path)
     reader = get_format(format) if format else _recognise(name, read_head(path))

@@ -11,8 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-__all__ = ["Missing", "MissingItem", "Question", "Times"]
-
 
 class Missing(StrEnum):
     """The kinds of missing items. The value is the keyword argument of ``open_recording`` that gives the answer."""
@@ -75,15 +73,7 @@ class MissingItem:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """The range of the times of a channel, in the file's unit.
-
-    Parameters
-    ----------
-    name : str
-    first, last : float
-    step : float
-        Median of the first time steps.
-    """
+    """The range of the times of a channel, in the file's unit; ``step`` is the median of the first time steps."""
 
     name: str
     first: float

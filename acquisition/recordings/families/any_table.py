@@ -30,7 +30,7 @@ from acquisition.recordings.tables.text import Text, decode, unify
 from acquisition.recordings.units import measure_of, time_power
 
 _MONITOR = re.compile(
-    r"\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:\s*->\s*|\]\s*)"
+    r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*", re.MULTILINE
 )
 _FEWEST, _SHARE = 3, 0.8
 
@@ -143,15 +143,14 @@ def without_monitor(text: Text) -> Text:
     """
     if not _MONITOR.search(decode(text.data[text.start : min(text.start + (1 << 16), text.stop)])):
         return text
-    lines = unify(decode(text.data[text.start : text.stop])).split("\n")
-    found = [_MONITOR.match(line) for line in lines]
-    if sum(each is not None for each in found) < max(_FEWEST, _SHARE * sum(bool(line.strip()) for line in lines)):
+    lines = unify(decode(text.data[text.start : text.stop]))
+    found = len(_MONITOR.findall(lines))
+    if found < max(_FEWEST, _SHARE * len(re.findall(r"^.*\S", lines, re.MULTILINE))):
         return text
-    messages = [line[each.end() :] if each else line for line, each in zip(lines, found, strict=True)]
-    marks = Counter(next((mark for mark in "\t;," if mark in each), " ") for each in messages if each.strip())
+    messages = [line for line in _MONITOR.sub("", lines[: 1 << 16]).split("\n") if line.strip()]
+    marks = Counter(next((mark for mark in "\t;," if mark in line), " ") for line in messages)
     mark = marks.most_common(1)[0][0] if marks else " "
-    rows = (f"{each[1]}{mark}{line}" if each else line for line, each in zip(messages, found, strict=True))
-    return Text.of("\n".join(rows).encode())
+    return Text.of(_MONITOR.sub(rf"\1{mark}", lines).encode())
 
 
 FORMAT = text_format(

@@ -9,8 +9,6 @@ import numpy as np
 from acquisition.block import F8, I8
 from acquisition.recordings.sampling.nominal import median
 
-__all__ = ["Bursts", "find_bursts"]
-
 _FEWEST = 20  # minimum number of bursts for which their interval can be determined
 _SHORT = 0.25  # maximum step within a burst, relative to the mean step
 _CLEAR = 0.95  # minimum share of steps that are clearly within a burst or between two bursts
@@ -19,19 +17,10 @@ _SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; t
 
 
 class Bursts(NamedTuple):
-    """Properties of samples that were stamped in bursts.
+    """Samples that were stamped in bursts of ``size`` on average, one every ``interval_s``.
 
-    Parameters
-    ----------
-    size : float
-        Samples per burst, on average.
-    interval_s : float
-        Interval from one burst to the next, s.
-    step_s, first_s : float
-        Interval between the samples if they are spread evenly, and the time of the first sample, s.
-    complete : bool
-        Whether the last stamp of every burst lies within one interval of its evenly spaced time. Otherwise samples are
-        missing somewhere.
+    Spread evenly, they are ``step_s`` apart and begin at ``first_s``. They are ``complete`` if the last stamp of every burst
+    lies within one interval of its evenly spaced time; otherwise samples are missing somewhere.
     """
 
     size: float
@@ -42,23 +31,11 @@ class Bursts(NamedTuple):
 
 
 def find_bursts(t: F8) -> Bursts | None:
-    """Find bursts in the times of a recording.
+    """Find bursts in the printed times of a recording (s); None for times that do not come in regular bursts.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        Times as printed.
-
-    Returns
-    -------
-    Bursts or None
-        None for times that do not come in regular bursts.
-
-    Notes
-    -----
-    A computer that polls a sensor, or gets its samples in packets, stamps each sample when it arrives. The stamps of
-    one packet lie close together and contain no information on when its samples were taken. The stamps of the last
-    samples of the packets do: a straight line fitted to them against the row numbers gives the rate and the start.
+    A computer that polls a sensor, or gets its samples in packets, stamps each sample when it arrives. The stamps of one
+    packet lie close together and contain no information on when its samples were taken. The stamps of the last samples of
+    the packets do: a straight line fitted to them against the row numbers gives the rate and the start.
     """
     if t.size < 2 * _FEWEST or not np.isfinite(t).all():
         return None

@@ -8,22 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import F8, I8, U8, Flag
+from acquisition.block import B1, F8, I8, U8, Flag
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.nominal import median, place_unread, snap, time_flags
 from acquisition.recordings.sampling.timing import Timing
-
-__all__ = [
-    "IRREGULAR",
-    "UNREAD_FLAGS",
-    "Rows",
-    "flags_of",
-    "place",
-    "row_traps",
-    "sample_traps",
-    "value_traps",
-    "within",
-]
 
 IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
@@ -38,34 +26,19 @@ _ZEROS = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """The rows of one channel, before they become samples.
+    """The rows of one channel, before they become samples; every array has one element for each row.
 
-    Parameters
-    ----------
-    printed : (n,) float64, s, or None
-        Times as printed; None if there are no times.
-    value : (n,) float64
-        Values in the channel's unit, multiplied by the wanted power of ten; NaN if unread or absent.
-    unread, remark : (n,) bool
-        Masks of the rows that could not be read, and of remarks: rows of text between samples, which are not samples.
-    line : callable
-        Returns the one-based line number of a row.
-    time_resolution, resolution : float
-        Size of the last printed digit of a time (s) and of a value; the latter is 0 for binary values.
-    tolerance : (n,) float64, s, or None
-        Half the last printed digit of each time, if the times are compared with a formula in the header.
-    cut : bool
-        Whether the last row is incomplete.
-    last_cell : str
-        The first cell of the last row.
-    decimals : int
-        Number of printed decimals of a time.
+    ``printed`` are the times as printed, s, or None; ``value`` the values in SI or a power of ten of it, NaN if unread or
+    absent. ``remark`` marks rows of text between samples, which are not samples. ``time_resolution`` (s) and ``resolution``
+    are the last printed digits, the latter 0 for binary values. ``tolerance`` is half the last digit of each time, if the
+    times are compared with a formula in the header. ``cut`` says that the last row is incomplete, ``last_cell`` is its
+    first cell, and ``decimals`` the number of printed decimals of a time.
     """
 
     printed: F8 | None
     value: F8
-    unread: NDArray[np.bool_]
-    remark: NDArray[np.bool_]
+    unread: B1
+    remark: B1
     line: Callable[[int], int]
     time_resolution: float
     resolution: float
@@ -96,16 +69,10 @@ def place(rows: Rows, timing: Timing) -> F8:
         return t if grid is None else snap(t, grid, timing.resolution_s, out=t)[0]
     if grid is not None:
         t[~unread] = snap(t[~unread], grid, timing.resolution_s)[0]
-    expected = {unread.size - 1: rows.last_cell} if unread[-1] else {}
-    return place_unread(t, unread, grid, expected, rows.decimals)
+    return place_unread(t, unread, grid, rows.last_cell if unread[-1] else "", rows.decimals)
 
 
-def within(values: F8, limit: float) -> bool:
-    """Return whether there are values and all of them lie between -limit and limit; false if there is a NaN."""
-    return bool(values.size and values.min() > -limit and values.max() < limit)  # any comparison with NaN is false
-
-
-def flags_of(t: F8, value: F8, unread: NDArray[np.bool_], rate_hz: float) -> U8:
+def flags_of(t: F8, value: F8, unread: B1, rate_hz: float) -> U8:
     """Return the flags for faults in the times and values."""
     flags = time_flags(t, 1.0 / rate_hz)
     missing = np.isnan(value)
@@ -116,7 +83,7 @@ def flags_of(t: F8, value: F8, unread: NDArray[np.bool_], rate_hz: float) -> U8:
     return flags
 
 
-def row_traps(rows: Rows, timed: NDArray[np.bool_], zeros: int) -> Iterator[Trap]:
+def row_traps(rows: Rows, timed: B1, zeros: int) -> Iterator[Trap]:
     """Report the rows that could not be read; ``timed`` marks the rows with a time, which become samples."""
     if zeros:
         yield Trap("zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted")
@@ -140,11 +107,7 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
         return
     kinds = (
         ("duplicate_time", Flag.DUPLICATE_TIME, "samples have the same time as an earlier one"),
-        (
-            "non_monotonic_time",
-            Flag.NON_MONOTONIC_TIME,
-            "samples have times that run backward or ahead of their neighbours",
-        ),
+        ("non_monotonic_time", Flag.NON_MONOTONIC_TIME, "samples have times that run backward or ahead of their neighbours"),
         ("missing_samples", Flag.MISSING, "samples have no value"),
     )
     for code, flag, what in kinds:
@@ -165,22 +128,9 @@ def value_traps(
 ) -> tuple[float, tuple[Trap, ...]]:
     """Find zeros that fill the end, a lost target, and distances rounded more coarsely than printed.
 
-    Parameters
-    ----------
-    distance : (n,) float64, m
-        Zeros that fill the end are replaced by NaN in place.
-    flags : (n,) uint8
-        In place, samples of a lost target get FALSE_ECHO, and zeros that fill the end get MISSING.
-    resolution : float
-        Size of the last printed digit, m.
-    line : callable
-    length : bool
-        Whether these are distances. Voltages have no lost target, and 0 V is a normal reading.
-
-    Returns
-    -------
-    quantum_m : float
-    traps : tuple of Trap
+    Zeros that fill the end become NaN and MISSING, and samples of a lost target FALSE_ECHO, in place. ``resolution`` is the
+    last printed digit. If the values are no lengths, there is no lost target, and zero is a normal reading. Return the step
+    of which all values are multiples, and the remarks.
     """
     traps = []
     if length and (tail := _zero_tail(distance)) < distance.size:

@@ -16,32 +16,16 @@ from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.bursts import Bursts, find_bursts
 from acquisition.recordings.sampling.nominal import Grid, find_rate
 
-__all__ = ["Timing", "check_rate", "clock_traps", "rate_needed", "time_by_column", "time_by_formula", "time_by_rate"]
-
 _SHARE_OF_JITTER = 0.2
 _ANY_RATE_HZ = 100.0  # an example: the rate of many sensors
 
 
 class Timing(NamedTuple):
-    """Rate and grid of a file's times.
+    """Rate and grid of a file's times; no grid if the times fit none and are used as printed.
 
-    Parameters
-    ----------
-    rate_hz : float
-    grid : Grid or None
-        None if the times fit no grid and are used as printed.
-    resolution_s : float
-        Size of the last printed digit, s.
-    certain : bool
-        Whether the times or a header determine the rate.
-    given : bool
-        Whether the user gave the rate and the file does not confirm it.
-    steps_s : (float, float) or None
-        Range of the time steps (5th to 95th percentile) if the times fit no grid but jitter little about one step.
-    by_row : bool
-        Whether times computed from row numbers are better than the printed times.
-    bursts : Bursts or None
-        The bursts in the computer's times, if evenly spaced times replace them.
+    The rate is ``certain`` if the times or a header determine it, and ``given`` if the user gave it. ``steps_s`` is the range
+    of the time steps (5th to 95th percentile) if the times fit no grid but jitter little about one step. ``by_row`` says
+    that times computed from row numbers are better than the printed times.
     """
 
     rate_hz: float
@@ -61,26 +45,12 @@ def check_rate(path: str, rate_hz: float | None) -> None:
 
 
 def rate_needed(instead: MissingItem | None = None) -> MissingItem:
-    """Return the missing item that represents a rate.
-
-    Parameters
-    ----------
-    instead : MissingItem, optional
-        The missing item for a column of times, which could be given in place of the rate.
-    """
+    """Return the missing item for a rate; a column of times may be given instead."""
     return MissingItem(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
 
 
 def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
-    """Infer the rate from the printed times (s) of valid rows.
-
-    Raises
-    ------
-    NeedsAnswer
-        If no rate was given, and there are fewer than two different times, or bursts of times with missing samples.
-    FormatError
-        If the given rate contradicts the times.
-    """
+    """Infer the rate from the printed times (s) of valid rows; ask for it if they do not show it."""
     if (bursts := find_bursts(printed)) is not None:
         return _spread(path, bursts, resolution, rate_hz)
     rate = find_rate(printed, resolution, rate_hz=rate_hz)
@@ -129,19 +99,10 @@ def time_by_formula(
     numbers: I8,
     rate_hz: float | None,
 ) -> Timing | None:
-    """Use the times ``start_s + i step_s`` of a header, if the column of times agrees within its rounding.
+    """Use the times ``start_s + i step_s`` of a header, or None if they are impossible or the column of times disagrees.
 
-    Parameters
-    ----------
-    printed, tolerance : (n,) float64, s, or None
-        Printed times of the rows (NaN if unread) and half the last digit of each; None if there is no column of times.
-    numbers : (n,) int64
-        The index i of each row.
-
-    Returns
-    -------
-    Timing or None
-        None if the header and the column disagree, or if the times of the header are impossible.
+    ``printed`` are the times of the rows (NaN if unread), ``tolerance`` is half the last digit of each, and ``numbers`` is
+    the index i of each row.
     """
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
@@ -193,25 +154,3 @@ def clock_traps(timing: Timing) -> Iterator[Trap]:
             else "the times fit no regular grid and are used as printed"
         )
         yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the most likely one: {why}")
-
-
-def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int) -> F8:
-    """Return half the last printed digit of each time, s; for a time with an exponent, an estimate from its size.
-
-    The estimate is not too small if the mantissa is at least 1.
-
-    Parameters
-    ----------
-    printed : (n,) float64, s
-    form : (n,) int8
-        See :class:`acquisition.recordings.tables.table.Table`.
-    shift : int
-        Power of ten from the printed unit to seconds.
-    exponent : int
-        Constant that is added to the number of decimals in the form of a number with an exponent.
-    """
-    usual = int(form[0]) if form.size else 0
-    if 0 <= usual < exponent and (form == usual).all():
-        return np.broadcast_to(np.float64(0.5 * 10.0 ** (shift - usual)), form.size)
-    decimals = np.where(form < 0, 0.0, form % exponent)
-    return 0.5 * 10.0**-decimals * np.where(form >= exponent, np.abs(printed), 10.0**shift)

@@ -15,6 +15,7 @@ from acquisition.recordings.tables.table import Formula, Table, side_by_side
 from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
 
 _HEAD_LINES = 300
+_MOST_RUNS = 5000
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +116,9 @@ def tables_of_text(
         raise FormatError(path, f"expected {expected}", "export the run again", line=1)
     begins = [(head[0], found)]
     if blocks is not None and isinstance(text, Text):
-        begins += blocks(text, found)
+        begins += islice(blocks(text, found), _MOST_RUNS)
+    if len(begins) > _MOST_RUNS:
+        raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
     if len(begins) == 1:
         return _tables(path, text, head[0], replace(found, run=""), None)
     title = " / ".join([each.title for _, each in begins if each.title][:4])

@@ -15,10 +15,10 @@ from collections.abc import Callable
 from functools import partial
 
 from acquisition.errors import FormatError
-from acquisition.recordings.families.workbook import child
+from acquisition.recordings.families import workbook_child
 from acquisition.recordings.foreign import foreign_format
 from acquisition.recordings.identify import formats
-from acquisition.recordings.parts import tables_of_parts
+from acquisition.recordings.families.archive import tables_of_parts
 from acquisition.recordings.tables.dialect import tables_of_text
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.rows import Sheet
@@ -62,7 +62,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
 def _sheets(path: str, data: bytes) -> list[tuple[str, Sheet]]:
     """Return the name and the cells of every sheet, as read by the child process."""
     # With -P the folder of the script is not searched for modules. subprocess also works inside a worker of a pool.
-    command = [sys.executable, "-P", child.__file__, str(MEMORY_BYTES), str(MOST_LETTERS)]
+    command = [sys.executable, "-P", workbook_child.__file__, str(MEMORY_BYTES), str(MOST_LETTERS)]
     try:
         done = subprocess.run(command, input=data, capture_output=True, timeout=TIME_LIMIT_S, check=False)
     except subprocess.TimeoutExpired as error:
