@@ -6,14 +6,11 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from acquisition.errors import FormatError
 from acquisition.recordings.base import read_bytes
 from acquisition.recordings.identify import get_format, sniff
 from acquisition.recordings.tables.format import ColumnFormat
-from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
-from acquisition.recordings.tables.text import Text, is_text
-
-_FIRST_ROWS = 4
+from acquisition.recordings.tables.table import Table, names_apart
+from acquisition.recordings.tables.text import HEAD_BYTES, Text, is_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,10 +25,7 @@ class ColumnRole:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The rows of some runs: the number and text of each line above them, and their columns.
-
-    ``first_line`` is the line number of the first row; None for a file that is not text.
-    """
+    """The rows of some runs: the lines above them, the number of the first (None if it is no text), the columns."""
 
     runs: tuple[str, ...]
     above: tuple[tuple[int, str], ...]
@@ -40,54 +34,42 @@ class Explanation:
 
 
 def explain(path: str | os.PathLike[str]) -> tuple[str, str, tuple[Explanation, ...]]:
-    """Return the family of a file, the evidence for it, and its rows."""
+    """Return the family of a file, the evidence for it, and its rows; any table shows the columns of other formats."""
     name, family, data = os.fspath(path), sniff(path), read_bytes(path)
     reader = get_format(family)
-    # MotionSensor.vi uses pairs of files; each of them has columns like any table.
-    format_of_columns = reader if isinstance(reader, ColumnFormat) else get_format("table")
-    if not isinstance(format_of_columns, ColumnFormat):
-        raise FormatError(name, f"expected a format with columns, got {family}", "leave out the explanation of columns")
-    tables = names_apart(format_of_columns.tables(name, data))
-    why = getattr(reader, "evidence", format_of_columns.evidence)(data[:8192])
-    return family, why, tuple(_explained(tables, data))
+    columns = reader if isinstance(reader, ColumnFormat) else get_format("table")
+    tables = names_apart(columns.tables(name, data)) if isinstance(columns, ColumnFormat) else []
+    evidence = getattr(reader, "evidence", lambda _: "")
+    return family, evidence(data[:HEAD_BYTES]), tuple(_explained(tables, data))
 
 
 def _explained(tables: Sequence[Table], data: bytes) -> Iterator[Explanation]:
-    ended = 0
     by_rows: dict[int, list[Table]] = {}
     for each in tables:
         by_rows.setdefault(id(each.lines or each), []).append(each)
+    ended = 0
     for own in by_rows.values():
-        lines, above = own[0].lines, ()
+        lines, above = own[0].lines, []
         if lines is not None and is_text(data):
-            text = Text.of(data).lines()
-            above = tuple((each.number, each.text) for each in text if ended < each.number < lines.first)
-            above = tuple(each for each in above if each[1].strip())
+            above = [(line.number, line.text) for line in Text.of(data).lines() if ended < line.number < lines.first]
             ended = lines.line(lines.rows - 1)
         runs = tuple(dict.fromkeys(each.run for each in own))
-        yield Explanation(runs, above, lines and lines.first, tuple(_roles(own, lines)))
+        shown = tuple(each for each in above if each[1].strip())
+        yield Explanation(runs, shown, lines.first if lines else None, tuple(_roles(own)))
 
 
-def _roles(tables: Sequence[Table], lines: Lines | None) -> Iterator[ColumnRole]:
+def _roles(tables: Sequence[Table]) -> Iterator[ColumnRole]:
     channels = {id(column.values): (column, each) for each in tables for column in each.columns}
-    times = {id(each.times.values): each.times for each in tables if each.times is not None}
-    for at, column in enumerate(tables[0].beside or [*times.values(), *(each for each, _ in channels.values())]):
+    units = {id(each.times.values): each.times.unit for each in tables if each.times is not None}
+    lines = tables[0].lines
+    for at, column in enumerate(tables[0].beside or tables[0].columns):
         key = id(column.values)
-        cells = _cells(column) if lines is None else tuple(row[at] if at < len(row) else "" for row in lines.cells)
+        printed = [f"{value:.6g}" for value in column.values[:4]]
+        cells = printed if lines is None else [row[at] if at < len(row) else "" for row in lines.cells]
+        name, unit, meaning = column.name, units.get(key, ""), "time" if key in units else "ignored"
         if key in channels:
             own, table = channels[key]
-            yield ColumnRole(own.name, own.unit, _meaning(own, table), cells)
-        elif key in times:
-            yield ColumnRole(column.name, times[key].unit, "time", cells)
-        else:
-            yield ColumnRole(column.name, "", "ignored", cells)
-
-
-def _cells(column: Column) -> tuple[str, ...]:
-    return tuple(f"{value:.6g}" for value in column.values[:_FIRST_ROWS])
-
-
-def _meaning(column: Column, table: Table) -> str:
-    meaning = "read only if it is named" if column.aside else "channel"
-    formula = table.formula
-    return meaning if formula is None else f"{meaning}, times {formula.start_s:g} s + i * {formula.step_s:g} s"
+            name, unit, meaning = own.name, own.unit, "read only if it is named" if own.aside else "channel"
+            if table.formula is not None:
+                meaning += f", times {table.formula.start_s:g} s + i * {table.formula.step_s:g} s"
+        yield ColumnRole(name, unit, meaning, tuple(cells))

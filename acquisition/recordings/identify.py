@@ -1,8 +1,7 @@
 """The formats of recordings, and the identification of a file's format.
 
-The table contains only names; the module of a format is imported on demand. Another package adds a format with an
-entry point in the group ``springmass.formats`` that names an object like :class:`acquisition.recordings.base.Format`.
-A user can declare a format without code (:mod:`acquisition.recordings.families.declared`).
+The module of a format is imported on demand. Another package adds a format with an entry point in the group
+``springmass.formats``; a user can declare one without code (:mod:`acquisition.recordings.families.declared`).
 """
 
 from __future__ import annotations
@@ -95,9 +94,9 @@ def open_recording(
 ) -> Recording:
     """Read a recording of another program; if anything is missing or faulty, the error says so in one line.
 
-    By default the format is identified by content. ``channel``, ``rate_hz``, ``unit``, ``run``, ``time`` and ``time_unit``
-    are what the file does not state or leaves open; see :meth:`springmass.extend.Format.read`. A velocity file is joined
-    with the position file by time.
+    By default the format is identified by content. ``channel``, ``rate_hz``, ``unit``, ``run``, ``time`` and
+    ``time_unit`` are what the file does not state or leaves open; see :meth:`springmass.extend.Format.read`. A
+    velocity file is joined with the position file by time.
     """
     name = os.fspath(path)
     reader = get_format(format) if format else _recognise(name, read_head(path))

@@ -19,18 +19,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.tables.cells import parse_number
-from acquisition.recordings.tables.clock import clock_s
+from acquisition.recordings.tables.cells import clock_s, parse_number
 from acquisition.recordings.tables.dialect import Header, text_format
 from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading
 from acquisition.recordings.tables.layout import Layout, find_table
 from acquisition.recordings.tables.roles import are_row_numbers, columns_of, is_aside, times_by_name, times_by_steps
 from acquisition.recordings.tables.table import Formula
-from acquisition.recordings.tables.text import Text, decode, unify
+from acquisition.recordings.tables.text import Text, decode
 from acquisition.recordings.units import measure_of, time_power
 
 _MONITOR = re.compile(
-    r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*", re.MULTILINE
+    r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",
+    re.MULTILINE,
 )
 _FEWEST, _SHARE = 3, 0.8
 
@@ -143,7 +143,7 @@ def without_monitor(text: Text) -> Text:
     """
     if not _MONITOR.search(decode(text.data[text.start : min(text.start + (1 << 16), text.stop)])):
         return text
-    lines = unify(decode(text.data[text.start : text.stop]))
+    lines = decode(text.data[text.start : text.stop]).replace("\r\n", "\n").replace("\r", "\n")
     found = len(_MONITOR.findall(lines))
     if found < max(_FEWEST, _SHARE * len(re.findall(r"^.*\S", lines, re.MULTILINE))):
         return text

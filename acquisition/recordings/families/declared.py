@@ -54,13 +54,7 @@ class _Declared(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def dialects() -> Iterator[ColumnFormat]:
-    """Yield the families that the user declares, sorted by name.
-
-    Raises
-    ------
-    AcquisitionError
-        If a declaration is not valid.
-    """
+    """Yield the families that the user declares, sorted by name; an invalid declaration is an error."""
     for path in sorted(dialect_folder().glob("*.toml")):
         try:
             with open_regular_text(path, "utf-8") as file:
@@ -82,25 +76,23 @@ def dialect(path: str, text: str) -> ColumnFormat:
     Raises
     ------
     AcquisitionError
-        If the declaration is not valid; the message is one line with the file, the key and the allowed values.
-
-    Examples
-    --------
-    >>> family = dialect("bench.toml", 'begins = "#bench"\\nheading = 1\\n[[column]]\\nname = "y"\\nunit = "mm"')
-    >>> family.name, family.recognises(b"#bench 12\\n0.5\\n")
-    ('bench', True)
+        If the declaration is not valid; the message is one line.
     """
     try:
         declared = msgspec.toml.decode(text, type=_Declared)
-    except (msgspec.DecodeError, ValueError) as error:
+    except msgspec.ValidationError as error:
         raise AcquisitionError(f"{path}: {' '.join(str(error).split())}; correct it") from error
+    except msgspec.DecodeError as error:
+        raise AcquisitionError(f"{path}: expected TOML, got {error}; repair or remove it") from error
     if declared.separator not in _SEPARATORS:
         allowed = ", ".join(f'"{each}"' for each in _SEPARATORS)
         raise AcquisitionError(f'{path}: separator must be one of {allowed}, got "{declared.separator}"')
     for number, each in enumerate(declared.column, 1):
         if each.time and each.unit and time_power(each.unit) is None:
             allowed = ", ".join(TIMES)
-            raise AcquisitionError(f'{path}: column {number}: unit of a time must be one of {allowed}, got "{each.unit}"')
+            raise AcquisitionError(
+                f'{path}: column {number}: unit of a time must be one of {allowed}, got "{each.unit}"'
+            )
     if declared.rate_hz == float("inf"):
         raise AcquisitionError(f"{path}: rate_hz must be a positive number, got inf")
     name = Path(path).stem

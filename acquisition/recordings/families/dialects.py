@@ -12,8 +12,8 @@ What is easy to get wrong:
   with its name and headings.
 - Logger Pro: runs are side by side under ``Latest: Position (m)`` or ``Data Set 1:Time(s)``.
 - phyphox: the phone measures the times, so their steps vary, and each sensor may have a separate column of times.
-- Tracker: an optional line ``mass A``, in the user's language, above ``t x y``. Lengths have the unit of the calibration
-  stick, so the user must state it.
+- Tracker: an optional line ``mass A``, in the user's language, above ``t x y``. Lengths have the unit of the
+  calibration stick, so the user must state it.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ from acquisition.recordings.tables.headings import (
     is_time,
     name_and_unit,
     split_heading,
+    words,
 )
 from acquisition.recordings.tables.text import Line, Text
 
 _CAPSTONE = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+|Run \d+)")
-_QUANTITIES = frozenset(
+_QUANTITIES = words(
     "position velocity acceleration posizione velocità velocita accelerazione ort weg geschwindigkeit beschleunigung "
-    "vitesse accélération posición velocidad aceleración 位置 速度 加速度".split()
+    "vitesse accélération posición velocidad aceleración 位置 速度 加速度"
 )
 _DATASTUDIO = re.compile(r"(?P<name>[^\t;]+), (?P<run>\S+ #\s?\d+)\s*")
 _DATASTUDIO_LINE = re.compile(rb"[\r\n]([^\t;\r\n]+, [^\s]+ #[ \t]?\d+[ \t]*)(?=[\r\n])")
@@ -55,9 +56,9 @@ def capstone(lines: Sequence[str]) -> Header | None:
         headings = [Heading(*name_and_unit(each["quantity"]), each["run"]) if each else Heading("") for each in matches]
         run = next(each.run for each in headings if each.run)
         return Header(f'headings in line 1 end in a run, "{run}"', 1, mark, headings)
-    words = [cell.lower() for cell in cells]
+    names = [cell.lower() for cell in cells]
     # A comment mark shows that the line comes from another program.
-    known = len(words) > 1 and words[0][:1] not in "#%" and is_time(words[0]) and _QUANTITIES.issuperset(words[1:])
+    known = len(names) > 1 and names[0][:1] not in "#%" and is_time(names[0]) and _QUANTITIES.issuperset(names[1:])
     if not known:
         return None
     return Header(f'line 1 is the headings "{mark.join(cells)}"', 1, mark, [Heading(cell) for cell in cells])
@@ -81,14 +82,10 @@ def _datastudio_runs(text: Text, first: Header) -> Iterator[tuple[Line, Header]]
     del first
     counted, number = text.start, 1
     for match in _DATASTUDIO_LINE.finditer(text.data, text.start, text.stop):
-        number += _line_ends(text, counted, counted := match.start(1))
+        number += text.line_ends(counted, counted := match.start(1))
         header = datastudio([line.text for line in islice(text.lines(counted), 2)])
         if header is not None:
             yield Line(number, counted, counted, ""), header
-
-
-def _line_ends(text: Text, start: int, stop: int) -> int:
-    return text.data.count(b"\n", start, stop) or text.data.count(b"\r", start, stop)
 
 
 def logger_pro(lines: Sequence[str]) -> Header | None:
@@ -162,16 +159,15 @@ def _data_set(lines: Sequence[str]) -> tuple[str, int, list[Heading]] | None:
         if above and any(numbers) and all(number or not cell for number, cell in zip(numbers, cells, strict=True)):
             run = above[0].strip() if "\t" not in above[0].strip() else ""
             names = above[1 if run else 0 :]
-            return (run, at, _vernier_headings(names, run)) if 1 <= len(names) <= _MOST_HEADINGS else None
+            return (run, at, _vernier_headings(names)) if 1 <= len(names) <= _MOST_HEADINGS else None
         above.append(line)
         if len(above) == _MOST_LINES:
             return None
     return None
 
 
-def _vernier_headings(lines: Sequence[str], run: str) -> list[Heading]:
+def _vernier_headings(lines: Sequence[str]) -> list[Heading]:
     """Combine long names with units; the units are in the last of two or three lines."""
-    del run
     names = [cell.strip() for cell in lines[0].rstrip().split("\t")]
     if len(lines) == 1:
         return [Heading(*name_and_unit(name)) for name in names]
@@ -183,21 +179,15 @@ def _vernier_headings(lines: Sequence[str], run: str) -> list[Heading]:
 def _vernier_sets(text: Text, first: Header) -> Iterator[tuple[Line, Header]]:
     """Yield further data sets: each repeats the line of long names, below its own name or below all lines of a file."""
     lines = text.head(first.lines + 1)
-    names = [line for line in lines[2 : first.lines] if line.text.strip(" ").strip()]
+    names = [line for line in lines[2 : first.lines] if line.text.strip()]
     if not names or len(lines) <= first.lines:
         return
     long_names = names[1 if first.run and len(names) > 1 else 0]
     needle = b"\n" + text.data[long_names.start : long_names.next].rstrip(b"\r\n")
-    rows, number = lines[first.lines].start, lines[first.lines].number
-    counted = rows
+    rows, counted, number = lines[first.lines].start, lines[first.lines].start, lines[first.lines].number
     while (again := text.data.find(needle, rows, text.stop)) >= 0:
-        begin = again + 1
-        while (above := text.data.rfind(b"\n", rows, begin - 1) + 1 or rows) > rows:
-            cell = text.data[above:begin].strip().split(b"\t")[0].strip()
-            if parse_number(cell.decode("latin-1")) is not None:
-                break
-            begin = above
-        number += _line_ends(text, counted, counted := begin)
+        begin = text.words_above(rows, again + 1)
+        number += text.line_ends(counted, counted := begin)
         head = [line.text for line in text.head(_MOST_LINES, begin, number)]
         skip = next((at + 2 for at, line in enumerate(head[:_MOST_HEADINGS]) if line.startswith(_VERNIER)), 0)
         below = _data_set(head[skip:])
@@ -207,12 +197,8 @@ def _vernier_sets(text: Text, first: Header) -> Iterator[tuple[Line, Header]]:
         rows = again + len(needle)
 
 
-CAPSTONE = text_format(
-    "capstone",
-    "PASCO Capstone CSV: runs side by side, any decimal mark",
-    capstone,
-    expected='headings like "Position (m) Run #1"',
-)
+_TITLE = "PASCO Capstone CSV: runs side by side, any decimal mark"
+CAPSTONE = text_format("capstone", _TITLE, capstone, expected='headings like "Position (m) Run #1"')
 DATASTUDIO = text_format(
     "datastudio",
     "PASCO DataStudio text: runs one below the other",

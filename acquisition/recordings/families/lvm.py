@@ -63,7 +63,15 @@ def _evidence(head: bytes) -> str:
 
 def _tables(path: str, data: bytes) -> list[Table]:
     text = text_of(path, data)
-    mark = _separator(path, text)
+    lines = text.head(_MOST_HEADER_LINES)
+    if not lines or not lines[0].text.lstrip().startswith(_MAGIC):
+        raise FormatError(path, f'expected "{_MAGIC}" in the first line', "check that this is an LVM file", line=1)
+    tag = re.compile(rf"\s*{_SEPARATOR}([^\w])")
+    # The separator is the character after its tag, or else after the opening words of line 1.
+    mark = next(
+        (match[1] for line in lines if (match := tag.match(line.text))), lines[0].text.lstrip()[len(_MAGIC) :][:1]
+    )
+    mark = mark or "\t"
     top = _header(path, text, text.start, 1, mark)
     segments = list(_segments(path, text, top, mark))
     tables: list[Table] = []
@@ -74,22 +82,6 @@ def _tables(path: str, data: bytes) -> list[Table]:
         raise FormatError(path, "expected channels below the header, got none", "export the run again")
     title = segments[0][0].first_of("Notes") or top.first_of("Description")
     return [replace(each, title=title) for each in tables]
-
-
-def _separator(path: str, text: Text) -> str:
-    """Return the separator: the character after the tag ``Separator``, or else after the opening words of line 1."""
-    first = next(text.lines(), None)
-    if first is None or not first.text.lstrip().startswith(_MAGIC):
-        problem = f'expected "{_MAGIC}" in the first line'
-        raise FormatError(path, problem, "check that this is an LVM file", line=1)
-    for line in text.lines():
-        tag = line.text.lstrip()
-        mark = tag.removeprefix(_SEPARATOR)[:1]
-        if tag.startswith(_SEPARATOR) and mark and not (mark.isalnum() or mark == "_"):
-            return mark
-        if line.text.startswith(_END) or line.number > _MOST_HEADER_LINES:
-            break
-    return first.text.lstrip()[len(_MAGIC) :][:1] or "\t"
 
 
 def _header(path: str, text: Text, start: int, number: int, mark: str) -> _Header:
@@ -118,26 +110,10 @@ def _segments(path: str, text: Text, top: _Header, mark: str) -> Iterator[tuple[
         if end < 0:
             yield header, text.stop
             return
-        start = _begin_of_header(text, header.next_start, end)
-        number = header.next_line + _line_ends(text.data, header.next_start, start)
+        start = text.words_above(header.next_start, text.data.rfind(b"\n", header.next_start, end) + 1 or end)
+        number = header.next_line + text.line_ends(header.next_start, start)
         yield header, start
     raise FormatError(path, f"expected at most {_MOST_SEGMENTS} segments", "split the file")
-
-
-def _begin_of_header(text: Text, low: int, end: int) -> int:
-    """Return where a header begins: walk back from its end over empty lines and lines that begin with a word."""
-    at = text.data.rfind(b"\n", low, end) + 1 or low
-    while at > low:
-        previous = max(text.data.rfind(b"\n", low, at - 1) + 1, low)
-        line = text.data[previous:at].strip()
-        if (line and not re.match(rb"[A-Za-z*]", line)) or previous == at:
-            break
-        at = previous
-    return at
-
-
-def _line_ends(data: bytes, start: int, stop: int) -> int:
-    return data.count(b"\n", start, stop) or data.count(b"\r", start, stop)
 
 
 def _of_segment(

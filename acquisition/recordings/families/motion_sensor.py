@@ -195,7 +195,7 @@ def _read(path: str, data: bytes, answers: Answers) -> File:
         raise _no_rows(path, first.number, f"rows of {layout.columns} numbers")
     columns = [each.of_size(lines.rows) for each in read]
     # Every cell of a row must be a number, and nothing may follow them.
-    forms = np.array([each.decimals for each in columns])
+    forms = np.array([each.forms for each in columns])
     damaged = (forms[: layout.columns] <= EMPTY).any(axis=0) | (forms[layout.columns :] != EMPTY).any(axis=0)
     if layout.assumed:
         message = f"no column line: read as time (s) and {layout.assumed}, in {layout.unit}"
@@ -203,7 +203,7 @@ def _read(path: str, data: bytes, answers: Answers) -> File:
     unit, velocity = layout.unit, layout.quantity == "velocity"
     value = Column(layout.quantity, unit + "/s" * velocity, columns[1].values, np.where(damaged, UNREAD, forms[1]))
     times = replace(columns[0], name="time", unit="s")
-    lines = replace(lines, cut=not lines.ended and bool(damaged[-1]))
+    lines = lines._replace(cut=not lines.ended and bool(damaged[-1]))
     table = Table((value,), times, title=layout.title, traps=traps, lines=lines, beside=(times, value))
     reading = read_channel(path, [table], replace(answers, channel=None, unit=None), difference=velocity)
     found, error_m = [], None
@@ -326,9 +326,9 @@ def _shape(lines: Sequence[str]) -> Layout | None:
         if usual > 0 and third.count(usual) >= _CONSTANT * len(third) and _times_run(three):
             assumed = "distance and its error, because the third column is constant"
             return Layout("distance", 3, "cm", assumed=assumed)
-    elif len(two) >= 3 and rows[0] == two[0] and math.isnan(two[0][1]) and not math.isnan(two[1][1]):
-        if _times_run(two):
-            return Layout("velocity", 2, "cm", assumed="velocity, because the first value is NaN")
+    nan_first = len(two) >= max(3, len(three)) and rows[0] == two[0] and math.isnan(two[0][1])
+    if nan_first and not math.isnan(two[1][1]) and _times_run(two):
+        return Layout("velocity", 2, "cm", assumed="velocity, because the first value is NaN")
     return None
 
 

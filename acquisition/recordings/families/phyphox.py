@@ -1,7 +1,7 @@
 """phyphox: exports as CSV with quoted headings, and saved states as XML.
 
-The CSV is in :mod:`acquisition.recordings.families.dialects`. In the XML, the ``init`` attribute of each container lists the numbers of a buffer, and ``<export>`` names the
-buffers.
+The CSV is in :mod:`acquisition.recordings.families.dialects`. In the XML, the ``init`` attribute of each container
+lists the numbers of a buffer, and ``<export>`` names the buffers.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def _sets(root: Element, buffers: Mapping[str, F8]) -> Iterator[Table]:
     """Yield the tables of every set in the export, each with the times of its set."""
     sets = list(root.iter("set"))
     for each in sets:
-        named = [(Heading(*name_and_unit(data.get("name", ""))), (data.text or "").strip()) for data in each.iter("data")]
+        named = [
+            (Heading(*name_and_unit(data.get("name", ""))), (data.text or "").strip()) for data in each.iter("data")
+        ]
         columns = [(heading, buffers[buffer]) for heading, buffer in named if buffer in buffers]
         yield from tables_of_markup(columns, each.get("name", "") if len(sets) > 1 else "")
 

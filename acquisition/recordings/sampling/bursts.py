@@ -19,8 +19,8 @@ _SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; t
 class Bursts(NamedTuple):
     """Samples that were stamped in bursts of ``size`` on average, one every ``interval_s``.
 
-    Spread evenly, they are ``step_s`` apart and begin at ``first_s``. They are ``complete`` if the last stamp of every burst
-    lies within one interval of its evenly spaced time; otherwise samples are missing somewhere.
+    Spread evenly, they are ``step_s`` apart and begin at ``first_s``. They are ``complete`` if the last stamp of every
+    burst lies within one interval of its evenly spaced time; otherwise samples are missing somewhere.
     """
 
     size: float
@@ -33,9 +33,9 @@ class Bursts(NamedTuple):
 def find_bursts(t: F8) -> Bursts | None:
     """Find bursts in the printed times of a recording (s); None for times that do not come in regular bursts.
 
-    A computer that polls a sensor, or gets its samples in packets, stamps each sample when it arrives. The stamps of one
-    packet lie close together and contain no information on when its samples were taken. The stamps of the last samples of
-    the packets do: a straight line fitted to them against the row numbers gives the rate and the start.
+    A computer that polls a sensor, or gets its samples in packets, stamps each sample when it arrives. The stamps of
+    one packet lie close together and contain no information on when its samples were taken. The stamps of the last
+    samples of the packets do: a straight line fitted to them against the row numbers gives the rate and the start.
     """
     if t.size < 2 * _FEWEST or not np.isfinite(t).all():
         return None

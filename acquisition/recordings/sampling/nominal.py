@@ -35,8 +35,8 @@ class Rate(NamedTuple):
     """The rate of printed times, in samples per second.
 
     ``relative_u`` is the relative half-width of the range of rates that are compatible with the rounding of the times.
-    ``grid`` is the grid from which the times were rounded, or None if they fit no grid. The rate is ``certain`` if no grid
-    with a rate one hertz higher or lower fits equally well.
+    ``grid`` is the grid from which the times were rounded, or None if they fit no grid. The rate is ``certain`` if no
+    grid with a rate one hertz higher or lower fits equally well.
     """
 
     rate_hz: float
@@ -138,43 +138,35 @@ def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F
 def place_unread(t: F8, unread: B1, grid: Grid | None, cut: str, decimals: int) -> F8:
     """Return the times of all rows; infer those of unread rows from the grid and the neighbouring rows.
 
-    The time of an unread row is its printed time or NaN. ``cut`` is the first cell of an incomplete last row, or empty; it
-    must begin like the next time with its decimals. A time that cannot be inferred is NaN, because nothing shows that the
-    row was a sample.
+    The time of an unread row is its printed time or NaN. ``cut`` is the first cell of an incomplete last row, or empty;
+    it must begin like the next time with its decimals. A time that cannot be inferred is NaN, because nothing shows
+    that the row was a sample.
     """
     out = np.where(unread, np.nan, t)
     for start, stop in _runs(unread):
-        before = float(t[start - 1]) if start else np.nan
-        after = float(t[stop]) if stop < t.size else np.nan
-        count = stop - start
-        if grid is not None and round((after - before) * grid.rate_hz if after > before else 0) == count + 1:
-            out[start:stop] = grid.time(grid.nearest(np.array([before]))[0] + 1 + np.arange(count))
+        before = float(t[start - 1]) if start else -np.inf
+        after = float(t[stop]) if stop < t.size else np.inf
+        inside = bool(np.isfinite(after - before))
+        if grid is not None and inside and round((after - before) * grid.rate_hz) == stop - start + 1:
+            out[start:stop] = grid.time(grid.nearest(np.array([before]))[0] + 1 + np.arange(stop - start))
             continue
         last = before
         for row in range(start, stop):
-            steps = (before, row - start + 1) if np.isfinite(before) else (after, row - stop)
-            out[row] = _time_of_row(float(t[row]), last, after, steps, grid)
-            last = last if np.isnan(out[row]) else float(out[row])
+            time = float(t[row])
+            fits = inside
+            if grid is not None and np.isfinite(time):
+                time = float(grid.time(grid.nearest(np.array([time])))[0])
+                # At either end of the file only the expected step is accepted, because a digit may be damaged.
+                steps = time - before, row - start + 1
+                steps = steps if start else (after - time, stop - row)
+                fits = inside or abs(steps[0] * grid.rate_hz - steps[1]) < 0.5
+            if fits and last < time < after:
+                out[row] = last = time
         if cut and stop == t.size and np.isnan(out[-1]) and grid is not None and np.isfinite(last):
             follows = float(grid.time(grid.nearest(np.array([last])) + 1)[0])
             if f"{follows:.{decimals}f}".startswith(cut):
                 out[-1] = follows
     return out
-
-
-def _time_of_row(printed: float, last: float, after: float, steps: tuple[float, int], grid: Grid | None) -> float:
-    """Return the printed time of an unread row if it lies at the expected place on the grid; else NaN."""
-    if not np.isfinite(printed) or printed <= last or printed >= after:
-        return np.nan
-    between = bool(np.isfinite(last) and np.isfinite(after))
-    if grid is None:
-        return printed if between else np.nan
-    exact = float(grid.time(grid.nearest(np.array([printed])))[0])
-    if between:
-        return exact if last < exact < after else np.nan
-    # At either end of the file only the expected step is accepted, because a digit may be damaged.
-    origin, count = steps
-    return exact if abs(exact - origin - count / grid.rate_hz) < 0.5 / grid.rate_hz else np.nan
 
 
 def _runs(mask: B1) -> Iterator[tuple[int, int]]:
@@ -194,8 +186,8 @@ def _even(t: F8, longest: float) -> bool:
 def time_flags(t: F8, step: float) -> U8:
     """Flag repeated times, backward times and gaps, given the nominal time between samples (s).
 
-    The times of samples with neither DUPLICATE_TIME nor NON_MONOTONIC_TIME increase strictly. If a single time is ahead of
-    its neighbours, only that time is flagged, and not all the times after it.
+    The times of samples with neither DUPLICATE_TIME nor NON_MONOTONIC_TIME increase strictly. If a single time is
+    ahead of its neighbours, only that time is flagged, and not all the times after it.
 
     >>> [Flag(int(f)).name for f in time_flags(np.array([0.0, 0.1, 0.1, 9.2, 0.3, 0.6]), 0.1)][2:]
     ['DUPLICATE_TIME', 'NON_MONOTONIC_TIME', 'GAP_BEFORE', 'GAP_BEFORE']

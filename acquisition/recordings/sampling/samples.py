@@ -28,11 +28,11 @@ _ZEROS = 10
 class Rows:
     """The rows of one channel, before they become samples; every array has one element for each row.
 
-    ``printed`` are the times as printed, s, or None; ``value`` the values in SI or a power of ten of it, NaN if unread or
-    absent. ``remark`` marks rows of text between samples, which are not samples. ``time_resolution`` (s) and ``resolution``
-    are the last printed digits, the latter 0 for binary values. ``tolerance`` is half the last digit of each time, if the
-    times are compared with a formula in the header. ``cut`` says that the last row is incomplete, ``last_cell`` is its
-    first cell, and ``decimals`` the number of printed decimals of a time.
+    ``printed`` are the times as printed, s, or None; ``value`` the values in SI or a power of ten of it, NaN if unread
+    or absent. ``remark`` marks rows of text between samples, which are not samples. ``time_resolution`` (s) and
+    ``resolution`` are the last printed digits, the latter 0 for binary values. ``tolerance`` is half the last digit of
+    each time, if the times are compared with a formula in the header. ``cut`` says that the last row is incomplete,
+    ``last_cell`` is its first cell, and ``decimals`` the number of printed decimals of a time.
     """
 
     printed: F8 | None
@@ -107,7 +107,11 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
         return
     kinds = (
         ("duplicate_time", Flag.DUPLICATE_TIME, "samples have the same time as an earlier one"),
-        ("non_monotonic_time", Flag.NON_MONOTONIC_TIME, "samples have times that run backward or ahead of their neighbours"),
+        (
+            "non_monotonic_time",
+            Flag.NON_MONOTONIC_TIME,
+            "samples have times that run backward or ahead of their neighbours",
+        ),
         ("missing_samples", Flag.MISSING, "samples have no value"),
     )
     for code, flag, what in kinds:
@@ -128,9 +132,9 @@ def value_traps(
 ) -> tuple[float, tuple[Trap, ...]]:
     """Find zeros that fill the end, a lost target, and distances rounded more coarsely than printed.
 
-    Zeros that fill the end become NaN and MISSING, and samples of a lost target FALSE_ECHO, in place. ``resolution`` is the
-    last printed digit. If the values are no lengths, there is no lost target, and zero is a normal reading. Return the step
-    of which all values are multiples, and the remarks.
+    Zeros that fill the end become NaN and MISSING, and samples of a lost target FALSE_ECHO, in place. ``resolution``
+    is the last printed digit. If the values are no lengths, there is no lost target, and zero is a normal reading.
+    Return the step of which all values are multiples, and the remarks.
     """
     traps = []
     if length and (tail := _zero_tail(distance)) < distance.size:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 from acquisition.errors import FormatError, NeedsAnswer
@@ -23,9 +22,9 @@ _ANY_RATE_HZ = 100.0  # an example: the rate of many sensors
 class Timing(NamedTuple):
     """Rate and grid of a file's times; no grid if the times fit none and are used as printed.
 
-    The rate is ``certain`` if the times or a header determine it, and ``given`` if the user gave it. ``steps_s`` is the range
-    of the time steps (5th to 95th percentile) if the times fit no grid but jitter little about one step. ``by_row`` says
-    that times computed from row numbers are better than the printed times.
+    The rate is ``certain`` if the times or a header determine it, and ``given`` if the user gave it. ``steps_s`` is
+    the range of the time steps (5th to 95th percentile) if the times fit no grid but jitter little about one step.
+    ``by_row`` says that times computed from row numbers are better than the printed times.
     """
 
     rate_hz: float
@@ -101,8 +100,8 @@ def time_by_formula(
 ) -> Timing | None:
     """Use the times ``start_s + i step_s`` of a header, or None if they are impossible or the column of times disagrees.
 
-    ``printed`` are the times of the rows (NaN if unread), ``tolerance`` is half the last digit of each, and ``numbers`` is
-    the index i of each row.
+    ``printed`` are the times of the rows (NaN if unread), ``tolerance`` is half the last digit of each, and
+    ``numbers`` is the index i of each row.
     """
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None

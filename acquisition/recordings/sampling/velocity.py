@@ -16,9 +16,9 @@ _COHERENT = 0.9
 def find_tick(values: F8, resolution: float) -> float | None:
     """Find the largest step of which the printed values are multiples, within rounding; None if there is none.
 
-    Gaps between neighbouring sizes of values are candidates for the step s. Each is refined by least squares of ``v = k s``
-    over an increasing range of v, because the integers k of large v are certain only if s is accurate. The step must
-    explain 95 % of the different sizes.
+    Gaps between neighbouring sizes of values are candidates for the step s. Each is refined by least squares of ``v =
+    k s`` over an increasing range of v, because the integers k of large v are certain only if s is accurate. The step
+    must explain 95 % of the different sizes.
 
     >>> k = np.random.default_rng(1).integers(-900, 900, 400)
     >>> round(find_tick(np.round(k * 0.25536, 3), 0.001), 5)
@@ -54,9 +54,9 @@ def _refine(size: F8, step: float) -> float:
 def find_quantum(values: F8, tick: float) -> float:
     """Return the spacing of the clusters of values: ``tick`` itself, or a multiple of it.
 
-    A device that converts timer ticks to distance by integer arithmetic gives values at ``j m tick`` and ``(j m + 1) tick``:
-    exact multiples of a small step, in clusters one timer tick apart. The spacing of the clusters is the quantum. It is
-    found by phase coherence, ``|mean exp(2 pi i k / m)|``, which must reach 0.9.
+    A device that converts timer ticks to distance by integer arithmetic gives values at ``j m tick`` and ``(j m + 1)
+    tick``: exact multiples of a small step, in clusters one timer tick apart. The spacing of the clusters is the
+    quantum. It is found by phase coherence, ``|mean exp(2 pi i k / m)|``, which must reach 0.9.
 
     >>> j = np.arange(-300, 300)
     >>> round(find_quantum(0.43 * j + 0.043 * (j % 2), 0.043), 6)
@@ -75,8 +75,8 @@ def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, round
     """Sum backward differences ``(x[i] - x[i-1]) * rate_hz`` to a position (m), zero at the first sample, NaN if unknown.
 
     ``index`` are sample numbers, increasing; a jump is a gap. A value within ``rounding`` of a multiple of the tick is
-    replaced by that multiple, so that rounding errors do not add up. In a gap the velocity is interpolated linearly. The
-    resulting offset is only an estimate, so the mask returned marks the first sample after each gap.
+    replaced by that multiple, so that rounding errors do not add up. In a gap the velocity is interpolated linearly.
+    The resulting offset is only an estimate, so the mask returned marks the first sample after each gap.
     """
     known = np.isfinite(velocity)
     v = velocity.copy()
@@ -107,8 +107,9 @@ def outer_join(left: I8, right: I8, regular: B1 | None = None) -> tuple[I8, I8]:
     """Pair the rows of two recordings by their sample numbers.
 
     If a number repeats, its n-th row on the left pairs with its n-th row on the right. ``regular`` marks the rows of
-    ``left`` whose numbers are in order. Return the row of each joined sample in ``left`` and in ``right``, -1 if there is
-    none. Rows of ``left`` keep their order, and rows that exist only in ``right`` are inserted according to their numbers.
+    ``left`` whose numbers are in order. Return the row of each joined sample in ``left`` and in ``right``, -1 if there
+    is none. Rows of ``left`` keep their order, and rows that exist only in ``right`` are inserted according to their
+    numbers.
 
     >>> [rows.tolist() for rows in outer_join(np.array([2, 3, 4]), np.array([1, 2, 4, 5]))]
     [[-1, 0, 1, 2, -1], [0, 1, -1, 2, 3]]

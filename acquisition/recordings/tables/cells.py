@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import B1, F8
+from acquisition.block import B1, F8, I8
 
 I1 = NDArray[np.int8]
 NAN, EMPTY, UNREAD = -1, -2, -3
@@ -20,14 +20,20 @@ EXPONENT = 64
 
 _CELL = re.compile(r"([+-]?(?:\d+[.,]?(\d*)|[.,](\d+)))(?:[eE]([+-]?\d{1,3}))?", re.ASCII)
 _LONGEST = 64  # bytes of a cell that are examined; longer cells are rare and are read one by one
-_DIGIT, _SIGN, _MARK, _OTHER = 1, 2, 3, 4
+_DIGIT, _SIGN, _MARK, _E, _OTHER = 1, 2, 3, 4, 5
 _KINDS = np.full(256, _OTHER, np.uint8)
-for _kind, _characters in ((0, b"\0"), (_DIGIT, b"0123456789"), (_SIGN, b"+-"), (_MARK, b".,")):
+for _kind, _characters in ((0, b"\0"), (_DIGIT, b"0123456789"), (_SIGN, b"+-"), (_MARK, b".,"), (_E, b"eE")):
     _KINDS[list(_characters)] = _kind
 _DAMAGE = bytes.maketrans(b"\0\x0b\x0c\x1c\x1d\x1e\x1f", b"?" * 7)
 """Control characters that numpy or ``split`` would ignore: a number next to one may have lost digits."""
 _MOST_EXACT, _MOST_TENS = 1e15, 22  # whole numbers and powers of ten up to here are exact in binary
 _TENS = np.array([float(f"1e{power}") for power in range(_MOST_TENS + 1)])
+CLOCK = re.compile(
+    r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?"
+    r"(?:(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d{1,9})?))?|(?P<m2>\d{1,2}):(?P<s2>\d\d[.,]\d{1,9}))"
+    r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
+    re.ASCII,
+)
 
 
 def cell(text: str) -> tuple[float, int]:
@@ -48,6 +54,38 @@ def cell(text: str) -> tuple[float, int]:
         return math.nan, UNREAD
     decimals = min(len(match[2] or match[3] or ""), EXPONENT - 1)
     return value, decimals + (EXPONENT if match[4] else 0)
+
+
+def clock_s(cell: str) -> tuple[str, float, int] | None:
+    """Return the printed date, the second of the day and the number of decimals; None for any other text.
+
+    >>> clock_s("10:04:59.812"), clock_s("01/08/2024 1:00:36 pm"), clock_s("0.5")
+    (('', 36299.812, 3), ('01/08/2024', 46836.0, 0), None)
+    """
+    match = CLOCK.fullmatch(cell)
+    if match is None:
+        return None
+    hour = int(match["h"] or 0)
+    hour = hour % 12 + 12 * (match["half"][0] in "pP") if match["half"] else hour
+    seconds = (match["s"] or match["s2"] or "0").replace(",", ".")
+    decimals = len(seconds.partition(".")[2])
+    at = hour * 3600 + int(match["m"] or match["m2"]) * 60 + float(seconds)
+    return (match["date"] or "").strip(" ,T"), round(at, decimals), decimals
+
+
+def clock_times(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
+    """Return times of day in seconds, the decimals of each, and a mask without commas, as :func:`read_cells` does."""
+    plain = [each.strip(b'"') for each in cells]
+    if all(len(each) >= 8 and each[2:3] == each[5:6] == b":" and each[6:8].isdigit() for each in plain):
+        hours, minutes = (read_cells([each[at : at + 2] for each in plain])[0] for at in (0, 3))
+        values, decimals, _ = read_cells([each[6:] for each in plain])
+        if (decimals >= 0).all() and np.isfinite(hours + minutes).all():
+            return hours * 3600.0 + minutes * 60.0 + values, decimals, np.zeros(values.size, bool)
+    values, decimals = np.full(len(plain), np.nan), np.full(len(plain), UNREAD, np.int8)
+    for row, each in enumerate(plain):
+        if (time := clock_s(each.decode("latin-1"))) is not None:
+            _, values[row], decimals[row] = time
+    return values, decimals, np.zeros(values.size, bool)
 
 
 def parse_number(text: str) -> float | None:
@@ -100,14 +138,36 @@ def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
     fixed = (digits + marked + (kinds[:, 0] == _SIGN) == lengths) & (digits > 0) & (marked <= 1)
     fixed &= lengths <= _LONGEST
     values = np.full(text.size, np.nan)
-    decimals = np.where(lengths == 0, EMPTY, np.where(marked == 1, lengths - 1 - marks.argmax(axis=1), 0))
-    decimals = np.minimum(decimals, EXPONENT - 1).astype(np.int8)
+    places = np.where(marked == 1, lengths - 1 - marks.argmax(axis=1), 0)
+    decimals = np.where(lengths == 0, EMPTY, np.minimum(places, EXPONENT - 1)).astype(np.int8)
     comma = raw == ord(",")
     raw[comma] = ord(".")
     values[fixed] = text[fixed].astype(np.float64)
-    for row in np.flatnonzero(~fixed & (lengths > 0)).tolist():
+    rest = ~fixed & (lengths > 0)
+    if rest.any() and not (kinds[rest] == _OTHER).any() and _exponents(text, kinds, places, rest, values, decimals):
+        return values, decimals, comma.any(axis=1)
+    for row in np.flatnonzero(rest).tolist():
         values[row], decimals[row] = cell(cells[row].decode("latin-1"))
     return values, decimals, comma.any(axis=1)
+
+
+def _exponents(
+    text: NDArray[np.bytes_], kinds: NDArray[np.uint8], places: I8, rows: B1, values: F8, decimals: I1
+) -> bool:
+    """Read the numbers in some rows, if all of them have a mantissa with a mark and an exponent of up to three digits."""
+    letters = kinds[rows] == _E
+    exponent = np.count_nonzero(kinds[rows], axis=1) - letters.argmax(axis=1)  # with its letter
+    own = places[rows] - exponent
+    if not ((letters.sum(axis=1) == 1) & (own >= 0) & (own < EXPONENT) & (exponent <= len("e-99"))).all():
+        return False
+    try:
+        read = text[rows].astype(np.float64)
+    except ValueError:
+        return False
+    if not np.isfinite(read).all():
+        return False
+    values[rows], decimals[rows] = read, own + EXPONENT
+    return True
 
 
 def scaled(values: F8, decimals: I1 | None, power: int) -> F8:

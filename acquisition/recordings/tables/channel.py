@@ -11,13 +11,7 @@ from acquisition.block import B1, F8, U8, Flag
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.samples import Rows, flags_of, place, row_traps, sample_traps
-from acquisition.recordings.sampling.timing import (
-    Timing,
-    clock_traps,
-    time_by_column,
-    time_by_formula,
-    time_by_rate,
-)
+from acquisition.recordings.sampling.timing import Timing, clock_traps, time_by_column, time_by_formula, time_by_rate
 from acquisition.recordings.tables.cells import EMPTY, EXPONENT, I1, UNREAD, scaled, usual_decimals
 from acquisition.recordings.tables.table import Column, Formula, Lines, Table
 from acquisition.recordings.units import TIMES, time_factor, time_power
@@ -54,10 +48,10 @@ def read_samples(
     """
     rows = rows_of(path, table, column, power)
     timing, traps = _timing(path, table, rows, rate_hz)
-    value, unread, t = rows.value, rows.unread, place(rows, timing)
+    unread, t = rows.unread, place(rows, timing)
     timed = np.isfinite(t)
     where = np.flatnonzero(timed)
-    t, value, lost = t[where], value[where], unread[where]
+    t, value = t[where], rows.value[where]
     if np.isnan(value).all():
         problem = f'expected numbers as "{column.name}", got NaN in all {value.size} rows'
         raise FormatError(path, problem, "record the run again", line=rows.line(0) or None)
@@ -65,7 +59,7 @@ def read_samples(
     def line(row: int) -> int | None:
         return rows.line(int(where[row])) or None
 
-    flags = flags_of(t, value, lost, timing.rate_hz)
+    flags = flags_of(t, value, unread[where], timing.rate_hz)
     if difference and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
     zeros = table.lines.zeros if table.lines else 0
@@ -81,17 +75,17 @@ def rows_of(path: str, table: Table, column: Column, power: int) -> Rows:
     if to_seconds is None:
         problem = f'expected times in one of {", ".join(TIMES)}, got "{unit}"'
         raise FormatError(path, problem, "export the times in seconds")
-    if table.lines is None or column.decimals is None:
-        return _binary_rows(table, column, power, to_seconds)
+    if table.lines is None:
+        return _binary_rows(table.times, column, power, to_seconds)
     return _text_rows(path, table, table.lines, column, power, to_seconds)
 
 
-def _binary_rows(table: Table, column: Column, power: int, to_seconds: int) -> Rows:
-    size = max(column.values.size, table.times.values.size if table.times else 0)
-    value, t = scaled(column.of_size(size).values, None, power), None
-    if table.times is not None:
-        t = scaled(table.times.of_size(size).values * time_factor(table.times.unit), None, to_seconds)
-    unread = np.zeros(size, bool) if t is None else ~np.isfinite(t)
+def _binary_rows(times: Column | None, column: Column, power: int, to_seconds: int) -> Rows:
+    size = max(column.values.size, times.values.size if times else 0)
+    value, t, unread = scaled(column.of_size(size).values, None, power), None, np.zeros(size, bool)
+    if times is not None:
+        t = scaled(times.of_size(size).values * time_factor(times.unit), None, to_seconds)
+        unread = ~np.isfinite(t)
     value[unread] = np.nan
     largest = 0.0 if t is None else float(np.fmax.reduce(np.abs(t), initial=0.0))
     return Rows(t, value, unread, np.zeros(size, bool), lambda _: 0, max(float(np.spacing(largest)), 1e-12), 0.0)
@@ -99,17 +93,15 @@ def _binary_rows(table: Table, column: Column, power: int, to_seconds: int) -> R
 
 def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int, to_seconds: int) -> Rows:
     own, time = column.of_size(lines.rows), table.times and table.times.of_size(lines.rows)
-    form, at = _forms(own), None if time is None else _forms(time)
+    form = own.forms
     # A row of words without a value is a remark between rows; a row of a longer channel is none of this channel's.
-    remark = lines.words & (form == EMPTY)
-    present = np.ones(form.size, bool)
-    unread = form == UNREAD
-    if at is not None:
-        remark &= (at == EMPTY) | (at == UNREAD)
-        present = ~((form == EMPTY) & (at == EMPTY))
-        if lines.cut and at[-1] == UNREAD:
+    remark, present, unread = lines.words & (form == EMPTY), np.ones(form.size, bool), form == UNREAD
+    if time is not None:
+        remark &= (time.forms == EMPTY) | (time.forms == UNREAD)
+        present = (form != EMPTY) | (time.forms != EMPTY)
+        if lines.cut and time.forms[-1] == UNREAD:
             unread[-1] = True  # its time is incomplete
-    if table.ragged or at is None:
+    if table.ragged or time is None:
         # Empty cells at the end follow the channel's last sample; an empty cell before it is a lost sample.
         filled = np.flatnonzero(form != EMPTY)
         present[int(filled[-1]) + 1 if filled.size else 0 :] = False
@@ -118,32 +110,26 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int
         raise _no_numbers(path, column, 0, lines.first)
     chosen = np.flatnonzero(keep)
     remark, unknown = remark[chosen], (unread | remark)[chosen]
-
     printed, tolerance, time_digit, decimals = None, None, 0.0, 0
-    if time is not None and at is not None:
-        printed, at = scaled(time.values, at, to_seconds)[chosen], at[chosen]
-        time_digit, decimals = last_digit(printed, _forms(time), to_seconds), usual_decimals(_forms(time))[0]
+    if time is not None:
+        printed = scaled(time.values, time.forms, to_seconds)[chosen]
+        time_digit, decimals = last_digit(printed, time.forms, to_seconds), usual_decimals(time.forms)[0]
         if table.formula is not None:
-            tolerance = _tolerance(printed, at, to_seconds)
-        if (factor := time_factor(time.unit)) != 1.0:
-            printed, time_digit = printed * factor, time_digit * factor
+            tolerance = _tolerance(printed, time.forms[chosen], to_seconds)
+        printed, time_digit = printed * time_factor(time.unit), time_digit * time_factor(time.unit)
         beyond = ~(np.abs(printed) < _LONGEST_S)  # true for a NaN
         printed[beyond] = np.nan
         unknown |= beyond
     value = scaled(own.values, form, power)[chosen]
     value[unknown] = np.nan
-
-    def line(row: int) -> int:
-        return lines.line(int(chosen[row]))
-
     if unknown.all():
-        raise _no_numbers(path, column, unknown.size, line(0))
+        raise _no_numbers(path, column, unknown.size, lines.line(int(chosen[0])))
     return Rows(
         printed=printed,
         value=value,
         unread=unknown,
         remark=remark,
-        line=line,
+        line=lambda row: lines.line(int(chosen[row])),
         time_resolution=time_digit,
         resolution=last_digit(value, form, power),
         tolerance=tolerance,
@@ -151,12 +137,6 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int
         last_cell=lines.last_cell,
         decimals=decimals,
     )
-
-
-def _forms(column: Column) -> I1:
-    if column.decimals is None:
-        raise ValueError("a column of a text has decimals")
-    return column.decimals
 
 
 def _no_numbers(path: str, column: Column, rows: int, line: int) -> FormatError:
@@ -211,9 +191,6 @@ def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) 
     timing = time_by_formula(path, formula.start_s, formula.step_s, printed, rows.tolerance, rows.numbers, rate_hz)
     if timing is None:
         stated = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
-        if printed is None:
-            traps.append(Trap("stale_header", f"{stated}, which are impossible"))
-        else:
-            message = f"{stated}, but the column of times differs and is used"
-            traps.append(Trap("stale_header", message, printed.size))
+        what = "which are impossible" if printed is None else "but the column of times differs and is used"
+        traps.append(Trap("stale_header", f"{stated}, {what}", 1 if printed is None else printed.size))
     return timing, traps

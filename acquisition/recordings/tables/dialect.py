@@ -111,8 +111,8 @@ def tables_of_text(
 ) -> list[Table]:
     """Read a text or a sheet: its header, the rows below it, and further runs with their headers."""
     head = text.head(_HEAD_LINES)
-    found = header([line.text for line in head])
-    if found is None:
+    found = header([line.text for line in head] or [""])
+    if found is None or not head:
         raise FormatError(path, f"expected {expected}", "export the run again", line=1)
     begins = [(head[0], found)]
     if blocks is not None and isinstance(text, Text):

@@ -9,13 +9,19 @@ from typing import Literal
 
 from acquisition.recordings.units import measure_of, time_power
 
-_TIME_WORDS = frozenset(
+
+def words(text: str) -> frozenset[str]:
+    """Return the words in a text."""
+    return frozenset(text.split())
+
+
+_TIME_WORDS = words(
     "time times t elapsed timestamp seconds secs millis milliseconds micros zeit tempo tempi temps tiempo tiempos tijd "
-    "tid czas čas aika idő zaman время 时间 時間 시간".split()
+    "tid czas čas aika idő zaman время 时间 時間 시간"
 )
-_BESIDE_TIME = frozenset(
+_BESIDE_TIME = words(
     "axis value stamp data set run latest elapsed relative absolute since start velocity acceleration raw sensor gps "
-    "system rel abs".split()
+    "system rel abs"
 )
 """Words that may accompany the word for time in a time column's name; other words denote, for example, a period."""
 _WORDS = re.compile(r"[^\W\d_]+\d*|\d+")
@@ -106,10 +112,10 @@ def is_time(name: str) -> bool:
     >>> is_time("Zeit"), is_time("Position"), is_time("t_{1}"), is_time("time for 10 swings")
     (True, False, True, False)
     """
-    words = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
-    time_words = [word for word in words if word in _TIME_WORDS]
-    others = [word for word in words if word not in time_words]
-    if not time_words or words[0].isdecimal() or (len(words[0]) == 1 and words[0] not in _TIME_WORDS):
+    found = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
+    time_words = [word for word in found if word in _TIME_WORDS]
+    others = [word for word in found if word not in time_words]
+    if not time_words or found[0].isdecimal() or (len(found[0]) == 1 and found[0] not in _TIME_WORDS):
         return False
     return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in others)
 

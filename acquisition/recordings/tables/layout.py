@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
-from acquisition.recordings.tables.cells import parse_number
-from acquisition.recordings.tables.clock import CLOCK
+from acquisition.recordings.tables.cells import CLOCK, parse_number
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time, split_cells, split_heading
 from acquisition.recordings.units import measure_of, time_power
 
@@ -28,9 +27,9 @@ _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
 class Layout(NamedTuple):
     """The layout of a table: its first row is line ``at``, counted from 0.
 
-    ``headings`` has one heading for each column. ``spare`` are names beyond the last column, each with the cell below it
-    in the line of units. ``rows`` are the cells of the first rows, which all have the same number of cells. The rows of
-    a matrix in ``brackets`` end in semicolons.
+    ``headings`` has one heading for each column. ``spare`` are names beyond the last column, each with the cell below
+    it in the line of units. ``rows`` are the cells of the first rows, which all have the same number of cells. The
+    rows of a matrix in ``brackets`` end in semicolons.
     """
 
     preamble: tuple[str, ...]

@@ -1,10 +1,11 @@
-"""Tables: columns of numbers as printed, and where their times come from. Families make them, everything else uses them."""
+"""Tables: columns of numbers as printed, and where their times come from."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +31,7 @@ class Column:
     values : (n,) float64
         The numbers as printed; NaN for a cell that is not a number.
     decimals : (n,) int8 or None
-        The printed decimals of each number, plus 64 if it has an exponent; -1 for the word NaN, -2 for an empty cell and
+        The printed decimals of each number, plus 64 if it has an exponent; -1 for the word NaN, -2 for an empty cell,
         -3 for a cell that is not a number. None for binary numbers.
     aside : bool
         Whether it is an auxiliary column (row numbers, an uncertainty), which is read only if the user names it.
@@ -41,6 +42,13 @@ class Column:
     values: F8
     decimals: I1 | None = None
     aside: bool = False
+
+    @property
+    def forms(self) -> I1:
+        """The decimals of a column of a text."""
+        if self.decimals is None:
+            raise ValueError("binary numbers have no decimals")
+        return self.decimals
 
     @property
     def label(self) -> str:
@@ -80,14 +88,13 @@ class Formula:
     samples: int | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Lines:
+class Lines(NamedTuple):
     """Where rows stand in a text.
 
-    ``first`` is the number of the first row's line, ``skipped`` holds, for each line that is no row, the number of rows
-    before it, and ``words`` marks rows that begin with text. ``ended`` says that the last row has a line end, and ``cut``
-    that it is incomplete; ``last_cell`` is its first cell. ``zeros`` is the number of zero bytes that were left out at the end of the file. ``cells`` are the
-    first rows as printed.
+    ``first`` is the number of the first row's line, and ``skipped`` holds, for each line that is no row, the number of
+    rows before it. ``words`` marks rows that begin with text. ``ended`` says that the last row has a line end, ``cut``
+    that it is incomplete; ``last_cell`` is its first cell. ``zeros`` is the number of zero bytes that were left out at
+    the end of the file. ``cells`` are the first rows as printed.
     """
 
     first: int

@@ -17,6 +17,7 @@ _FOREIGN = re.compile(rb"[\x80-\xff]+[\x21-\x7e]?")
 _HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
 """Common Chinese characters in GB 2312; in cp1252 these codes are capitals with accents, which rarely come in pairs."""
 _LINE_END = re.compile(rb"\r\n|\r|\n")
+_NUMBER = re.compile(rb"[\s,;]*[-+]?[.,]?\d")
 _ZIP = b"PK\x03\x04"
 _PAGE_BYTES = 1 << 16
 _HEAD_SPAN = 1 << 16
@@ -35,8 +36,7 @@ class Line(NamedTuple):
 class Text:
     """A text as bytes in which every digit, sign and separator is one byte.
 
-    It lies between ``start`` (after a byte order mark) and ``stop`` (before trailing zero bytes and end-of-file
-    characters, ``zeros`` in number).
+    It lies between ``start``, after a byte order mark, and ``stop``, before trailing zero bytes (``zeros`` in number).
     """
 
     data: bytes
@@ -46,12 +46,7 @@ class Text:
 
     @classmethod
     def of(cls, data: bytes) -> Text:
-        """Return the text of a file's bytes.
-
-        >>> text = Text.of("\\ufeff0,5\\n".encode("utf-16"))
-        >>> [line.text for line in text.lines()], Text.of(b"1\\n\\0\\0").zeros
-        (['0,5'], 2)
-        """
+        """Return the text of a file's bytes."""
         if encoding := _utf16(data[:HEAD_BYTES]):
             data = data.decode(encoding, errors="replace").removeprefix("\ufeff").encode("utf-8", "replace")
         start = 3 if data.startswith(codecs.BOM_UTF8) else 0
@@ -77,6 +72,19 @@ class Text:
                 break
             lines.append(line)
         return lines
+
+    def words_above(self, low: int, at: int) -> int:
+        """Return where the lines begin that stand above position ``at``, as far as they do not begin with a number."""
+        while at > low:
+            above = max(self.data.rfind(b"\n", low, at - 1) + 1, low)
+            if _NUMBER.match(self.data, above, at):
+                break
+            at = above
+        return at
+
+    def line_ends(self, start: int, stop: int) -> int:
+        """Return the number of line ends between two positions."""
+        return self.data.count(b"\n", start, stop) or self.data.count(b"\r", start, stop)
 
     def pages(self, start: int, stop: int) -> Iterator[bytes]:
         """Yield whole lines, about 64 KiB at a time."""
@@ -116,9 +124,6 @@ def decode(data: bytes) -> str:
 
     Byte order marks are obeyed and removed. UTF-16 without one is recognised by its zero bytes. Text that is not UTF-8
     is read as GB 2312 if its bytes look like that, else as cp1252. An incomplete character at the end is ignored.
-
-    >>> decode("\\ufeff0,5".encode("utf-16-le")), decode(b"20 \\xb0C")
-    ('0,5', '20 °C')
     """
     if data.isascii() and b"\0" not in data:
         return data.decode("ascii")  # the usual case, without further checks
@@ -150,27 +155,8 @@ def _utf16(head: bytes) -> str:
 
 
 def head_lines(head: bytes) -> list[str]:
-    """Return the lines of the first bytes of a file; one empty line if the file is binary.
-
-    Parameters
-    ----------
-    head : bytes
-
-    Returns
-    -------
-    list of str
-
-    Examples
-    --------
-    >>> head_lines(b"Time (s)\\r\\n0.5"), head_lines(bytes(64))
-    (['Time (s)', '0.5'], [''])
-    """
-    return unify(decode(head)).split("\n") if is_text(head) else [""]
-
-
-def unify(text: str) -> str:
-    """Convert every line end (CRLF, CR, LF) to LF."""
-    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+    """Return the lines of the first bytes of a file; one empty line if the file is binary."""
+    return decode(head).replace("\r\n", "\n").replace("\r", "\n").split("\n") if is_text(head) else [""]
 
 
 def says_simulated(text: str) -> bool:
