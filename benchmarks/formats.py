@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 REPO_ROOT = Path(__file__).resolve().parents[1]
-COLD_ROWS, LONG_ROWS, LVM_ROWS = 12_000, 10_000_000, 51_200
+COLD_ROWS, LONG_ROWS, LVM_ROWS = 12_000, 1_000_000, 51_200
 TIMES = 20
 
 OPEN = (

@@ -123,7 +123,7 @@ def _evidence(head: bytes) -> str:
 def _tables(path: str, data: bytes) -> list[Table]:
     families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in _CONTAINERS]
 
-    def reader(name: str, data: bytes) -> Callable[[], list[Table]] | None:
+    def reader(name: str, data: bytes) -> Callable[[], Sequence[Table]] | None:
         family = next((each for each in families if each.recognises(data[:HEAD_BYTES])), None)
         return None if family is None else partial(family.tables, f"{path}, file {name}", data)
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from acquisition.errors import FormatError
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat
-from acquisition.recordings.tables.headings import Heading, is_time
+from acquisition.recordings.tables.headings import Heading, Role, is_time
 from acquisition.recordings.tables.markup import numbers, read_markup, tables_of_markup
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Table, side_by_side
@@ -42,7 +42,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
 
 
 def _heading(name: str, symbol: str, unit: str) -> Heading:
-    role = "time" if is_time(name) else "aside" if name == "Index" else "channel"
+    role: Role = "time" if is_time(name) else "aside" if name == "Index" else "channel"
     return Heading(f"{name} {symbol}".strip(), unit, role=role)
 
 

@@ -27,7 +27,7 @@ from acquisition.recordings.tables.table import Table
 MOST_BYTES = 1 << 27
 """Maximum size of a workbook, bytes."""
 MOST_LETTERS = 1 << 27
-"""Maximum number of characters of all cells, a number counting as eight: a million rows of three columns take 24 million."""
+"""Maximum number of characters of all cells; a number counts as eight."""
 MEMORY_BYTES = 1 << 30
 """Memory limit of the child process, bytes: a million rows of three columns take 600 MB."""
 TIME_LIMIT_S = 60.0

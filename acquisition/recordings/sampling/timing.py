@@ -98,7 +98,7 @@ def time_by_formula(
     numbers: I8,
     rate_hz: float | None,
 ) -> Timing | None:
-    """Use the times ``start_s + i step_s`` of a header, or None if they are impossible or the column of times disagrees.
+    """Use the times ``start_s + i step_s`` of a header; None if they are impossible or the column of times differs.
 
     ``printed`` are the times of the rows (NaN if unread), ``tolerance`` is half the last digit of each, and
     ``numbers`` is the index i of each row.

@@ -72,7 +72,7 @@ def find_quantum(values: F8, tick: float) -> float:
 
 
 def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, rounding: float) -> tuple[F8, B1]:
-    """Sum backward differences ``(x[i] - x[i-1]) * rate_hz`` to a position (m), zero at the first sample, NaN if unknown.
+    """Sum backward differences ``(x[i] - x[i-1]) * rate_hz`` to a position, m: zero at first, NaN if unknown.
 
     ``index`` are sample numbers, increasing; a jump is a gap. A value within ``rounding`` of a multiple of the tick is
     replaced by that multiple, so that rounding errors do not add up. In a gap the velocity is interpolated linearly.

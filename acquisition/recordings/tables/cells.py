@@ -154,7 +154,7 @@ def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
 def _exponents(
     text: NDArray[np.bytes_], kinds: NDArray[np.uint8], places: I8, rows: B1, values: F8, decimals: I1
 ) -> bool:
-    """Read the numbers in some rows, if all of them have a mantissa with a mark and an exponent of up to three digits."""
+    """Read the numbers in some rows, if all have a mantissa with a mark, and an exponent of up to three digits."""
     letters = kinds[rows] == _E
     exponent = np.count_nonzero(kinds[rows], axis=1) - letters.argmax(axis=1)  # with its letter
     own = places[rows] - exponent
@@ -176,7 +176,7 @@ def scaled(values: F8, decimals: I1 | None, power: int) -> F8:
     A number printed with d decimals is a whole number over 10**d, so it is divided once by 10**(d - power).
     """
     if decimals is None:
-        return values / 10.0**-power if power else values.copy()
+        return values * np.float64(1.0) if not power else values / np.float64(10.0**-power)
     if not power:
         return values.copy()
     places = np.clip(decimals, 0, _MOST_TENS).astype(np.int64)

@@ -18,7 +18,7 @@ from acquisition.recordings.tables.choose import Answers, choose_channel, measur
 from acquisition.recordings.tables.table import Column, Table, names_apart
 from acquisition.recordings.tables.text import says_simulated
 from acquisition.recordings.units import Measure
-from acquisition.source import Kind, SourceInfo
+from acquisition.source import ClockKind, Kind, SourceInfo
 
 if TYPE_CHECKING:
     from acquisition.recordings.tables.dialect import Header
@@ -48,7 +48,7 @@ class Reading:
         """Return the recording of a block, with what was found in its values."""
         table, column, samples, name = self.table, self.column, self.samples, PurePath(path).name
         kind: Kind = "simulated" if says_simulated(f"{table.title} {table.run} {column.name} {name}") else "replay"
-        clock = "device" if samples.timing.grid is None else "nominal"
+        clock: ClockKind = "device" if samples.timing.grid is None else "nominal"
         return Recording(
             format=family,
             path=path,

@@ -51,7 +51,7 @@ def _is_even(column: F8) -> bool:
 
 
 def is_aside(heading: Heading, column: F8, others: bool) -> bool:
-    """Return whether a column is auxiliary: row numbers (if ``others`` may be the times), uncertain, or nearly empty."""
+    """Return whether a column is row numbers (if ``others`` may be the times), an uncertainty, or nearly empty."""
     name = " ".join(heading.name.lower().replace("_", " ").split())
     index = others and are_row_numbers(column) and (name in _INDEX or bool(_NUMBERED.fullmatch(name)))
     return index or is_uncertainty(name) or bool(np.mean(np.isfinite(column)) < _SPARSE)
