@@ -30,13 +30,12 @@ from acquisition.recordings.sampling.nominal import median, time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS, value_traps
 from acquisition.recordings.sampling.velocity import find_quantum, find_tick, integrate, outer_join
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, parse_number, scaled
-from acquisition.recordings.tables.channel import Samples
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.format import Reading, read_channel
 from acquisition.recordings.tables.headings import guess_delimiter, is_time, name_and_unit, split_cells
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Table
-from acquisition.recordings.tables.text import Text, head_lines, text_of
+from acquisition.recordings.tables.text import head_lines, text_of
 from acquisition.recordings.units import LENGTHS
 
 Quantity = Literal["distance", "velocity"]
@@ -187,9 +186,10 @@ FORMAT = MotionSensor()
 
 def _read(path: str, data: bytes, answers: Answers) -> File:
     text = text_of(path, data)
-    layout = _find_layout(path, text, answers.channel, answers.unit)
-    first = text.head(layout.lines + 1)[layout.lines]
-    delimiter = _delimiter([line.text for line in text.head(layout.lines + _ROWS_OF_SHAPE)[layout.lines :]])
+    head = text.head(_HEADER_LINES + _ROWS_OF_SHAPE)
+    layout = _find_layout(path, [line.text for line in head], answers.channel, answers.unit)
+    first, below = head[layout.lines], [line.text for line in head[layout.lines :] if line.text.strip()]
+    delimiter = guess_delimiter(next(filter(_is_row, below), below[0]))
     read, lines, traps = read_rows(path, text, first, delimiter)
     if len(read) < layout.columns:
         raise _no_rows(path, first.number, f"rows of {layout.columns} numbers")
@@ -224,40 +224,47 @@ def _read(path: str, data: bytes, answers: Answers) -> File:
     return File(path, data, reading, quantum, error_m, tuple(found))
 
 
-# The lines above the rows ---------------------------------------------------------------------------------------
-
-
-def _find_layout(path: str, text: Text, channel: str | None, unit: str | None) -> Layout:
+def _find_layout(path: str, lines: Sequence[str], channel: str | None, unit: str | None) -> Layout:
     """Return the meaning of the rows, or ask for it if nothing shows it."""
-    lines = [line.text for line in text.head(_HEADER_LINES + _ROWS_OF_SHAPE)]
     if channel is not None and channel.lower() not in _CHANNELS:
         raise FormatError(path, f'channel must be distance or velocity, got "{channel}"', "name one of these")
     wanted = None if channel is None else _CHANNELS[channel.lower()]
     stated = None if unit is None else unit.strip().removesuffix("/s")
     layout = _column_line(lines)
-    if layout is not None:
-        if stated is not None and stated != layout.unit:
-            problem = f'unit must be {layout.unit} as stated by the column line, got "{unit}"'
-            raise FormatError(path, problem, "leave the unit out", line=layout.lines)
-        title = " / ".join(line.strip() for line in lines[: layout.lines - 1] if line.strip())
-        layout = layout._replace(title=title)
-    else:
-        start = _first_row(lines)
-        if start < 0:
-            raise _no_rows(path, len(lines), "rows of two or three numbers")
-        layout = _by_shape(path, lines, start, wanted)
+    if layout is None:
+        layout = _by_shape(path, lines, wanted)
         if stated is not None and stated not in LENGTHS:
             raise FormatError(path, f'unit must be one of {", ".join(LENGTHS)}, got "{unit}"', "name one of these")
-        # Line 1 is the title, unless it is a row or looks like a damaged row.
-        titled = start and (_is_title(lines[0]) or not _begins_with_number(lines[0]))
-        layout = layout._replace(unit=stated or layout.unit, lines=int(bool(titled)))
-        layout = layout._replace(title=lines[0].strip() if titled else "")
+        layout = layout._replace(unit=stated or layout.unit)
+    if stated is not None and stated != layout.unit:
+        problem = f'unit must be {layout.unit} as stated by the column line, got "{unit}"'
+        raise FormatError(path, problem, "leave the unit out", line=layout.lines)
     if wanted and wanted != layout.quantity:
         problem = f'channel must be {layout.quantity}, which the file holds, got "{channel}"'
         raise FormatError(path, problem, "leave the channel out or name the other file")
     if not any(line.strip() for line in lines[layout.lines :]):
         raise _no_rows(path, len(lines), "rows of numbers below the column line")
     return layout
+
+
+def _by_shape(path: str, lines: Sequence[str], wanted: Quantity | None) -> Layout:
+    """Return the layout that the shape of the rows or the user indicates."""
+    start = _first_row(lines)
+    if start < 0:
+        raise _no_rows(path, len(lines), "rows of two or three numbers")
+    columns, layout = len(_numbers(lines[start])), _shape(lines[start:])
+    if layout is None and columns == 2 and wanted:
+        layout = Layout(wanted, 2, "cm", assumed=f"{wanted}, as stated by the user")
+    if layout is None:
+        got = f"{columns} columns" + (" under the title" if any(map(_is_title, lines[:_HEADER_LINES])) else "")
+        if columns != 2:
+            raise _no_column_line(path, got, start + 1)
+        need = MissingItem(Missing.CHANNEL, ("distance", "velocity"), "distance")
+        reason = f"no column line names the columns, got {got}"
+        raise NeedsAnswer(Question(path, (need,), reason=reason), line=start + 1)
+    # Line 1 is the title, unless it is a row or looks like a damaged row.
+    titled = start and (_is_title(lines[0]) or _numbers(lines[0])[:1] in ([], [None]))
+    return layout._replace(lines=1, title=lines[0].strip()) if titled else layout
 
 
 def _no_column_line(path: str, got: str, line: int | None = None) -> FormatError:
@@ -274,11 +281,12 @@ def _column_line(lines: Sequence[str]) -> Layout | None:
         if _is_row(line):
             return None
         cells = [cell.strip().lower() for cell in split_cells(line, guess_delimiter(line) or "\t")]
+        title = " / ".join(line.strip() for line in lines[: at - 1] if line.strip())
         if 2 <= len(cells) <= 3 and cells[0] == _TIME:
             if (unit := _VELOCITY.get(cells[1])) and len(cells) == 2:
-                return Layout("velocity", 2, unit, at)
+                return Layout("velocity", 2, unit, at, title=title)
             if (unit := _DISTANCE.get(cells[1])) and (len(cells) == 2 or _ERROR.get(cells[2]) == unit):
-                return Layout("distance", len(cells), unit, at)
+                return Layout("distance", len(cells), unit, at, title=title)
     return None
 
 
@@ -306,52 +314,24 @@ def _first_row(lines: Sequence[str]) -> int:
     return next((at for at, line in enumerate(lines[:_HEADER_LINES]) if _is_row(line)), -1)
 
 
-def _begins_with_number(line: str) -> bool:
-    return _numbers(line)[:1] not in ([], [None])
-
-
-def _delimiter(lines: Sequence[str]) -> str:
-    rows = [line for line in lines if line.strip()]
-    return next((guess_delimiter(row) for row in rows if _is_row(row)), guess_delimiter(rows[0]) if rows else "\t")
-
-
 def _shape(lines: Sequence[str]) -> Layout | None:
     """Infer the layout from the rows alone: a constant third column is the error, an initial NaN means velocity."""
     every = [_numbers(line) for line in lines[:_ROWS_OF_SHAPE] if line.strip()]
     rows = [[x for x in row if x is not None] for row in every if None not in row]
     three, two = ([row for row in rows if len(row) == n] for n in (3, 2))
-    if len(three) >= 3 and len(three) > len(two):
+    usual_rows = three if len(three) > len(two) else two
+    forward = sum(a[0] < b[0] for a, b in pairwise(usual_rows))
+    if len(usual_rows) < 3 or usual_rows[0][0] < 0 or forward < 0.5 * (len(usual_rows) - 1):
+        return None
+    if usual_rows is three:
         third = [row[2] for row in three]
         usual = max(set(third), key=third.count)
-        if usual > 0 and third.count(usual) >= _CONSTANT * len(third) and _times_run(three):
+        if usual > 0 and third.count(usual) >= _CONSTANT * len(third):
             assumed = "distance and its error, because the third column is constant"
             return Layout("distance", 3, "cm", assumed=assumed)
-    nan_first = len(two) >= max(3, len(three)) and rows[0] == two[0] and math.isnan(two[0][1])
-    if nan_first and not math.isnan(two[1][1]) and _times_run(two):
+    elif rows[0] == two[0] and math.isnan(two[0][1]) and not math.isnan(two[1][1]):
         return Layout("velocity", 2, "cm", assumed="velocity, because the first value is NaN")
     return None
-
-
-def _times_run(rows: Sequence[Sequence[float]]) -> bool:
-    forward = sum(a[0] < b[0] for a, b in pairwise(rows))
-    return rows[0][0] >= 0 and forward >= 0.5 * (len(rows) - 1)
-
-
-def _by_shape(path: str, lines: Sequence[str], start: int, wanted: Quantity | None) -> Layout:
-    if layout := _shape(lines[start:]):
-        return layout
-    columns = len(_numbers(lines[start]))
-    if columns == 2 and wanted:
-        return Layout(wanted, 2, "cm", assumed=f"{wanted}, as stated by the user")
-    got = f"{columns} columns" + (" under the title" if any(map(_is_title, lines[:_HEADER_LINES])) else "")
-    if columns != 2:
-        raise _no_column_line(path, got, start + 1)
-    need = MissingItem(Missing.CHANNEL, ("distance", "velocity"), "distance")
-    reason = f"no column line names the columns, got {got}"
-    raise NeedsAnswer(Question(path, (need,), reason=reason), line=start + 1)
-
-
-# Position and velocity ------------------------------------------------------------------------------------------
 
 
 def _velocity_alone(file: File) -> Recording:
@@ -394,8 +374,8 @@ def _join(position: File, velocity: File) -> Recording:
     flags |= np.where(in_p, p.flags[from_p], v.flags[from_v]) & UNREAD_FLAGS
     flags[~in_p] |= Flag.MISSING.value
     quantum_m = velocity.step() if velocity.tick() else position.quantum
-    traps = (*_velocity_traps(velocity), *_join_traps(p, v, from_p, from_v))
-    joined = position.recording(Block(0, t, distance, flags, None, speed), quantum_m, traps)
+    block = Block(0, t, distance, flags, None, speed)
+    joined = position.recording(block, quantum_m, _join_traps(position, velocity, from_p, from_v))
     return replace(
         joined,
         malformed_rows=p.malformed_rows + v.malformed_rows,
@@ -403,29 +383,25 @@ def _join(position: File, velocity: File) -> Recording:
     )
 
 
-def _velocity_traps(velocity: File) -> Iterable[Trap]:
-    """Yield the remarks on the velocity file, with its name, except remarks that apply to both files."""
-    for trap in (*velocity.reading.traps, *velocity.reading.samples.traps, *velocity.found):
+def _join_traps(position: File, velocity: File, from_p: I8, from_v: I8) -> Iterable[Trap]:
+    """Yield the remarks on the velocity file, except those that apply to both files, and on the two together."""
+    p, v = position.reading.samples, velocity.reading.samples
+    for trap in (*velocity.reading.traps, *v.traps, *velocity.found):
         if trap.code not in ("nominal_clock", "rate_assumed", "rate_given"):
-            yield Trap(trap.code, f"in {velocity.name}: {trap.message}", trap.count, trap.line)
-
-
-def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterable[Trap]:
+            yield replace(trap, message=f"in {velocity.name}: {trap.message}")
     alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
     if alone_v:
         message = f"{alone_v} times are only in the velocity file, so they have no distance"
         yield Trap("missing_samples", message, alone_v)
     if alone_p:
-        yield Trap(
-            "velocity_missing", f"{alone_p} times are only in the position file, so they have no velocity", alone_p
-        )
+        message = f"{alone_p} times are only in the position file, so they have no velocity"
+        yield Trap("velocity_missing", message, alone_p)
     # The velocity of a sample must be its difference from the previous position, multiplied by the rate.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
     x, rate_hz = p.value, p.timing.rate_hz
     apart = np.abs((x[from_p[both]] - x[from_p[both - 1]]) * rate_hz - v.value[from_v[both]])
     apart = apart[np.isfinite(apart)]
-    allowed = p.resolution * rate_hz + v.resolution
-    wrong = int(np.count_nonzero(apart > 1.01 * allowed))
+    wrong = int(np.count_nonzero(apart > 1.01 * (p.resolution * rate_hz + v.resolution)))
     if wrong > 0.5 * apart.size:
         message = f"{wrong} of {apart.size} velocities contradict the positions; the two files may be of different runs"
         yield Trap("pair_mismatch", message, wrong)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.block import B1, F8, I8, U8, Flag
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.nominal import median, place_unread, snap, time_flags
-from acquisition.recordings.sampling.timing import Timing
+from acquisition.recordings.sampling.timing import Rows, Timing
 
 IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
@@ -22,35 +20,7 @@ _FAR_SPREADS, _FAR_GAP = 30.0, 3.0
 _SAMPLE = 65536
 _FEWEST = 50  # minimum number of distances; with fewer, a common step may be accidental
 _ZEROS = 10
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rows:
-    """The rows of one channel, before they become samples; every array has one element for each row.
-
-    ``printed`` are the times as printed, s, or None; ``value`` the values in SI or a power of ten of it, NaN if unread
-    or absent. ``remark`` marks rows of text between samples, which are not samples. ``time_resolution`` (s) and
-    ``resolution`` are the last printed digits, the latter 0 for binary values. ``tolerance`` is half the last digit of
-    each time, if the times are compared with a formula in the header. ``cut`` says that the last row is incomplete,
-    ``last_cell`` is its first cell, and ``decimals`` the number of printed decimals of a time.
-    """
-
-    printed: F8 | None
-    value: F8
-    unread: B1
-    remark: B1
-    line: Callable[[int], int]
-    time_resolution: float
-    resolution: float
-    tolerance: F8 | None = None
-    cut: bool = False
-    last_cell: str = ""
-    decimals: int = 0
-
-    @property
-    def numbers(self) -> I8:
-        """Sample number of each row, not counting remarks; a remark has the number of the preceding row."""
-        return np.cumsum(~self.remark) - 1
+_BACKWARD = "run backward or ahead of their neighbours"
 
 
 def place(rows: Rows, timing: Timing) -> F8:
@@ -107,11 +77,7 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
         return
     kinds = (
         ("duplicate_time", Flag.DUPLICATE_TIME, "samples have the same time as an earlier one"),
-        (
-            "non_monotonic_time",
-            Flag.NON_MONOTONIC_TIME,
-            "samples have times that run backward or ahead of their neighbours",
-        ),
+        ("non_monotonic_time", Flag.NON_MONOTONIC_TIME, f"samples have times that {_BACKWARD}"),
         ("missing_samples", Flag.MISSING, "samples have no value"),
     )
     for code, flag, what in kinds:
@@ -147,10 +113,8 @@ def value_traps(
     if far.size:
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
-        message = (
-            f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others: the target was lost; "
-            "kept and flagged"
-        )
+        distances = f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others"
+        message = f"{distances}: the target was lost; kept and flagged"
         traps.append(Trap("lost_target", message, int(far.size), line(int(far[0]))))
     quantum = _common_step(distance, resolution)
     if length and quantum >= _COARSE_M * (1 - 1e-9):
@@ -167,18 +131,13 @@ def _zero_tail(distance: F8) -> int:
     return int(nonzero[-1]) + 1 if nonzero.size else int(distance.size)
 
 
-def _some(values: F8) -> F8:
-    """Return at most about 130 000 finite values, evenly spaced in the recording."""
-    some = values[:: max(1, values.size // _SAMPLE)]
-    return some[np.isfinite(some)]
-
-
-def _far(distance: F8, resolution: float) -> NDArray[np.int64]:
+def _far(distance: F8, resolution: float) -> I8:
     """Return the samples that deviate far more from the median than the others, with a gap in between.
 
     The size of the experiment is unknown, so there is no absolute limit. A decaying motion has no such gap.
     """
-    values, no_samples = _some(distance), np.empty(0, np.int64)
+    values, no_samples = distance[:: max(1, distance.size // _SAMPLE)], np.empty(0, np.int64)
+    values = values[np.isfinite(values)]
     if values.size < _ZEROS:
         return no_samples
     middle = median(values)

@@ -10,10 +10,10 @@ import numpy as np
 from acquisition.block import B1, F8, U8, Flag
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.samples import Rows, flags_of, place, row_traps, sample_traps
-from acquisition.recordings.sampling.timing import Timing, clock_traps, time_by_column, time_by_formula, time_by_rate
+from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps
+from acquisition.recordings.sampling.timing import Rows, Timing, clock_traps, find_timing
 from acquisition.recordings.tables.cells import EMPTY, EXPONENT, I1, UNREAD, scaled, usual_decimals
-from acquisition.recordings.tables.table import Column, Formula, Lines, Table
+from acquisition.recordings.tables.table import Column, Lines, Table
 from acquisition.recordings.units import TIMES, time_factor, time_power
 
 _LONGEST_S = 1e10
@@ -47,7 +47,11 @@ def read_samples(
     ``difference`` says that each value is the difference from the row before, so that the first may be absent.
     """
     rows = rows_of(path, table, column, power)
-    timing, traps = _timing(path, table, rows, rate_hz)
+    formula = table.formula and (table.formula.start_s, table.formula.step_s, table.formula.samples)
+    timing, found = find_timing(path, rows, formula, rate_hz)
+    if table.formula is None and table.times is not None and not table.times.unit:
+        found.append(Trap("unit_assumed", "the times have no unit: read as seconds"))
+    found.extend(clock_traps(timing))
     unread, t = rows.unread, place(rows, timing)
     timed = np.isfinite(t)
     where = np.flatnonzero(timed)
@@ -63,7 +67,7 @@ def read_samples(
     if difference and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
     zeros = table.lines.zeros if table.lines else 0
-    traps += (*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line))
+    traps = (*found, *row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line))
     malformed = int(np.count_nonzero(unread))
     return Samples(t, value, flags, timing, rows.resolution, traps, line, malformed, ~unread)
 
@@ -164,33 +168,3 @@ def _tolerance(printed: F8, decimals: I1, power: int) -> F8:
     """
     places = np.where(decimals < 0, 0.0, decimals % EXPONENT)
     return 0.5 * 10.0**-places * np.where(decimals >= EXPONENT, np.abs(printed), 10.0**power)
-
-
-def _timing(path: str, table: Table, rows: Rows, rate_hz: float | None) -> tuple[Timing, tuple[Trap, ...]]:
-    """Return the rate and the grid of the times: those of the header if no column contradicts it, or of the column."""
-    traps: list[Trap] = []
-    timing = None
-    if table.formula is not None:
-        timing, traps = _by_formula(path, table.formula, rows, rate_hz)
-    if timing is None and rows.printed is not None:
-        timing = time_by_column(path, rows.printed[~rows.unread], rows.time_resolution, rate_hz)
-        if table.formula is None and table.times is not None and not table.times.unit:
-            traps.append(Trap("unit_assumed", "the times have no unit: read as seconds"))
-    if timing is None:
-        timing = time_by_rate(path, rate_hz, "no column of times and no sampling interval")
-    return timing, (*traps, *clock_traps(timing))
-
-
-def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) -> tuple[Timing | None, list[Trap]]:
-    traps = []
-    count = int(np.count_nonzero(~rows.remark))
-    if formula.samples is not None and formula.samples != count:
-        message = f"the header declares {formula.samples} samples, but there are {count} rows; all are kept"
-        traps.append(Trap("stale_header", message, abs(formula.samples - count)))
-    printed = None if rows.printed is None else np.where(rows.unread, np.nan, rows.printed)
-    timing = time_by_formula(path, formula.start_s, formula.step_s, printed, rows.tolerance, rows.numbers, rate_hz)
-    if timing is None:
-        stated = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
-        what = "which are impossible" if printed is None else "but the column of times differs and is used"
-        traps.append(Trap("stale_header", f"{stated}, {what}", 1 if printed is None else printed.size))
-    return timing, traps
