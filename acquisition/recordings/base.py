@@ -11,7 +11,6 @@ from platformdirs import user_config_path
 
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Recording, Trap
-from acquisition.recordings.tables.text import HEAD_BYTES
 from acquisition.regular_file import open_regular
 
 
@@ -105,40 +104,20 @@ class SurveyFormat(Protocol):
         ...
 
 
-class PairFormat(Format, Protocol):
-    """A family that stores position and velocity in separate files."""
-
-    def read_pair(
-        self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
-    ) -> Recording:
-        """Read two files, each given as its path and content, and join them by time."""
-        ...
-
-
 def dialect_folder() -> Path:
     """Return the folder of a user's dialects inside the system's folder for settings."""
     return user_config_path("springmass", appauthor=False, roaming=True) / "dialects"
 
 
-def read_head(path: str | os.PathLike[str]) -> bytes:
-    """Return the first :data:`HEAD_BYTES` of a file; raise an error if it cannot be read or is empty."""
-    return _read(path, HEAD_BYTES)
-
-
-def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return the content of a file; raise an error if it cannot be read or is empty."""
-    return _read(path, -1)
-
-
-def _read(path: str | os.PathLike[str], limit: int) -> bytes:
+def read_bytes(path: str | os.PathLike[str], limit: int = -1) -> bytes:
+    """Return the first bytes of a file, or all; raise an error if it cannot be read or is empty."""
     name = os.fspath(path)
     try:
         with open_regular(name) as file:
             data = file.read(limit)
     except OSError as error:
-        raise FormatError(
-            name, f"cannot be opened ({error.strerror or error})", "check its name and permissions"
-        ) from error
+        problem = f"cannot be opened ({error.strerror or error})"
+        raise FormatError(name, problem, "check its name and permissions") from error
     except ValueError as error:  # the name contains a NUL character
         raise FormatError(repr(name), f"not a valid file name ({error})", "check the name") from error
     if not data:

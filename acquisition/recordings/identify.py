@@ -15,9 +15,10 @@ from typing import cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.extensions import entry_points_of, load_entry
-from acquisition.recordings.base import Format, PairFormat, Survey, SurveyFormat, dialect_folder, read_bytes, read_head
+from acquisition.recordings.base import Format, Survey, SurveyFormat, dialect_folder, read_bytes
 from acquisition.recordings.foreign import unknown_format
 from acquisition.recordings.recording import Recording
+from acquisition.recordings.tables.text import HEAD_BYTES
 
 _MODULES = {
     "motion-sensor": "motion_sensor",
@@ -62,7 +63,7 @@ def get_format(name: str) -> Format:
 
 def sniff(path: str | os.PathLike[str]) -> str:
     """Return the name of a file's format, identified by its first bytes."""
-    return _recognise(os.fspath(path), read_head(path)).name
+    return _recognise(os.fspath(path), read_bytes(path, HEAD_BYTES)).name
 
 
 def open_recording(
@@ -84,14 +85,15 @@ def open_recording(
     file is joined with the position file by time.
     """
     name = os.fspath(path)
-    reader = get_format(format) if format else _recognise(name, read_head(path))
+    reader = get_format(format) if format else _recognise(name, read_bytes(path, HEAD_BYTES))
     data = read_bytes(path)
     if velocity_path is not None:
-        if not hasattr(reader, "read_pair"):
+        read_pair = getattr(reader, "read_pair", None)
+        if read_pair is None:
             problem = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
             raise UnknownFormat(name, problem, "leave the velocity file out")
         velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
-        return cast("PairFormat", reader).read_pair((name, data), velocity, rate_hz=rate_hz)
+        return cast(Recording, read_pair((name, data), velocity, rate_hz=rate_hz))
     optional = {"run": run, "time": time, "time_unit": time_unit}
     answers = {name: value for name, value in optional.items() if value is not None}
     return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **answers)
@@ -99,7 +101,7 @@ def open_recording(
 
 def inspect(path: str | os.PathLike[str]) -> Inspection:
     """Return the format and the content of a file, before a channel is chosen."""
-    head = read_head(path)
+    head = read_bytes(path, HEAD_BYTES)
     reader = _recognise(os.fspath(path), head)
     if not isinstance(reader, SurveyFormat):
         return Inspection(reader.name, reader.title, "", ())
@@ -123,11 +125,15 @@ def _loaders() -> dict[str, Callable[[], Format]]:
             if each.name in (*_MODULES, "table"):
                 where = folder / f"{each.name}.toml"
                 raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')
-            loaders[each.name] = lambda each=each: each
+            loaders[each.name] = partial(_declared, each)
     loaders |= {name: partial(_built_in, module) for name, module in _MODULES.items()}
     for name, entry in entry_points_of("springmass.formats").items():
         loaders.setdefault(name, partial(load_entry, entry, f'format "{name}"', AcquisitionError))
     return {**loaders, "table": partial(_built_in, "any_table")}
+
+
+def _declared(each: Format) -> Format:
+    return each
 
 
 def _built_in(module: str) -> Format:

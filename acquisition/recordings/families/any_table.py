@@ -22,8 +22,15 @@ from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.cells import clock_s, parse_number
 from acquisition.recordings.tables.dialect import Header, text_format
 from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading
-from acquisition.recordings.tables.layout import Layout, find_table
-from acquisition.recordings.tables.roles import are_row_numbers, columns_of, is_aside, times_by_name, times_by_steps
+from acquisition.recordings.tables.layout import (
+    Layout,
+    are_row_numbers,
+    columns_of,
+    find_table,
+    is_aside,
+    times_by_name,
+    times_by_steps,
+)
 from acquisition.recordings.tables.table import Formula
 from acquisition.recordings.tables.text import Text, decode
 from acquisition.recordings.units import measure_of, time_power
@@ -135,12 +142,7 @@ def _formula(table: Layout) -> Formula | None:
 
 
 def without_monitor(text: Text) -> Text:
-    """Return a text in which the clock times that a serial monitor writes before each line are the first column.
-
-    >>> text = without_monitor(Text.of(b"15:00:25.3 -> 23.4\\n15:00:25.4 -> 23.5\\n15:00:25.5 -> 23.7\\n"))
-    >>> text.data
-    b'15:00:25.3 23.4\\n15:00:25.4 23.5\\n15:00:25.5 23.7\\n'
-    """
+    """Return a text in which the clock times that a serial monitor writes before each line are the first column."""
     if not _MONITOR.search(decode(text.data[text.start : min(text.start + (1 << 16), text.stop)])):
         return text
     lines = decode(text.data[text.start : text.stop]).replace("\r\n", "\n").replace("\r", "\n")

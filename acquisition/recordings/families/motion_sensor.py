@@ -149,13 +149,7 @@ class MotionSensor:
         time: str | None = None,
         time_unit: str | None = None,
     ) -> Recording:
-        """Read one file, either of position or of velocity; see :class:`springmass.extend.Format`.
-
-        >>> rows = b"Time (s)\\tDistance (cm)\\n0.430\\t16.500\\n0.440\\t16.509\\n0.450\\t16.565"
-        >>> recording = FORMAT.read("run.txt", rows)
-        >>> recording.info.rate_hz, recording.samples.distance.tolist()
-        (100.0, [0.165, 0.16509, 0.16565])
-        """
+        """Read one file, either of position or of velocity; see :class:`springmass.extend.Format`."""
         file = _read(path, data, Answers(channel, rate_hz, unit, run, time, time_unit))
         if file.quantity == "velocity":
             return _velocity_alone(file)

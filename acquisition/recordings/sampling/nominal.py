@@ -49,9 +49,6 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
     """Infer the rate from printed times (s) with a last digit of ``resolution``; None without two different times.
 
     Times may repeat, run backward or be missing. If the rate is known, only grids of this rate are tried.
-
-    >>> find_rate(np.array([0.0, 0.017, 0.033, 0.05, 0.067]), 0.001).rate_hz
-    60.0
     """
     times = t if (t[1:] > t[:-1]).all() else np.unique(t[np.isfinite(t)])
     if times.size < 2:
@@ -188,9 +185,6 @@ def time_flags(t: F8, step: float) -> U8:
 
     The times of samples with neither DUPLICATE_TIME nor NON_MONOTONIC_TIME increase strictly. If a single time is
     ahead of its neighbours, only that time is flagged, and not all the times after it.
-
-    >>> [Flag(int(f)).name for f in time_flags(np.array([0.0, 0.1, 0.1, 9.2, 0.3, 0.6]), 0.1)][2:]
-    ['DUPLICATE_TIME', 'NON_MONOTONIC_TIME', 'GAP_BEFORE', 'GAP_BEFORE']
     """
     flags = np.zeros(t.size, np.uint8)
     if t.size == 0 or _even(t, 1.5 * step):

@@ -19,10 +19,6 @@ def find_tick(values: F8, resolution: float) -> float | None:
     Gaps between neighbouring sizes of values are candidates for the step s. Each is refined by least squares of ``v =
     k s`` over an increasing range of v, because the integers k of large v are certain only if s is accurate. The step
     must explain 95 % of the different sizes.
-
-    >>> k = np.random.default_rng(1).integers(-900, 900, 400)
-    >>> round(find_tick(np.round(k * 0.25536, 3), 0.001), 5)
-    0.25536
     """
     size = np.unique(np.rint(np.abs(values[np.isfinite(values)]) / resolution))
     if size.size < _FEWEST_VALUES or size[-1] > 2**50:
@@ -57,10 +53,6 @@ def find_quantum(values: F8, tick: float) -> float:
     A device that converts timer ticks to distance by integer arithmetic gives values at ``j m tick`` and ``(j m + 1)
     tick``: exact multiples of a small step, in clusters one timer tick apart. The spacing of the clusters is the
     quantum. It is found by phase coherence, ``|mean exp(2 pi i k / m)|``, which must reach 0.9.
-
-    >>> j = np.arange(-300, 300)
-    >>> round(find_quantum(0.43 * j + 0.043 * (j % 2), 0.043), 6)
-    0.43
     """
     k = np.rint(values[np.isfinite(values)] / tick).astype(np.int64)
     spread = float(np.std(k)) if k.size else 0.0
@@ -110,9 +102,6 @@ def outer_join(left: I8, right: I8, regular: B1 | None = None) -> tuple[I8, I8]:
     ``left`` whose numbers are in order. Return the row of each joined sample in ``left`` and in ``right``, -1 if there
     is none. Rows of ``left`` keep their order, and rows that exist only in ``right`` are inserted according to their
     numbers.
-
-    >>> [rows.tolist() for rows in outer_join(np.array([2, 3, 4]), np.array([1, 2, 4, 5]))]
-    [[-1, 0, 1, 2, -1], [0, 1, -1, 2, 3]]
     """
     rows_of = {key: row for row, key in enumerate(_with_turn(right))}
     partner = np.array([rows_of.pop(key, -1) for key in _with_turn(left)], np.int64)

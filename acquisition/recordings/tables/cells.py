@@ -40,9 +40,6 @@ def cell(text: str) -> tuple[float, int]:
     """Return the number in a cell, with a point or a comma, and its printed decimals; NaN and a code if there is none.
 
     This is stricter than ``float()``: it rejects ``1_000``, ``inf``, digits of other scripts, and overflow.
-
-    >>> cell("-8,90E-4"), cell("16.509"), cell("1.234,5"), cell("")
-    ((-0.00089, 66), (16.509, 3), (nan, -3), (nan, -2))
     """
     if not text:
         return math.nan, EMPTY
@@ -57,11 +54,7 @@ def cell(text: str) -> tuple[float, int]:
 
 
 def clock_s(cell: str) -> tuple[str, float, int] | None:
-    """Return the printed date, the second of the day and the number of decimals; None for any other text.
-
-    >>> clock_s("10:04:59.812"), clock_s("01/08/2024 1:00:36 pm"), clock_s("0.5")
-    (('', 36299.812, 3), ('01/08/2024', 46836.0, 0), None)
-    """
+    """Return the printed date, the second of the day and the number of decimals; None for any other text."""
     match = CLOCK.fullmatch(cell)
     if match is None:
         return None
@@ -176,7 +169,8 @@ def scaled(values: F8, decimals: I1 | None, power: int) -> F8:
     A number printed with d decimals is a whole number over 10**d, so it is divided once by 10**(d - power).
     """
     if decimals is None:
-        return values * np.float64(1.0) if not power else values / np.float64(10.0**-power)
+        result: F8 = values / 10.0**-power if power else values.copy()
+        return result
     if not power:
         return values.copy()
     places = np.clip(decimals, 0, _MOST_TENS).astype(np.int64)

@@ -47,7 +47,8 @@ def read_samples(
     ``difference`` says that each value is the difference from the row before, so that the first may be absent.
     """
     rows = rows_of(path, table, column, power)
-    formula = table.formula and (table.formula.start_s, table.formula.step_s, table.formula.samples)
+    stated = table.formula
+    formula = None if stated is None else (stated.start_s, stated.step_s, stated.samples)
     timing, found = find_timing(path, rows, formula, rate_hz)
     if table.formula is None and table.times is not None and not table.times.unit:
         found.append(Trap("unit_assumed", "the times have no unit: read as seconds"))

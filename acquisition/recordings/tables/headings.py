@@ -71,11 +71,7 @@ def role_of(heading: Heading) -> Role:
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
-    """Split a heading into its name and its unit in brackets.
-
-    >>> name_and_unit('"Position (mm)"'), name_and_unit("Time ( s )"), name_and_unit("velocity")
-    (('Position', 'mm'), ('Time', 's'), ('velocity', ''))
-    """
+    """Split a heading into its name and its unit in brackets."""
     plain = heading.strip().strip('"').strip()
     match = BRACKETED.fullmatch(plain)
     if not match or not match["name"] or _NO_UNIT.fullmatch(match["unit"].strip()):
@@ -84,11 +80,7 @@ def name_and_unit(heading: str) -> tuple[str, str]:
 
 
 def heading_of(cell: str) -> tuple[str, str]:
-    """Split a heading into name and unit: the unit is in brackets, after a slash, or after a last underscore.
-
-    >>> heading_of("Zeit t / s"), heading_of("theta_rad"), heading_of("x_rojo"), heading_of("Position in mm")
-    (('Zeit t', 's'), ('theta', 'rad'), ('x_rojo', ''), ('Position', 'mm'))
-    """
+    """Split a heading into name and unit: the unit is in brackets, after a slash, or after a last underscore."""
     name, unit = name_and_unit(cell)
     if unit:
         return name, unit
@@ -107,11 +99,7 @@ def _ends(name: str, unit: str) -> bool:
 
 
 def is_time(name: str) -> bool:
-    """Return whether a column's name denotes time, in one of a dozen languages.
-
-    >>> is_time("Zeit"), is_time("Position"), is_time("t_{1}"), is_time("time for 10 swings")
-    (True, False, True, False)
-    """
+    """Return whether a column's name denotes time, in one of a dozen languages."""
     found = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
     time_words = [word for word in found if word in _TIME_WORDS]
     others = [word for word in found if word not in time_words]
@@ -126,11 +114,7 @@ def is_uncertainty(name: str) -> bool:
 
 
 def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
-    """Split a line of headings, quoted or not; return its cells and their separator, which is found if not given.
-
-    >>> split_heading('"Time (s)","Length, total (m)"')
-    (['Time (s)', 'Length, total (m)'], ',')
-    """
+    """Split a line of headings, quoted or not; return its cells and their separator, which is found if not given."""
     bare = re.sub(r'"[^"]*"', "", line)
     mark = mark or next((mark for mark in "\t;," if mark in bare), "\t")
     cells = [each.strip() for each in re.split(rf'{re.escape(mark)}(?=(?:[^"]*"[^"]*")*[^"]*$)', line)]
@@ -143,9 +127,6 @@ def guess_delimiter(line: str) -> str:
     """Return the separator of the cells of a row; an empty string means runs of white space.
 
     A comma is the separator only if there is no other separator, because it may be a decimal mark.
-
-    >>> guess_delimiter("0,43;16,5"), guess_delimiter("0.43 16.5"), guess_delimiter("0.43,16.5")
-    (';', '', ',')
     """
     for mark in "\t;":
         if mark in line:
@@ -168,11 +149,7 @@ def split_cells(line: str, delimiter: str) -> list[str]:
 
 
 def numbered_apart(names: Sequence[str]) -> list[str]:
-    """Return unique names: repetitions of a name get a number.
-
-    >>> numbered_apart(["a", "b", "a"])
-    ['a', 'b', 'a [2]']
-    """
+    """Return unique names: repetitions of a name get a number."""
     seen: dict[str, int] = {}
     apart: dict[str, None] = {}
     for name in names:
