@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.block import B1, F8, U8, Flag
+from acquisition.block import B1, F8, I8, U8, Flag
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps
@@ -55,14 +55,14 @@ def read_samples(
     found.extend(clock_traps(timing))
     unread, t = rows.unread, place(rows, timing)
     timed = np.isfinite(t)
-    where = np.flatnonzero(timed)
+    where = _rows_in(timed)
     t, value = t[where], rows.value[where]
     if np.isnan(value).all():
         problem = f'expected numbers as "{column.name}", got NaN in all {value.size} rows'
         raise FormatError(path, problem, "record the run again", line=rows.line(0) or None)
 
     def line(row: int) -> int | None:
-        return rows.line(int(where[row])) or None
+        return rows.line(row if isinstance(where, slice) else int(where[row])) or None
 
     flags = flags_of(t, value, unread[where], timing.rate_hz)
     if difference and not unread[0] and np.isnan(value[0]):
@@ -113,7 +113,7 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int
     keep = present | remark
     if not (keep & ~remark).any():
         raise _no_numbers(path, column, 0, lines.first)
-    chosen = np.flatnonzero(keep)
+    chosen = _rows_in(keep)
     remark, unknown = remark[chosen], (unread | remark)[chosen]
     printed, tolerance, time_digit, decimals = None, None, 0.0, 0
     if time is not None:
@@ -127,14 +127,18 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int
         unknown |= beyond
     value = scaled(own.values, form, power)[chosen]
     value[unknown] = np.nan
+
+    def line(row: int) -> int:
+        return lines.line(row if isinstance(chosen, slice) else int(chosen[row]))
+
     if unknown.all():
-        raise _no_numbers(path, column, unknown.size, lines.line(int(chosen[0])))
+        raise _no_numbers(path, column, unknown.size, line(0))
     return Rows(
         printed=printed,
         value=value,
         unread=unknown,
         remark=remark,
-        line=lambda row: lines.line(int(chosen[row])),
+        line=line,
         time_resolution=time_digit,
         resolution=last_digit(value, form, power),
         tolerance=tolerance,
@@ -142,6 +146,11 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int
         last_cell=lines.last_cell,
         decimals=decimals,
     )
+
+
+def _rows_in(mask: B1) -> I8 | slice:
+    """Return the indices of the rows in a mask; a slice of all rows takes no memory."""
+    return slice(None) if mask.all() else np.flatnonzero(mask)
 
 
 def _no_numbers(path: str, column: Column, rows: int, line: int) -> FormatError:
