@@ -5,7 +5,7 @@ Each format stores less than a run file. Everything that it cannot store is repo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,16 +39,19 @@ def write_motion_sensor(path: str, samples: Block, info: SourceInfo, title: str 
     """
     _demand_times(path, samples.t, 3, "MotionSensor.vi prints times to 1 ms")
     head = title if title.lower().startswith(_TITLE.lower()) else f"{_TITLE} {title or start_time}".strip()
-    head = " ".join(_with_simulated_note(head, info).split())
-    velocity = _velocity(samples, info.rate_hz) if samples.velocity is None else samples.velocity
+    head += " (simulated)" if info.kind == "simulated" and not says_simulated(head) else ""
+    head, velocity = " ".join(head.split()), samples.velocity
+    if velocity is None:
+        whole = np.rint(np.diff(samples.t, prepend=np.nan) * info.rate_hz) == 1
+        velocity = np.where(whole, np.diff(samples.distance, prepend=np.nan) * info.rate_hz, np.nan)
     error = "" if info.stated_error_m is None else f"\t{info.stated_error_m * 100:.3f}"
     columns = "Time (s)\tDistance (cm)" + ("\tDist Error (cm)" if error else "")
-    position = (f"{t:.3f}\t{_fixed(x * 100, 3)}{error}" for t, x in _pairs(samples.t, samples.distance))
-    speeds = (f"{t:.3f}\t{_fixed(v * 100, 3)}" for t, v in _pairs(samples.t, velocity))
-    files = (
-        ("", "\r\n".join([head, columns, *position]).encode()),
-        ("_velocity", "\r\n".join([head, "Time (s)\tVelocity (cm/s)", *speeds]).encode()),
-    )
+
+    def file(columns: str, values: F8, end: str = "") -> bytes:
+        pairs = zip(samples.t.tolist(), values.tolist(), strict=True)
+        return "\r\n".join([head, columns, *(f"{t:.3f}\t{_fixed(x * 100, 3)}{end}" for t, x in pairs)]).encode()
+
+    files = ("", file(columns, samples.distance, error)), ("_velocity", file("Time (s)\tVelocity (cm/s)", velocity))
     return Written(files, _losses(samples, rounding_m=1e-5))
 
 
@@ -85,10 +88,6 @@ def _fixed(value: float, decimals: int) -> str:
     return shown.removeprefix("-") if float(shown) == 0 else shown
 
 
-def _pairs(t: F8, values: F8) -> Iterable[tuple[float, float]]:
-    return zip(t.tolist(), values.tolist(), strict=True)
-
-
 def _demand_times(path: str, t: F8, decimals: int, why: str) -> None:
     """Check that no two samples with different times get the same printed time."""
     printed = np.rint(t * 10.0**decimals)
@@ -96,20 +95,6 @@ def _demand_times(path: str, t: F8, decimals: int, why: str) -> None:
     if merged:
         problem = f"{why}, but {merged} samples are closer together"
         raise FormatError(path, problem, "write .csv or a run file instead")
-
-
-def _velocity(samples: Block, rate_hz: float) -> F8:
-    velocity = np.full(len(samples), np.nan)
-    if len(samples) > 1:
-        whole = np.rint(np.diff(samples.t) * rate_hz) == 1
-        velocity[1:] = np.where(whole, np.diff(samples.distance) * rate_hz, np.nan)
-    return velocity
-
-
-def _with_simulated_note(title: str, info: SourceInfo) -> str:
-    if info.kind != "simulated" or says_simulated(title):
-        return title
-    return f"{title} (simulated)".strip()
 
 
 def _losses(samples: Block, rounding_m: float) -> tuple[str, ...]:

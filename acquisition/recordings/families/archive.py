@@ -78,19 +78,16 @@ def _is_timed(tables: Sequence[Table]) -> bool:
     return any(each.is_timed for each in tables)
 
 
-def members(path: str, data: bytes, most_bytes: int = MOST_BYTES) -> Iterator[tuple[str, bytes]]:
+def members(path: str, data: bytes) -> Iterator[tuple[str, bytes]]:
     """Yield the name and content of each file in a zip archive, except files that operating systems add."""
-    remedy = "unpack it, and name a file inside"
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            listed = _wanted(archive.infolist())
-            if len(listed) > _MOST_MEMBERS:
-                problem = f"expected an archive of at most {_MOST_MEMBERS} files, got {len(listed)}"
-                raise FormatError(path, problem, remedy)
+            listed = list(filter(_is_wanted, archive.infolist()))
             total = sum(each.file_size for each in listed)
-            if total > most_bytes:
-                problem = f"expected at most {most_bytes} bytes unpacked, got {total}"
-                raise FormatError(path, problem, remedy)
+            if len(listed) > _MOST_MEMBERS or total > MOST_BYTES:
+                limits = f"at most {_MOST_MEMBERS} files of {MOST_BYTES} bytes"
+                problem = f"expected {limits}, got {len(listed)} of {total} bytes"
+                raise FormatError(path, problem, "unpack it, and name a file inside")
             for each in listed:
                 with archive.open(each) as file:
                     # zipfile stops at the stated size, and raises an error if the file is longer.
@@ -103,16 +100,12 @@ def members(path: str, data: bytes, most_bytes: int = MOST_BYTES) -> Iterator[tu
         raise foreign_format(path, b"") or unread from error
 
 
-def _wanted(listed: Sequence[zipfile.ZipInfo]) -> list[zipfile.ZipInfo]:
-    if not all(each.filename for each in listed):
+def _is_wanted(file: zipfile.ZipInfo) -> bool:
+    """Return whether a file is none that an operating system adds."""
+    if not file.filename:
         raise zipfile.BadZipFile("a file in it has no name")
-    return [
-        each
-        for each in listed
-        if not each.is_dir()
-        and not each.filename.startswith("__MACOSX/")
-        and PurePosixPath(each.filename).name[:1] != "."
-    ]
+    hidden = file.filename.startswith("__MACOSX/") or PurePosixPath(file.filename).name[:1] == "."
+    return not file.is_dir() and not hidden
 
 
 def _evidence(head: bytes) -> str:

@@ -1,21 +1,4 @@
-"""Dialects that a user declares without code: a TOML file describes the tables of a family.
-
-Each file in ``springmass/dialects`` under the user's configuration folder is a family with the name of the file::
-
-    title = "height log of bench 12"
-    begins = "Height log"            # what line 1 begins with
-    separator = ";"                  # or "tab", "blank"
-    heading = 1                      # lines above the rows
-    rate_hz = 100                    # if no column holds times
-
-    [[column]]
-    name = "n"
-    aside = true                     # read only if it is named
-
-    [[column]]
-    name = "height"
-    unit = "mm"                      # a column of times has time = true
-"""
+"""Dialects that a user declares without code, in TOML files; docs/how-to/add-a-format.md shows one."""
 
 from __future__ import annotations
 
