@@ -29,10 +29,10 @@ _MODULES = {
     "capstone": "dialects:CAPSTONE",
     "datastudio": "dialects:DATASTUDIO",
     "vernier": "dialects:VERNIER",
-    "logger-pro": "logger_pro",
-    "phyphox": "phyphox",
-    "cassy": "cassy",
-    "tracker": "tracker",
+    "logger-pro": "saved:LOGGER_PRO",
+    "phyphox": "saved:PHYPHOX",
+    "cassy": "saved:CASSY",
+    "tracker": "saved:TRACKER",
 }
 """For each name of a format its module in ``families``, and the format's name there if it is not FORMAT."""
 
