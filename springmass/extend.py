@@ -5,7 +5,7 @@ wheel alike. Import them from here; the modules that define them may move.
 
 Examples
 --------
->>> from springmass.extend import Channel, ColumnFormat, Contents, Formula, Sheet
+>>> from springmass.extend import Column, ColumnFormat, Formula, Header, Heading, Table, text_format
 >>> from springmass.extend import Family, FramedDecoder, LineSplitter, Reading
 >>> from springmass.extend import Law, Unit, make_law
 >>> from springmass.extend import Integrator, OneStep, acceleration
@@ -28,9 +28,10 @@ if TYPE_CHECKING:
     from acquisition.recordings.families.declared import dialect
     from acquisition.recordings.questions import Missing, MissingItem, Question
     from acquisition.recordings.recording import Original, Recording, Trap
-    from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Formula, Sheet
-    from acquisition.recordings.tables.sheet import ColumnFormat
-    from acquisition.recordings.tables.text import head_lines, text_of
+    from acquisition.recordings.tables.dialect import Header, text_format
+    from acquisition.recordings.tables.format import ColumnFormat
+    from acquisition.recordings.tables.headings import Heading
+    from acquisition.recordings.tables.table import Column, Formula, Table
     from acquisition.source import SourceInfo
     from pipeline.damping.laws.law import Law, Unit
     from pipeline.damping.laws.of_function import make_law
@@ -41,11 +42,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AnalysisError",
-    "Arrays",
     "Block",
-    "Channel",
+    "Column",
     "ColumnFormat",
-    "Contents",
     "Decoder",
     "DynamicsError",
     "Encoder",
@@ -56,6 +55,8 @@ __all__ = [
     "FormatError",
     "Formula",
     "FramedDecoder",
+    "Header",
+    "Heading",
     "Identity",
     "Integrator",
     "Law",
@@ -72,10 +73,10 @@ __all__ = [
     "Readings",
     "Recording",
     "SensorError",
-    "Sheet",
     "SourceInfo",
     "SumFrames",
     "SurveyFormat",
+    "Table",
     "Trajectory",
     "Trap",
     "Unit",
@@ -83,9 +84,8 @@ __all__ = [
     "auto",
     "dialect",
     "get_integrator",
-    "head_lines",
     "make_law",
-    "text_of",
+    "text_format",
     "with_sum",
 ]
 
@@ -101,9 +101,10 @@ _WHERE = {
     "acquisition.recordings.families.declared": ("dialect",),
     "acquisition.recordings.questions": ("Missing", "MissingItem", "Question"),
     "acquisition.recordings.recording": ("Original", "Recording", "Trap"),
-    "acquisition.recordings.tables.contents": ("Arrays", "Channel", "Contents", "Formula", "Sheet"),
-    "acquisition.recordings.tables.sheet": ("ColumnFormat",),
-    "acquisition.recordings.tables.text": ("head_lines", "text_of"),
+    "acquisition.recordings.tables.dialect": ("Header", "text_format"),
+    "acquisition.recordings.tables.format": ("ColumnFormat",),
+    "acquisition.recordings.tables.headings": ("Heading",),
+    "acquisition.recordings.tables.table": ("Column", "Formula", "Table"),
     "acquisition.source": ("SourceInfo",),
     "pipeline.damping.laws.law": ("Law", "Unit"),
     "pipeline.damping.laws.of_function": ("make_law",),

@@ -1,18 +1,25 @@
-"""Find the table in a text: preamble, names, units, first row and separator. No numbers are read here."""
+"""Find the table in the first lines of any text, and the roles of its columns."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
-from acquisition.recordings.tables.contents import Heading, is_time, name_and_unit, split_heading
-from acquisition.recordings.tables.text import Line, parse_number, split_cells
-from acquisition.recordings.units import measure_of, time_power
+import numpy as np
 
-__all__ = ["TableLayout", "clock_s", "find_table", "heading_of"]
+from acquisition.block import F8
+from acquisition.recordings.tables.cells import CLOCK, parse_number
+from acquisition.recordings.tables.headings import (
+    Heading,
+    heading_of,
+    is_time,
+    is_uncertainty,
+    split_cells,
+    split_heading,
+)
+from acquisition.recordings.units import measure_of, time_power
 
 _MARKS = ("\t", ";", ",", "")
 _PROBE, _FEWEST, _SOUND = 20, 3, 0.8
@@ -21,52 +28,39 @@ _COMMENT = "#%*!'/ \ufeff"
 _BRACKETS = re.compile(r"[\[\];]")  # brackets and semicolons of a matrix as MATLAB writes it
 _NUMBERS = re.compile(r"[-+\d.,;eE\s\[\]]*\d[-+\d.,;eE\s\[\]]*")
 _DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}", re.ASCII)
-_CLOCK = re.compile(
-    r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?"
-    r"(?:(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d{1,9})?))?|(?P<m2>\d{1,2}):(?P<s2>\d\d[.,]\d{1,9}))"
-    r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
-    re.ASCII,
-)
 _SETTING = re.compile(r"[=]|:(?!\s*$)")
 _LONGEST_NAME = 5  # maximum number of words
 _BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
-_SLASH = re.compile(r"(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
-_TAIL = re.compile(r"(?P<name>.*?[^\W_])(?:[_ ](?:in )?|,\s*|:)(?P<unit>[^\W_]+(?:/s(?:ec)?(?:\^?2|²)?)?|°(?:/s)?)")
-_IN = re.compile(r"(?P<name>.*?\S)\s+in\s+(?P<unit>\S+)")
-_NO_TAIL = frozenset(("1", "in", "g", "mg"))
-"""Units that often end a name without being its unit: ``V_in``, ``x_1``."""
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
+_NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
+_INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
+_FIRST_NUMBERS = 10  # row numbers begin below this; the first may be missing, in rows unlike the others
+_NEUTRAL = re.compile(
+    r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|(column|col|spalte|colonna|columna|var|field|unnamed:)[-_ ]?\d+",
+    re.IGNORECASE,
+)
+"""Names that do not prevent a column from being read as the times."""
+_SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
+"""Names of durations, which are not times of samples."""
+_SPARSE = 0.2  # minimum share of rows with a number in a column of samples
+_CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
 
 
-@dataclass(frozen=True, slots=True)
-class TableLayout:
-    """The layout of a table in a text.
+class Layout(NamedTuple):
+    """The layout of a table: its first row is line ``at``, counted from 0.
 
-    Parameters
-    ----------
-    preamble : tuple of str
-        Lines above the headings.
-    headings : tuple of Heading
-        One heading for each column; the names are empty if no line names the columns.
-    spare : tuple of (str, str)
-        Names beyond the last column, each with the cell below it in the line of units.
-    line : Line
-        The first row.
-    mark : str
-        The separator of cells; empty for runs of white space.
-    brackets : bool
-        Whether rows end in semicolons and may be in brackets.
-    rows : tuple of tuple of str
-        Cells of the first rows, which all have the same number of cells.
+    ``headings`` has one heading for each column. ``spare`` are names beyond the last column, each with the cell below
+    it in the line of units. ``rows`` are the cells of the first rows, which all have the same number of cells. The
+    rows of a matrix in ``brackets`` end in semicolons.
     """
 
     preamble: tuple[str, ...]
     headings: tuple[Heading, ...]
     spare: tuple[tuple[str, str], ...]
-    line: Line
+    at: int
     mark: str
     brackets: bool
-    rows: tuple[tuple[str, ...], ...]
+    rows: tuple[tuple[str, ...], ...] = ()
 
     @property
     def named(self) -> bool:
@@ -74,41 +68,23 @@ class TableLayout:
         return any(each.name for each in self.headings)
 
 
-def find_table(lines: Sequence[Line]) -> TableLayout | None:
+@lru_cache(maxsize=1)  # the same table is needed twice: to recognise a file, and to read it
+def find_table(lines: tuple[str, ...]) -> Layout | None:
     """Find the first rows of numbers in a text, and the names of their columns; None if there are none.
 
     Rows are lines in which each column contains either only numbers or only words, apart from empty cells. The chosen
     separator gives the earliest rows; among several such separators, it is one that also fits a line of names.
-
-    Examples
-    --------
-    >>> lines = ["A title", "Tempo,Pos", "0,00\\t1,5", "0,02\\t1,7", "0,04\\t1,8"]
-    >>> found = find_table([Line(i, 0, 0, text) for i, text in enumerate(lines, 1)])
-    >>> [each.name for each in found.headings], found.line.number, found.preamble
-    (['Tempo', 'Pos'], 3, ('A title',))
     """
-    return _find_table(tuple(lines))
-
-
-@lru_cache(maxsize=1)  # the same table is needed twice: to recognise a file, and to read it
-def _find_table(lines: tuple[Line, ...]) -> TableLayout | None:
-    best: tuple[tuple[int, bool, int], _Split, _Rows, TableLayout] | None = None
+    best: tuple[tuple[int, bool, int], _Split, _Rows, Layout] | None = None
     for order, mark in enumerate(_MARKS):
-        if order and mark and not any(mark in each.text for each in lines):
+        if order and mark and not any(mark in each for each in lines):
             continue  # each line would be a single cell, a case that the first separator has covered
         split = _Split(lines, mark)
         if (rows := split.first_rows()) is not None:
             table = _with_names(lines, rows.start, mark, split.brackets, rows.width)
             trial = (rows.start, not table.named, order), split, rows, table
             best = trial if best is None else min(best, trial, key=lambda each: each[0])
-    return None if best is None else replace(best[3], rows=best[1].all_rows(best[2]))
-
-
-def _cells(line: str, mark: str, brackets: bool) -> list[str]:
-    if '"' in line and mark and not brackets:
-        return [cell.strip() for cell in split_heading(line, mark)[0]]
-    cells = split_cells(_BRACKETS.sub(" ", line) if brackets else line, mark)
-    return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells]
+    return None if best is None else best[3]._replace(rows=best[1].all_rows(best[2]))
 
 
 def _kind(cell: str) -> str:
@@ -116,7 +92,7 @@ def _kind(cell: str) -> str:
         return ""
     if parse_number(cell) is not None:
         return "number"
-    if _CLOCK.fullmatch(cell):
+    if CLOCK.fullmatch(cell):
         return "clock"
     if _DATE.fullmatch(cell):
         return "text"
@@ -135,26 +111,32 @@ class _Rows(NamedTuple):
 class _Split:
     """Lines that are split into cells by one separator; a line is split when it is first needed."""
 
-    def __init__(self, lines: Sequence[Line], mark: str) -> None:
+    def __init__(self, lines: Sequence[str], mark: str) -> None:
         self.lines, self.mark = lines, mark
-        ends = 0 if mark else sum(each.text.rstrip().endswith(";") for each in lines)
+        ends = 0 if mark else sum(each.rstrip().endswith(";") for each in lines)
         self.brackets = ends > len(lines) / 2  # as in a MATLAB matrix
         self._split: dict[int, tuple[list[str], list[str]]] = {}
 
     def at(self, line: int) -> tuple[list[str], list[str]]:
         """Return the cells of a line and their kinds."""
         if line not in self._split:
-            cells = _cells(self.lines[line].text, self.mark, self.brackets)
+            cells = self._cells(self.lines[line])
             self._split[line] = cells, [_kind(cell) for cell in cells]
         return self._split[line]
+
+    def _cells(self, line: str) -> list[str]:
+        if '"' in line and self.mark and not self.brackets:
+            return split_heading(line, self.mark)[0]
+        cells = split_cells(_BRACKETS.sub(" ", line) if self.brackets else line, self.mark)
+        return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells]
 
     def first_rows(self) -> _Rows | None:
         """Return the first rows; None if there are none."""
         blanks = self.mark + " " if self.mark else "\t [];" if self.brackets else "\t "
-        filled = [at for at, each in enumerate(self.lines) if each.text.strip(blanks)]
+        filled = [at for at, each in enumerate(self.lines) if each.strip(blanks)]
         for position, start in enumerate(filled):
             cells, first = self.at(start)
-            if not _is_row(first) or any("=" in cell for cell in cells):
+            if not _is_row(first) or cells[0] == "-" or any("=" in cell for cell in cells):  # "- 0.5" is a list of YAML
                 continue
             probe = [self.at(at)[1] for at in filled[position : position + _PROBE]]
             width = max((len(kinds) for kinds in probe if _is_row(kinds)), default=0) if self.mark else len(first)
@@ -182,13 +164,13 @@ def _alike(kinds: Sequence[str], first: Sequence[str], width: int, mark: str) ->
     return all(a == b or "" in (a, b) for a, b in zip(kinds, first, strict=False))
 
 
-def _with_names(lines: Sequence[Line], start: int, mark: str, brackets: bool, width: int) -> TableLayout:
+def _with_names(lines: Sequence[str], start: int, mark: str, brackets: bool, width: int) -> Layout:
     """Return the layout of a table whose first row is known, without its rows."""
-    above = [at for at in range(start - 1, -1, -1) if lines[at].text.strip(_COMMENT)][:_ABOVE]
+    above = [at for at in range(start - 1, -1, -1) if lines[at].strip(_COMMENT)][:_ABOVE]
     names, units, at_names = [""] * width, [""] * width, start
     spare: tuple[tuple[str, str], ...] = ()
     for at in above:
-        cells = _names(lines[at].text, mark, width, numbered=at_names < start)
+        cells = _names(lines[at], mark, width, numbered=at_names < start)
         if not cells:
             continue
         below = cells[:width] + [""] * (width - len(cells))
@@ -205,8 +187,8 @@ def _with_names(lines: Sequence[Line], start: int, mark: str, brackets: bool, wi
     for name, unit in zip(names, units, strict=True):
         plain, own = heading_of(name)
         headings.append(Heading(plain, own or unit.strip(" ()[]")))
-    preamble = tuple(text for each in lines[:at_names] if (text := each.text.strip(_COMMENT + "\t")))
-    return TableLayout(preamble, tuple(headings), spare, lines[start], mark, brackets, ())
+    preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t")))
+    return Layout(preamble, tuple(headings), spare, start, mark, brackets)
 
 
 def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[str]:
@@ -219,7 +201,7 @@ def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[
     if width == 1 and (_SETTING.search(plain) or len(plain.split()) > _LONGEST_NAME):
         return []
     for cells in _splits(plain, mark, width):
-        words = [cell for cell in cells if cell and parse_number(cell) is None and not _CLOCK.fullmatch(cell)]
+        words = [cell for cell in cells if cell and parse_number(cell) is None and not CLOCK.fullmatch(cell)]
         if words and (numbered or 2 * len(words) >= len([cell for cell in cells if cell])):
             return cells
     return []
@@ -257,47 +239,68 @@ def _are_units(cells: Sequence[str]) -> bool:
     return bool(known) and sum(known) * 2 >= len(known) and not any(is_time(cell) for cell in filled)
 
 
-def heading_of(cell: str) -> tuple[str, str]:
-    """Split a heading into name and unit: the unit is in brackets, after a slash, or after a last underscore.
+def columns_of(rows: Sequence[Sequence[str]]) -> list[F8]:
+    """Return the numbers of each column; NaN for cells that are not numbers."""
+    read = [[parse_number(cell) for cell in row] for row in rows]
+    return [np.array([np.nan if x is None else x for x in column]) for column in zip(*read, strict=True)]
 
-    Examples
-    --------
-    >>> heading_of("Zeit t / s"), heading_of("theta_rad"), heading_of("x_rojo"), heading_of("Time(sec)")
-    (('Zeit t', 's'), ('theta', 'rad'), ('x_rojo', ''), ('Time', 'sec'))
-    >>> heading_of("Position in mm"), heading_of("Volt, V"), heading_of("gx_dps"), heading_of("V_in")
-    (('Position', 'mm'), ('Volt', 'V'), ('gx', 'dps'), ('V_in', ''))
+
+def are_row_numbers(column: F8) -> bool:
+    """Return whether a column starts at a small number and increases by one in every row."""
+    return bool(column.size > 1 and column[0] in range(_FIRST_NUMBERS) and (np.diff(column) == 1.0).all())
+
+
+def runs_forward(column: F8) -> bool:
+    """Return whether a column rises in all but a few rows."""
+    known = column[np.isfinite(column)]
+    steps = np.diff(known)
+    return bool(known.size >= 3 and known[-1] > known[0] and np.mean(steps >= 0) >= 0.95 and np.mean(steps > 0) >= 0.5)
+
+
+def _is_even(column: F8) -> bool:
+    steps = np.diff(column[np.isfinite(column)])
+    usual = float(np.median(steps))
+    return bool(usual > 0 and np.mean(np.abs(steps - usual) <= 0.5 * usual) >= 0.8)
+
+
+def is_aside(heading: Heading, column: F8, others: bool) -> bool:
+    """Return whether a column is row numbers (if ``others`` may be the times), an uncertainty, or nearly empty."""
+    name = " ".join(heading.name.lower().replace("_", " ").split())
+    index = others and are_row_numbers(column) and (name in _INDEX or bool(_NUMBERED.fullmatch(name)))
+    return index or is_uncertainty(name) or bool(np.mean(np.isfinite(column)) < _SPARSE)
+
+
+def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[int]:
+    """Return the rising columns that are named as times, and the first column if its even steps have a unit of time.
+
+    A capital T is not accepted as a name of times, because it often denotes a period.
     """
-    name, unit = name_and_unit(cell)
-    if unit:
-        return name, unit
-    for form in (_SLASH, _TAIL, _IN):
-        match = form.fullmatch(name)
-        if match and (form is _SLASH or _ends(match["name"], match["unit"])):
-            return match["name"].strip(), match["unit"].strip()
-    return name, ""
+    named = [
+        column
+        for column, each in enumerate(headings)
+        if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_power(each.unit) is None))
+        or (column == 0 and time_power(each.unit) is not None and not _SPAN.search(each.name) and _is_even(columns[0]))
+    ]
+    return [column for column in named if runs_forward(columns[column])]
 
 
-def _ends(name: str, unit: str) -> bool:
-    """Return whether the end of a name is its unit; h is a unit only for a time."""
-    if unit in _NO_TAIL or (unit == "h" and not is_time(name)):
-        return False
-    return measure_of(unit) is not None or time_power(unit) is not None
+def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | None:
+    """Return the column that must be the times because of its steps; None if there is no such column.
 
-
-def clock_s(cell: str) -> tuple[str, float, int] | None:
-    """Parse a time of day: printed date, second of the day, number of decimals; return None for any other text.
-
-    Examples
-    --------
-    >>> clock_s("10:04:59.812"), clock_s("01/08/2024 1:00:36 pm"), clock_s("0.5")
-    (('', 36299.812, 3), ('01/08/2024', 46836.0, 0), None)
+    This is the first column if it rises in even steps, else the only column that does so, else the only column that
+    rises. Row numbers are not considered, because their step is unknown. Neither are columns whose name or unit
+    denotes something else.
     """
-    match = _CLOCK.fullmatch(cell)
-    if match is None:
-        return None
-    hour = int(match["h"] or 0)
-    hour = hour % 12 + 12 * (match["half"][0] in "pP") if match["half"] else hour
-    seconds = (match["s"] or match["s2"] or "0").replace(",", ".")
-    decimals = len(seconds.partition(".")[2])
-    at = hour * 3600 + int(match["m"] or match["m2"]) * 60 + float(seconds)
-    return (match["date"] or "").strip(" ,T"), round(at, decimals), decimals
+    fit = [
+        column
+        for column, each in enumerate(headings)
+        if _NEUTRAL.fullmatch(each.name) and (not each.unit or time_power(each.unit) is not None)
+        if runs_forward(columns[column]) and not are_row_numbers(columns[column])
+    ]
+    even = [column for column in fit if _is_even(columns[column])]
+    if even and even[0] == 0:
+        return 0
+    for choice in (even, fit):
+        if len(choice) == 1:
+            return choice[0]
+    return None

@@ -4,8 +4,7 @@ This file is run as a script, by its path. It imports neither numpy nor the pack
 between a checkout and a wheel, so that it starts in a few hundredths of a second. Its arguments are the memory limit,
 in bytes, and the maximum number of characters to write.
 
-The JSON is ``{"sheets": [[name, text], ...]}``, each text with one line per row and one tab between cells, or
-``{"refused": reason}``.
+The JSON is ``{"sheets": [[name, columns], ...]}``, each column a list of numbers and texts, or ``{"refused": reason}``.
 """
 
 from __future__ import annotations
@@ -13,68 +12,39 @@ from __future__ import annotations
 import datetime
 import io
 import json
+import math
 import sys
-from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["read_sheets"]
-
-_DIGITS = 15  # the significant digits that spreadsheet programs show and compute with
-_MOST_DECIMALS = 12
+_DIGITS = 15
 _BLANK = str.maketrans("\t\r\n", "   ")
 
 
-def read_sheets(data: bytes, most_letters: int) -> list[tuple[str, str]]:
-    """Return the name and the text of every sheet.
+Cell = float | str
 
-    Parameters
-    ----------
-    data : bytes
-        An xlsx or xls.
-    most_letters : int
-        Maximum number of characters in all texts together.
 
-    Raises
-    ------
-    ValueError
-        If the texts have more characters.
-    python_calamine.CalamineError
-        If calamine cannot read the workbook.
-    """
+def read_sheets(data: bytes, most_letters: int) -> list[tuple[str, list[list[Cell]]]]:
+    """Return the name and the columns of every sheet; raise an error if all texts together have too many characters."""
     from python_calamine import CalamineWorkbook
 
     book = CalamineWorkbook.from_object(io.BytesIO(data))
     sheets = []
     letters = 0
     for name in book.sheet_names:
-        text = _text(book.get_sheet_by_name(name).to_python(skip_empty_area=False), most_letters - letters)
-        letters += len(text)
-        sheets.append((name, text))
+        rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+        columns = []
+        for column in zip(*rows, strict=True):
+            columns.append([_rounded(cell) if _is_number(cell) else _word(cell) for cell in column])
+            letters += sum(len(cell) if isinstance(cell, str) else 8 for cell in columns[-1])
+            if letters > most_letters:
+                raise ValueError("its cells are too many or too long")
+        sheets.append((name, columns))
     return sheets
 
 
-def _text(rows: Sequence[Sequence[Any]], most_letters: int) -> str:
-    """Return a sheet's cells as text."""
-    columns = []
-    letters = 0
-    for column in zip(*rows, strict=True):
-        columns.append(_printed(column))
-        letters += sum(map(len, columns[-1])) + len(columns[-1])
-        if letters > most_letters:
-            raise ValueError("the text of its cells is too long")
-    return "\n".join("\t".join(row) for row in zip(*columns, strict=True)) + "\n"
-
-
-def _printed(column: Sequence[Any]) -> list[str]:
-    """Return the cells of a column as text; all numbers have as many decimals as the longest of them needs.
-
-    The reader of text treats a number with fewer decimals than its column as incomplete.
-    """
-    numbers = [f"{cell:.{_DIGITS}g}" for cell in column if _is_number(cell)]
-    decimals = max((len(each.partition(".")[2]) for each in numbers if "e" not in each), default=0)
-    fixed = decimals <= _MOST_DECIMALS and not any("e" in each for each in numbers)
-    form = f".{decimals}f" if fixed else f".{_DIGITS - 1}e"
-    return [format(cell, form) if _is_number(cell) else _word(cell) for cell in column]
+def _rounded(number: float) -> Cell:
+    """Round to the digits that spreadsheet programs show and compute with; infinite numbers become text."""
+    return float(f"{number:.{_DIGITS}g}") if math.isfinite(number) else str(number)
 
 
 def _is_number(cell: object) -> bool:
