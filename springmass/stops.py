@@ -19,7 +19,7 @@ from springmass.errors import INTERRUPTED
 
 __all__ = ["STOPS", "EndReason", "Stops"]
 
-TOGETHER_NS = 200_000_000
+TOGETHER_NS = 100_000_000
 """Signals within this time count as one: `timeout` and some terminals send each of them twice."""
 
 
