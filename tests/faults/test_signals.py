@@ -37,7 +37,9 @@ def inputs(folder: Path, samples: int) -> dict[str, list[str]]:
     t = 0.01 * np.arange(samples)
     table = np.column_stack([t, 0.5 + 0.05 * np.cos(7.0 * t)])
     np.savetxt(folder / "run.csv", table, "%.6f", ",", header="time_s,distance_m", comments="")
-    log = WireLogWriter(folder / "log.wire", LogHeader(sensors=(SensorEntry(0, "line-protocol"),), mono_ns=0, unix_ns=0))
+    log = WireLogWriter(
+        folder / "log.wire", LogHeader(sensors=(SensorEntry(0, "line-protocol"),), mono_ns=0, unix_ns=0)
+    )
     for number in range(samples):
         append(log, Kind.DATA, line_of(number), mono_ns=10_000_000 * number)
     append(log, Kind.END, b"{}", mono_ns=10_000_000 * samples)
