@@ -78,6 +78,7 @@ class Stops:
         for number in (getattr(signal, name) for name in SIGNALS if hasattr(signal, name)):
             if signal.getsignal(number) is not signal.SIG_IGN:
                 self._before[int(number)] = signal.signal(number, self._heard)
+        self._dropped_before, sys.unraisablehook = sys.unraisablehook, self._dropped
         woken, self._wake = socket.socketpair()
         self._wake.setblocking(False)
         self._woken_before = signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
@@ -90,6 +91,7 @@ class Stops:
         for number, handler in self._before.items():
             signal.signal(number, signal.SIG_IGN if program else handler)  # type: ignore[arg-type]
         self._before.clear()
+        sys.unraisablehook = self._dropped_before
         signal.set_wakeup_fd(self._woken_before)
         self._wake.close()
 
@@ -118,11 +120,15 @@ class Stops:
         if self.by is not None:
             return
         self.by = by
-        main = threading.main_thread().ident
-        if hasattr(signal, "pthread_kill") and main is not None:
-            signal.pthread_kill(main, signal.SIGINT)  # interrupts a wait, unlike a flag
-        else:
-            _thread.interrupt_main()
+        _interrupt_main()
+
+    def _dropped(self, dropped: sys.UnraisableHookArgs) -> None:
+        """Deliver a signal again that came in a destructor, for example of an import: Python drops what they raise."""
+        if not isinstance(dropped.exc_value, KeyboardInterrupt):
+            self._dropped_before(dropped)
+            return
+        self._signalled = False
+        threading.Timer(0.01, _interrupt_main).start()  # not from here, where it would be dropped as well
 
     def _heard(self, number: int, _: object) -> None:
         if self._signalled:
@@ -156,6 +162,14 @@ class Stops:
                 os.write(stderr, line.encode(errors="backslashreplace"))
         finally:
             os._exit(INTERRUPTED)
+
+
+def _interrupt_main() -> None:
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:
+        signal.pthread_kill(main, signal.SIGINT)  # interrupts a wait, unlike a flag
+    else:
+        _thread.interrupt_main()
 
 
 STOPS = Stops()
