@@ -78,6 +78,8 @@ class Stops:
         for number in (getattr(signal, name) for name in SIGNALS if hasattr(signal, name)):
             if signal.getsignal(number) is not signal.SIG_IGN:
                 self._before[int(number)] = signal.signal(number, self._heard)
+        if not self._before:
+            return
         self._dropped_before, sys.unraisablehook = sys.unraisablehook, self._dropped
         woken, self._wake = socket.socketpair()
         self._wake.setblocking(False)
@@ -88,12 +90,12 @@ class Stops:
         """Handle signals as before; as the last act of the program, ignore them: while Python ends, they would kill."""
         if not self._before:
             return
-        for number, handler in self._before.items():
-            signal.signal(number, signal.SIG_IGN if program else handler)  # type: ignore[arg-type]
-        self._before.clear()
         sys.unraisablehook = self._dropped_before
         signal.set_wakeup_fd(self._woken_before)
         self._wake.close()
+        before, self._before = self._before, {}
+        for number, handler in before.items():  # the last step, because an earlier handler may raise
+            signal.signal(number, signal.SIG_IGN if program else handler)  # type: ignore[arg-type]
 
     @contextlib.contextmanager
     def counted(self) -> Iterator[None]:
