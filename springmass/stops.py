@@ -12,12 +12,11 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from types import FrameType
 
 from acquisition.clock import SystemClock
 from acquisition.errors import visible
 from springmass.errors import INTERRUPTED
-
-__all__ = ["STOPS", "EndReason", "Stops"]
 
 TOGETHER_NS = 100_000_000
 """Signals within this time count as one: `timeout` and some terminals send each of them twice."""
@@ -44,35 +43,23 @@ SIGNALS = {"SIGINT": EndReason.CTRL_C, "SIGTERM": EndReason.SIGTERM, "SIGHUP": E
 
 
 class Stops:
-    """The signals that end a command, in two states.
+    """The signals that end a command. Those ignored before stay ignored: under ``nohup``, a recording goes on.
 
-    The first raises KeyboardInterrupt within :meth:`raised`; outside, it waits for the next :meth:`raised`. The second
-    ends the process at once. This is the work of a thread, because the main thread may wait for a disk that hangs.
-    Signals that were ignored before stay ignored: under ``nohup``, a recording outlives its terminal.
-
-    Attributes
-    ----------
-    by : EndReason or None
-        First reason for which the end was requested; None if there was no request.
-    last_words : callable
-        Returns the line that the second signal prints. It must not wait for a disk.
-    leaving : list of callable
-        Called before the second signal ends the process.
+    The first raises KeyboardInterrupt within :meth:`raised`, after the end of an import; outside, it waits for the next
+    :meth:`raised`. The second ends the process at once, on a thread, because the main thread may wait for a disk. It
+    calls ``leaving`` and prints ``last_words``, which must not wait for a disk. ``by`` is the first reason for the end.
     """
 
     def __init__(self) -> None:
         self._before: dict[int, object] = {}
-        self._reset()
-
-    def _reset(self) -> None:
         self.by: EndReason | None = None
         self.last_words: Callable[[], str] = lambda: "stopped immediately"
         self.leaving: list[Callable[[], object]] = []
-        self._raises = self._signalled = False
+        self._raises = self._signalled = self._postponed = False
 
     def begin(self) -> None:
         """Handle signals from now on, if this is the main thread; no other can."""
-        self._reset()
+        vars(self).update(vars(Stops()))  # a new command
         if threading.current_thread() is not threading.main_thread():
             return
         for number in (getattr(signal, name) for name in SIGNALS if hasattr(signal, name)):
@@ -80,7 +67,6 @@ class Stops:
                 self._before[int(number)] = signal.signal(number, self._heard)
         if not self._before:
             return
-        self._dropped_before, sys.unraisablehook = sys.unraisablehook, self._dropped
         woken, self._wake = socket.socketpair()
         self._wake.setblocking(False)
         self._woken_before = signal.set_wakeup_fd(self._wake.fileno(), warn_on_full_buffer=False)
@@ -90,7 +76,6 @@ class Stops:
         """Handle signals as before; as the last act of the program, ignore them: while Python ends, they would kill."""
         if not self._before:
             return
-        sys.unraisablehook = self._dropped_before
         signal.set_wakeup_fd(self._woken_before)
         self._wake.close()
         before, self._before = self._before, {}
@@ -124,33 +109,38 @@ class Stops:
         self.by = by
         _interrupt_main()
 
-    def _dropped(self, dropped: sys.UnraisableHookArgs) -> None:
-        """Deliver a signal again that came in a destructor, for example of an import: Python drops what they raise."""
-        if not isinstance(dropped.exc_value, KeyboardInterrupt):
-            self._dropped_before(dropped)
-            return
-        self._signalled = False
-        threading.Timer(0.01, _interrupt_main).start()  # not from here, where it would be dropped as well
-
-    def _heard(self, number: int, _: object) -> None:
+    def _heard(self, number: int, frame: FrameType | None) -> None:
         if self._signalled:
             return
-        self._signalled = True
         self.by = self.by or SIGNALS[signal.Signals(number).name]
+        if self._raises and _swallows(frame):
+            self._postponed = True
+            return
+        self._signalled = True
         if self._raises:
             raise KeyboardInterrupt
 
     def _watch(self, woken: socket.socket) -> None:
         """Leave at the second signal. Python writes the number of each signal to ``woken``, whatever is going on."""
-        clock, first_ns = SystemClock(), None
+        clock, first_ns, again = SystemClock(), None, 0
         with woken:
-            while number := woken.recv(1):
+            while True:
+                try:
+                    if not (number := woken.recv(1)):
+                        return
+                except TimeoutError:
+                    if self._postponed:
+                        self._postponed, again = False, again + 1
+                        _interrupt_main()
+                    continue
                 if signal.Signals(number[0]).name not in SIGNALS:
                     continue
-                now_ns = clock.now_ns()
-                if first_ns is None:
-                    first_ns = now_ns
-                elif now_ns - first_ns > TOGETHER_NS:
+                if again:
+                    again -= 1
+                elif first_ns is None:
+                    first_ns = clock.now_ns()
+                    woken.settimeout(0.02)
+                elif clock.now_ns() - first_ns > TOGETHER_NS:
                     self._leave()
 
     def _leave(self) -> None:
@@ -164,6 +154,15 @@ class Stops:
                 os.write(stderr, line.encode(errors="backslashreplace"))
         finally:
             os._exit(INTERRUPTED)
+
+
+def _swallows(frame: FrameType | None) -> bool:
+    """Return whether Python is in an import or a destructor, which drop or convert what a handler raises."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib") or frame.f_code.co_name == "__del__":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _interrupt_main() -> None:
