@@ -121,7 +121,7 @@ sys.meta_path.insert(0, Finder)
 
 
 def test_a_signal_in_an_import_waits_for_its_end(tmp_path: Path) -> None:
-    """Python drops or converts what a handler raises in an import, so it raises afterwards, and nothing else is said."""
+    """Python drops or converts what a handler raises in an import, so it raises afterwards; nothing else is said."""
     mark = tmp_path / "imported"
     program = started(inputs(tmp_path, 100)["convert"], IMPORTING.replace("MARK", repr(str(mark))))
     said = program.communicate(timeout=LIMIT_S)[1]
