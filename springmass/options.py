@@ -427,7 +427,6 @@ class TradeOptions:
 class FormatsOptions:
     """The options of ``springmass formats``."""
 
-    explain: Annotated[bool, _flag("show how the file is read, column by column")] = False
     json: Annotated[bool, _flag("print JSON on standard output")] = False
 
 

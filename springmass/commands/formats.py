@@ -1,4 +1,4 @@
-"""``springmass formats``: the families of recordings, what one file is, how it is read, or what a folder holds."""
+"""``springmass formats``: the families of recordings, what one file is, or what a folder holds."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ import numpy as np
 
 from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.base import Survey
-from acquisition.recordings.explained import explain
 from acquisition.recordings.identify import Inspection, formats, inspect
-from springmass.errors import OK, USAGE, ProgramError, suggest
+from springmass.errors import OK, suggest
 from springmass.options import FormatsOptions
 from springmass.runs.json_results import picked, plain
 from springmass.runs.loading import Loaded, kind_of, load
@@ -30,7 +29,6 @@ OURS = {
     "wire": "springmass wire log: what was on disk while a run was recorded",
 }
 _WIDTHS = (44, 13, 36, 11, 11, 100)
-_MOST_ABOVE = 30
 _WHY = {"run": "it begins with the signature of HDF5", "wire": "it begins with the mark of a log's record"}
 
 
@@ -39,8 +37,6 @@ def run(file: str | Path | None, options: FormatsOptions, read: ReadOptions) -> 
     if file is None:
         return _list(as_json=options.json)
     path = Path(file)
-    if options.explain:
-        return _explain(path, as_json=options.json)
     if is_shelf(path):
         return _shelf(path, as_json=options.json)
     facts = _describe(path, read, as_json=options.json)
@@ -79,30 +75,6 @@ def _row(each: Entry) -> tuple[str, ...]:
 
 def _fitted(cell: str, width: int) -> str:
     return cell if len(cell) <= width else f"{cell[: width - 3]}..."
-
-
-def _explain(path: Path, *, as_json: bool) -> int:
-    """Print how a file is read: the lines above the rows, and the role of each column."""
-    if (kind := kind_of(path)) != "recording":
-        raise ProgramError(f"{path}: --explain shows columns of old recordings, got a {kind} file; leave it out", USAGE)
-    family, why, layouts = explain(path)
-    if as_json:
-        explanation = {"path": str(path), "format": family, "why": why, "tables": [asdict(each) for each in layouts]}
-        print(json.dumps(explanation, allow_nan=False))
-        return OK
-    print(visible(f"{'format':<10} {family}: {why}"))
-    for each in layouts:
-        if any(each.runs):
-            print(visible(f"{'run':<10} {', '.join(each.runs)}"))
-        for number, text in each.above[:_MOST_ABOVE]:
-            print(visible(f"{'above':<10} {f'line {number}':<10} {text.strip()[:100]}"))
-        if len(each.above) > _MOST_ABOVE:
-            print(f"{'above':<10} and {len(each.above) - _MOST_ABOVE} lines more")
-        for number, column in enumerate(each.columns, 1):
-            unit = f" ({column.unit})" if column.unit else ""
-            label = column.name or "no name"
-            print(visible(f"{f'column {number}':<10} {label}{unit}: {column.meaning}: {', '.join(column.cells)}, ..."))
-    return OK
 
 
 def _list(*, as_json: bool) -> int:

@@ -27,7 +27,6 @@ from acquisition.recordings.tables.cells import (
 from acquisition.recordings.tables.table import Column, Lines
 from acquisition.recordings.tables.text import Line, Text
 
-_FIRST_ROWS = 4
 _MOST_EMPTY = 4_000_000
 """Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
 _DIGITS, _MOST_DECIMALS = 15, 12  # the significant digits that spreadsheet programs show; more decimals: an exponent
@@ -85,7 +84,6 @@ def read_rows(
     sizes: list[int] = []
     skipped: list[int] = []
     marks, most, count = _Marks(path, bool(mark)), stop - first.start + _MOST_EMPTY, 0
-    head: list[list[bytes]] = []
     last: list[bytes] = []
     for page in text.pages(first.start, stop):
         rows = []
@@ -109,7 +107,7 @@ def read_rows(
             marks.look(at, cells, values, decimals, commas)
             pieces[at].append((values, decimals))
             sizes[at] = count + len(rows)
-        count, last, head = count + len(rows), rows[-1], head or rows[:_FIRST_ROWS]
+        count, last = count + len(rows), rows[-1]
     columns = []
     for own in pieces:
         values, decimals = (np.concatenate(each) for each in zip(*own, strict=True))
@@ -126,10 +124,9 @@ def read_rows(
     if clock is not None and clock < len(columns):
         _count_from_first(columns[clock])
     words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
-    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut)
-    shown = tuple(tuple(each.decode("latin-1") for each in row) for row in head)
     last_cell = last[0].decode("latin-1").replace(",", ".") if last else ""
-    return Rows(columns, lines._replace(last_cell=last_cell, zeros=text.zeros, cells=shown), traps)
+    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, last_cell, text.zeros)
+    return Rows(columns, lines, traps)
 
 
 def _count_from_first(column: Column) -> None:
@@ -160,9 +157,8 @@ def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Rows:
     columns = [Column("", "", column.values[filled], column.forms[filled]) for column in columns]
     if clock is not None:
         _count_from_first(columns[clock])
-    head = zip(*(map(_printed, column[first - 1 : first - 1 + _FIRST_ROWS]) for column in sheet.columns), strict=True)
     skipped = np.cumsum(filled)[~filled].astype(np.int64)
-    lines = Lines(first, int(filled.sum()), skipped, columns[0].forms == UNREAD, cells=tuple(head))
+    lines = Lines(first, int(filled.sum()), skipped, columns[0].forms == UNREAD)
     return Rows(columns, lines)
 
 

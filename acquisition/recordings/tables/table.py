@@ -94,7 +94,7 @@ class Lines(NamedTuple):
     ``first`` is the number of the first row's line, and ``skipped`` holds, for each line that is no row, the number of
     rows before it. ``words`` marks rows that begin with text. ``ended`` says that the last row has a line end, ``cut``
     that it is incomplete; ``last_cell`` is its first cell. ``zeros`` is the number of zero bytes that were left out at
-    the end of the file. ``cells`` are the first rows as printed.
+    the end of the file.
     """
 
     first: int
@@ -105,7 +105,6 @@ class Lines(NamedTuple):
     cut: bool = False
     last_cell: str = ""
     zeros: int = 0
-    cells: tuple[tuple[str, ...], ...] = ()
 
     def line(self, row: int) -> int:
         """Return the one-based line number of a row."""
