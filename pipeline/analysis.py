@@ -11,13 +11,13 @@ from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
 from pipeline.motion.fitted import Fitted
 from pipeline.motion.overdamped import Overdamped
-from pipeline.motion.smoother import Smoothed, smooth
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
 from pipeline.params import Params
 from pipeline.registry.quantities import check_quantity
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
+from pipeline.results.kinematics import Smoothed, kinematics
 from pipeline.samples.condition import Conditioned
 from pipeline.track import U8, Track
 from pipeline.windows.cycles import Cycles
@@ -105,7 +105,7 @@ class Analysis:
 
     @one_thread
     def smoothed(self) -> Smoothed:
-        """Return position, velocity and acceleration at every sample, with their uncertainties.
+        """Return position, velocity and acceleration at every sample from the fit, with their uncertainties.
 
         Raises
         ------
@@ -123,7 +123,6 @@ class Analysis:
         >>> bool(np.std(error) < 0.002 * 0.05 * 8.3)
         True
         """
-        motion = self.motion
-        if not isinstance(motion, Oscillation):
-            raise AnalysisError(f"there is no oscillation to smooth: {motion.why}")
-        return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.disturbances)
+        if not isinstance(self.motion, Oscillation):
+            raise AnalysisError(f"there is no oscillation to smooth: {self.motion.why}")
+        return kinematics(self.track, self.motion, self.motion.derived.laws)

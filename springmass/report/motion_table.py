@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
-from pipeline.motion.smoother import Smoothed
+from pipeline.results.kinematics import Smoothed
 from pipeline.numerics.quantity import in_unit, noun
 from pipeline.track import UNUSABLE
 

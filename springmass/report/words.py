@@ -317,8 +317,8 @@ def _motion(analysis: Analysis, _: Oscillation) -> str:
     above = f"The {rate} over the whole recording; below it, " if is_long(analysis) else ""
     first = f"{first[:1].lower()}{first[1:]}" if above else first
     return (
-        f"{above}{first} over {periods}, estimated by an oscillator smoother from all samples, not by differences of "
-        f"neighbours. The panel below{whole}: smoothed {rate} minus fitted law, with a band of ±u. Bottom: the "
+        f"{above}{first} over {periods}, from the fit and its covariance, not by differences of "
+        f"neighbours. The panel below{whole}: {rate} minus that of the selected law, with a band of ±u. Bottom: the "
         "standard uncertainties, which are larger at the ends. Errors of clock and scale are not included. "
         f"motion.csv holds {rows}."
     )

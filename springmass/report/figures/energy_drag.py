@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
-from pipeline.motion.smoother import Smoothed
+from pipeline.results.kinematics import Smoothed
 from pipeline.numerics.quantity import SHOWN
 from pipeline.results.curves import Curve
 from pipeline.track import F8
