@@ -225,7 +225,7 @@ def _oscillation(
     track, unit = samples.track, samples.track.unit
     fitted = fitted.in_unit(unit)
     windows, damping, phase, disturbances = fitted.demodulated, fitted.damping, fitted.phase, fitted.disturbances
-    rest, waveform = fitted.rest.stepping(disturbances.steps), fitted.waveform.with_disturbances(disturbances)
+    rest, waveform = fitted.rest, fitted.waveform.with_disturbances(disturbances)
     instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
     smoothing = SensorFilter.of(scene, track.rate_hz)
     by_windows = not isinstance(solved, EquationFit)

@@ -98,7 +98,6 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Find
     cycles : Cycles
     fitted : Fitted
     rest : Rest
-        Rest position, including its steps.
     """
     demodulated, phase = fitted.demodulated, fitted.phase
     unit = rest.mean.unit
@@ -134,27 +133,15 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Find
             )
     # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
-    if rest.moves and rest.range_m > float(np.max(errors)):
+    if rest.drifts and rest.drift_m > float(np.max(errors)):
         yield _rest_finding(rest, phase.damping.best.damping_rate().u)
     yield from _mode_findings(fitted, unit)
 
 
 def _rest_finding(rest: Rest, u_rate: float) -> Finding:
     unit = rest.mean.unit
-    parts = []
-    if rest.drifts:
-        parts.append(f"drifts by {amount(rest.drift_m, unit)}")
-    if rest.steps:
-        first = rest.steps[0]
-        times = "once" if len(rest.steps) == 1 else f"{len(rest.steps)} times"
-        parts.append(f"jumps {times} (by {amount(first.height.value, unit, '+.2g')} at {first.time.value:.4g} s)")
-    details = [
-        f"{amount(step.height.value, unit, '+.2g')} at {step.time.value:.4g} s, u {amount(step.height.u, unit)}"
-        for step in rest.steps
-    ]
-    text = f"Jumps: {'; '.join(details)}. " if len(details) > 1 else ""
-    values = {"drift_m": rest.drift_m, "jumps": float(len(rest.steps))}
-    if rest.drifts and unit == "m" and rest.mean.value > 0.0:
+    text, values = "", {"drift_m": rest.drift_m}
+    if unit == "m" and rest.mean.value > 0.0:
         share, seconds = rest.drift_m / rest.mean.value, float(np.ptp(rest.t))
         if share >= u_rate * seconds:
             text += (
@@ -162,7 +149,7 @@ def _rest_finding(rest: Rest, u_rate: float) -> Finding:
                 f"and the damping rate is wrong by about {share / seconds:.1g} 1/s."
             )
             values["damping_rate_error"] = share / seconds
-    return Finding("rest_drift", "warning", f"The rest position {' and '.join(parts)}.", text.strip(), values)
+    return Finding("rest_drift", "warning", f"The rest position drifts by {amount(rest.drift_m, unit)}.", text.strip(), values)
 
 
 def _mode_findings(fitted: Fitted, unit: str) -> Iterator[Finding]:

@@ -166,14 +166,11 @@ def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
 
 def _rest_drift(rest: Rest, noise_m: float) -> Effect:
     unit = rest.mean.unit
-    if not rest.moves:
+    if not rest.drifts:
         why = f"a constant rest position describes the record (noise of one sample {amount(noise_m, unit)})"
         return Effect("rest_drift", None, rest.drift_m, unit, False, why)
-    parts = ["it is followed by a smooth curve"] if rest.drifts else []
-    if rest.steps:
-        parts.append(f"its steps, {len(rest.steps)} in number, are taken out")
-    why = f"the rest position moves more than its scatter allows; {' and '.join(parts)}"
-    return Effect("rest_drift", None, rest.range_m, unit, True, why)
+    why = "the rest position moves more than its scatter allows; it is followed by a smooth curve"
+    return Effect("rest_drift", None, rest.drift_m, unit, True, why)
 
 
 def _modes(disturbances: Disturbances | None, unit: str) -> Iterator[Effect]:

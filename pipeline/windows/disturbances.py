@@ -1,4 +1,4 @@
-"""Disturbances: modes and steps beside the main oscillation, found and subtracted where they would do harm."""
+"""Disturbances: modes beside the main oscillation, found and subtracted where they would do harm."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ import numpy as np
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 from pipeline.windows import sideways as swings
-from pipeline.windows import steps as jumps
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import Demodulated, demodulate
 from pipeline.windows.demodulate import Params as Demodulation
 from pipeline.windows.modes import Sideways
 from pipeline.windows.sideways import find_sideways
-from pipeline.windows.steps import Step, find_steps, staircase, weighed
 
 __all__ = ["Disturbances", "Params", "separate"]
 
@@ -30,7 +28,6 @@ class Params:
     Parameters
     ----------
     sideways : pipeline.windows.sideways.Params
-    steps : pipeline.windows.steps.Params
     modes : bool
         Whether to search for modes at all.
     rounds : int
@@ -38,7 +35,6 @@ class Params:
     """
 
     sideways: swings.Params = field(default_factory=swings.Params)
-    steps: jumps.Params = field(default_factory=jumps.Params)
     modes: bool = True
     rounds: int = 2
 
@@ -57,8 +53,6 @@ class Disturbances:
         Whether ``sideways`` was subtracted, since it would bias the amplitude by over a tenth of its uncertainty.
     leak_m : float
         Bias of the amplitude that ``sideways`` would cause, m.
-    steps : tuple of Step
-        Steps of the rest position; they are always subtracted.
     position : (n,) float64, m
         Sum of the subtracted effects at the record's times.
     """
@@ -67,24 +61,19 @@ class Disturbances:
     sideways: Sideways
     modelled: bool
     leak_m: float
-    steps: tuple[Step, ...]
     position: F8
 
     @classmethod
     def nothing(cls, conditioned: Conditioned) -> Disturbances:
         """Return disturbances of which none was found, or none was searched for."""
-        return cls(conditioned, Sideways((), None), False, 0.0, (), np.zeros(len(conditioned.track)))
+        return cls(conditioned, Sideways((), None), False, 0.0, np.zeros(len(conditioned.track)))
 
     def __bool__(self) -> bool:
-        return self.modelled or bool(self.steps)
+        return self.modelled
 
     def columns(self, t: F8) -> F8:
         """Return (n, k): the subtracted effects at t (n,), as columns of a linear fit."""
-        parts = [np.empty((t.size, 0))]
-        if self.modelled:
-            parts.append(self.sideways.columns(t))
-        parts.extend((t >= step.time.value).astype(np.float64)[:, None] for step in self.steps)
-        return np.concatenate(parts, axis=1)
+        return self.sideways.columns(t) if self.modelled else np.empty((t.size, 0))
 
 
 def separate(
@@ -94,7 +83,7 @@ def separate(
     params: Params | None = None,
     demodulation: Demodulation | None = None,
 ) -> tuple[Demodulated, Disturbances]:
-    """Search for modes and steps, and demodulate again without them.
+    """Search for modes, and demodulate again without them.
 
     Parameters
     ----------
@@ -129,12 +118,7 @@ def separate(
         demodulated = demodulate(conditioned.less(taken), cycles, demodulation)
     if modelled:
         demodulated = replace(demodulated, covariance=demodulated.covariance * _price(sideways))
-    steps = find_steps(conditioned.less(taken), demodulated, params.steps)
-    if steps:
-        demodulated = demodulate(conditioned.less(taken + staircase(steps, t)), cycles, demodulation)
-        steps, demodulated = weighed(steps, demodulated)
-        taken = taken + staircase(steps, t)
-    return demodulated, Disturbances(conditioned.less(taken), sideways, modelled, leak_m, steps, taken)
+    return demodulated, Disturbances(conditioned.less(taken), sideways, modelled, leak_m, taken)
 
 
 def _u_amplitude(demodulated: Demodulated) -> float:
