@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -60,8 +59,7 @@ from pipeline.windows.clipping import find_cuts
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.windows.demodulate import Demodulated, demodulate, model_error
 from pipeline.windows.disturbances import separate
-from pipeline.windows.part import before_release, before_trigger, long_after_stop
-from pipeline.windows.segments import Segments, SpanKind, find_free_part
+from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part
 
 __all__ = ["STANDARD", "Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
 
@@ -152,25 +150,29 @@ class _FreePart:
 
 
 def _free_part(samples: Conditioned, params: Params) -> _FreePart | NoOscillation:
-    """Find the part that oscillates freely, without the time before the release and long after the stop.
+    """Find the part that oscillates freely.
 
-    The time before the trigger, the time before the release, the time long after the stop, and all but one free part
-    are left out in this order. The samples are conditioned again after each step, because the part left out may have
-    hidden the plateaus and the noise of the rest.
+    The time before the trigger and all but one free part are left out. The samples are conditioned again after each
+    step, because the part left out may have hidden the noise of the rest.
     """
     segments = None
-    release = partial(before_release, periods=params.segments.held_periods)
-    for outside_of in (before_trigger, release, partial(long_after_stop, share=params.early)):
-        if (outside := outside_of(samples)) is not None:
-            samples = condition(outside.flagged(samples.track), params.condition)
-            segments = outside.within(segments)
-    rests = segments is not None and any(span.kind is SpanKind.AT_REST for span in segments.left_out)
-    cycles, stopped = _cycles(samples, params, params.late if rests else params.early)
+    if (outside := before_trigger(samples)) is not None:
+        samples = condition(outside.flagged(samples.track), params.condition)
+        segments = outside
+    cycles, stopped = _cycles(samples, params, params.early)
     if isinstance(cycles, NoOscillation):
-        return cycles
+        # A long time in the hand hides the motion after it, which the later half may show.
+        t = samples.track.t[samples.used]
+        half_s = float(np.median(t))
+        later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
+        samples, segments = condition(later.flagged(samples.track), params.condition), later.within(segments)
+        trimmed, stopped = _cycles(samples, params, params.early)
+        if isinstance(trimmed, NoOscillation):
+            return cycles
+        cycles = trimmed
     for _ in range(params.most_parts):
         windows = demodulate(samples, cycles, params.demodulate)
-        outside = find_free_part(samples, cycles, windows, params.segments)
+        outside = find_free_part(samples, windows, params.segments)
         if outside is None:
             break
         shorter = condition(outside.flagged(samples.track), params.condition)

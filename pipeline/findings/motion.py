@@ -149,7 +149,8 @@ def _rest_finding(rest: Rest, u_rate: float) -> Finding:
                 f"and the damping rate is wrong by about {share / seconds:.1g} 1/s."
             )
             values["damping_rate_error"] = share / seconds
-    return Finding("rest_drift", "warning", f"The rest position drifts by {amount(rest.drift_m, unit)}.", text.strip(), values)
+    message = f"The rest position drifts by {amount(rest.drift_m, unit)}."
+    return Finding("rest_drift", "warning", message, text.strip(), values)
 
 
 def _mode_findings(fitted: Fitted, unit: str) -> Iterator[Finding]:

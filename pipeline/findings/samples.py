@@ -46,22 +46,20 @@ def sample_findings(
     """
     track, quantum_m = conditioned.track, conditioned.quantum_m
     counts, n, unit = count_quality(flags), len(track), track.unit
-    levels_m = [cut.from_m for cut in conditioned.cuts] or conditioned.plateaus_m
+    levels_m = [cut.from_m for cut in conditioned.cuts]
     advice = _distance_to_move(levels_m, swing_m) if swing_m is not None and unit == "m" else ""
     if unit != "m":
         advice = "Choose a larger range of the sensor, or release with a smaller amplitude."
     yield from (_cut_finding(cut, n, unit, advice) for cut in conditioned.cuts)
     if counts["clipped"] and not conditioned.cuts:
-        levels = " and ".join(amount(level, unit, ".1f") for level in conditioned.plateaus_m)
-        where = f"at {levels}" if levels else "at a level flagged in the recording"
         yield Finding(
             "clipped",
             "warning",
-            f"{counts['clipped']} of {n} samples are cut off {where}; they were left out.",
+            f"{counts['clipped']} of {n} samples are cut off at a level flagged in the recording; they were left out.",
             "The readings stop there: the bob leaves the range of the sensor, or a fixed object stands between them. "
             "Period and damping come from the other samples of each period. The turning points beyond were not "
             "measured, so the amplitude comes from the sinusoid that is fitted to the other samples.",
-            {"samples": counts["clipped"], **{f"level_{i}_m": m for i, m in enumerate(conditioned.plateaus_m, 1)}},
+            {"samples": counts["clipped"]},
             advice,
         )
     if (echoes := counts["false_echo"]) and not by_chance:

@@ -162,9 +162,7 @@ def fit_record(
 
     Samples whose residuals exceed four standard deviations, as estimated from the median absolute deviation, are
     excluded. The fit is repeated until the set of samples no longer changes
-    (:class:`pipeline.motion.waveform_model.Chooser`). Near a clipped plateau samples are excluded by the model's value
-    and not by their own noise, to avoid bias. The margin is 3.5 standard deviations from the level above which samples
-    count as clipped.
+    (:class:`pipeline.motion.waveform_model.Chooser`).
 
     If residuals are not white the covariance is that of the score summed over whole periods, including correlation
     between neighbouring periods, if it exceeds the white covariance significantly.
@@ -204,7 +202,7 @@ def fit_record(
         _refined_phase(phase, damping, demodulated, solved.state, covariance),
         _refined_rest(solved, rest, phase.middle, covariance),
         _refined_waveform(solved, conditioned.track),
-        _flags(conditioned, chooser, solved),
+        _flags(conditioned, solved),
         solved.noise_m,
         dict(zip(solved.state.names, factors.tolist(), strict=True)),
     )
@@ -337,13 +335,11 @@ def _with_joint(fit: LawFit, solved: _Solved, covariance: F8) -> LawFit:
     return replace(fit, joint=joint, converged=True)
 
 
-def _flags(conditioned: Conditioned, chooser: Chooser, solved: _Solved) -> NDArray[np.uint8]:
-    """Return the flags, with the samples excluded from the fit flagged as clipped or false echoes."""
+def _flags(conditioned: Conditioned, solved: _Solved) -> NDArray[np.uint8]:
+    """Return the flags, with the samples excluded from the fit flagged as false echoes."""
     flags = conditioned.flags.copy()
     out = ((flags & UNUSABLE) == 0) & ~solved.rows
-    crest = out & chooser.on_plateau(solved.position)
-    flags[crest] |= np.uint8(Quality.CLIPPED)
-    flags[out & ~crest] |= np.uint8(Quality.FALSE_ECHO)
+    flags[out] |= np.uint8(Quality.FALSE_ECHO)
     return flags
 
 

@@ -106,7 +106,7 @@ def _u_phase(phase: PhaseFit, t: F8) -> F8:
 
 
 def _by_equation(phase: PhaseFit, x: F8, v: F8) -> F8:
-    """Return the acceleration by the equation of motion of :mod:`pipeline.motion.equation_fit`; 0 where friction holds."""
+    """Return the acceleration by the fitted equation of motion; 0 where friction holds the bob."""
     found = phase.damping.best.joint.estimates()
     mu, gamma, beta = (found[name].value if name in found else 0.0 for name in COEFFICIENTS)
     natural = math.sqrt(phase.angular_frequency.value**2 + (phase.squared_rate or 0.0))

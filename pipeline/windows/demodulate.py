@@ -75,7 +75,7 @@ class Demodulated:
     residual : (n,) float64, m
         Every sample less its window's fit; NaN for samples outside all windows or not measured.
     flags : (n,) uint8
-        Flags from the conditioning, with the false echoes and clipped crests found here.
+        Flags from the conditioning, with the false echoes found here.
     lost : int
         Number of windows with too few usable samples, which give no point.
     """
@@ -138,11 +138,6 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     _rescue(windows, basis, solution, spread, tuning, params)
     _clip(windows, basis, solution, spread, rough, params)
     weights = solution.weights
-    if conditioned.clipped_from_m:
-        level = _typical(_spread(windows.usable, solution.residual), windows, solution)
-        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
-        windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
-        weights = np.where(crest, 0.0, weights)
     # Fit again with each window's own frequency and decay, after correcting the drift of the rest position.
     windows = _steadied(windows, solution, spread, tuning.angular_frequency)
     tuning = retune(windows, solution, tuning.angular_frequency)
@@ -305,10 +300,6 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     inside = windows.placed & good[:, None]
     echoes = inside & (windows.usable > 0) & (weights == 0)
     flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
-    crests = inside & (windows.usable == 0)
-    if crests.any():
-        crests &= flags[windows.rows] == 0
-        flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
     residual = np.full(len(conditioned.track), np.nan)
     residual[windows.rows[inside]] = solution.residual[inside]
     return Demodulated(

@@ -19,17 +19,17 @@ from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, Quality, Track
 from pipeline.windows import change_points
-from pipeline.windows.change_points import find_changes, lone_points
-from pipeline.windows.cycles import Cycles
+from pipeline.windows.change_points import find_changes
 from pipeline.windows.demodulate import FINEST, Demodulated
 
 __all__ = ["Break", "BreakKind", "Params", "Segments", "Span", "SpanKind", "find_free_part"]
 
 MOST_DECAY = 300.0  # largest exponent of a decay, against overflow
-BRIDGED = 3  # samples that noise may move off a plateau on which a hand holds the bob
 # Jump of the amplitude, over that of the phase, up to which the phase jumps alone. For one touch in sixteen, at any
 # moment, the ratio is smaller.
 ALONE = 0.1
+LEAST_AFTER = 64  # samples needed after a trigger to leave out the part before it
+HANGING = 0.25  # fraction of the range after the trigger within which a bob hangs still before it
 NEAR = 5  # number of windows beside a break or still windows from which the motion is extrapolated
 
 
@@ -53,9 +53,6 @@ class Params:
         Maximum decrease of the logarithm of the amplitude per window, after the maximum, for which jumps are searched.
         The sinusoid of a window has a single decay rate. At a stronger decay its error, the square of the decrease
         (0.4 %), exceeds the noise and is largest at the start of the motion.
-    held_periods : float
-        Minimum time on a plateau, in periods, that shows a hand holding the bob. A crest that is cut off above the
-        rest position lasts half a period at most.
     """
 
     changes: change_points.Params = field(default_factory=change_points.Params)
@@ -63,7 +60,6 @@ class Params:
     share: float = 0.2
     rest_share: float = 0.3
     most_fall: float = 0.06
-    held_periods: float = 0.75
 
 
 class SpanKind(StrEnum):
@@ -153,15 +149,27 @@ class Segments:
         return Segments(first_s, last_s, tuple(spans), tuple(breaks))
 
 
-def find_free_part(
-    conditioned: Conditioned, cycles: Cycles, windows: Demodulated, params: Params | None = None
-) -> Segments | None:
+def before_trigger(conditioned: Conditioned) -> Segments | None:
+    """Return the part after the trigger, if the bob hung still before it; None otherwise."""
+    t, y, moment_s = conditioned.track.t, conditioned.track.y, conditioned.track.trigger_s
+    if moment_s is None:
+        return None
+    before, after = conditioned.used & (t < moment_s), conditioned.used & (t >= moment_s)
+    if not before.any() or np.count_nonzero(after) < LEAST_AFTER:
+        return None
+    # A bob that is already swinging triggers immediately, so there is no still part to leave out.
+    ranges = [float(np.ptp(np.quantile(y[rows], (0.05, 0.95)))) for rows in (before, after)]
+    if ranges[0] > HANGING * ranges[1]:
+        return None
+    return Segments(moment_s, math.inf, (Span(SpanKind.WAITING, float(t[before][0]), moment_s),))
+
+
+def find_free_part(conditioned: Conditioned, windows: Demodulated, params: Params | None = None) -> Segments | None:
     """Return the longest part with one free oscillation; None if this is the whole record.
 
     Parameters
     ----------
     conditioned : Conditioned
-    cycles : Cycles
     windows : Demodulated
     params : Params, optional
 
@@ -175,9 +183,6 @@ def find_free_part(
     unknown, so a window on either side of a jump is left out.
     """
     params = params or Params()
-    held = _held(conditioned, cycles, params.held_periods)
-    if held is not None:
-        return held
     if windows.t.size < 2 * params.least_windows:
         return None
     series = _Series.of(windows, params.changes.false_alarm)
@@ -283,10 +288,8 @@ class _Series:
         """Split windows first to stop - 1 at their jumps."""
         if stop - first < NEAR:
             return [_Part(first, stop, False)] if stop > first else []
-        values, u = self.values[:, first:stop], self.u[:, first:stop]
-        rows = np.flatnonzero(~lone_points(values, u, params.false_alarm))
-        changes = find_changes(self.t[first + rows], values[:, rows], u[:, rows], params)
-        edges = [first, *(first + int(rows[change.index]) for change in changes), stop]
+        changes = find_changes(self.t[first:stop], self.values[:, first:stop], self.u[:, first:stop], params)
+        edges = [first, *(first + change.index for change in changes), stop]
         return [_Part(a, b, False) for a, b in itertools.pairwise(edges)]
 
 
@@ -359,22 +362,3 @@ def _faded(series: _Series, moving: int) -> Segments | None:
     last_s = float(series.t[moving - 1]) + series.spacing
     end_s = float(series.t[-1]) + 0.5 * series.spacing
     return Segments(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, end_s),))
-
-
-def _held(conditioned: Conditioned, cycles: Cycles, periods: float) -> Segments | None:
-    """Return the longer side of a plateau on which a hand holds the bob; None without such a plateau."""
-    rows = np.flatnonzero(conditioned.flags & np.uint8(Quality.CLIPPED))
-    if not rows.size:
-        return None
-    t, used = conditioned.track.t, np.flatnonzero(conditioned.used)
-    # Noise may move a few samples off a plateau.
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1])
-    ends = np.concatenate([starts[1:], [rows.size]]) - 1
-    longest = int(np.argmax(t[rows[ends]] - t[rows[starts]]))
-    first, last = int(rows[starts[longest]]), int(rows[ends[longest]])
-    if not t[last] - t[first] > periods / cycles.frequency_hz:
-        return None
-    begin, end = float(min(t[first], t[used[0]])), float(max(t[last], t[used[-1]]))
-    if t[first] - begin > end - t[last]:
-        return Segments(-math.inf, float(t[first - 1]), (Span(SpanKind.HANDLED, float(t[first]), end),))
-    return Segments(float(t[last + 1]), math.inf, (Span(SpanKind.HANDLED, begin, float(t[last])),))
