@@ -23,7 +23,7 @@ from pipeline.checks.model import check_model
 from pipeline.checks.oscillation import check_coherence, check_sinusoid, typical_miss
 from pipeline.checks.plausibility import check_plausibility
 from pipeline.checks.residuals import residuals_of
-from pipeline.checks.sensor import find_held, find_joined, find_smoothing, held_count, matters
+from pipeline.checks.sensor import find_smoothing, held, held_count
 from pipeline.damping.select import Damping, fit_damping
 from pipeline.errors import AnalysisError
 from pipeline.findings.damping import damping_findings
@@ -239,7 +239,7 @@ def _oscillation(
     found += plausibility_findings(plausible, track)
     # Strong damping distorts every period, which would look like harmonics; its fit describes the whole motion anyway.
     residuals = residuals_of(samples, windows, disturbances, phase) if by_windows else None
-    unexplained = residuals
+    unexplained, shortest = residuals, 1
     if residuals is not None:
         rounding_m = median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
         shape = find_harmonics(residuals, max(0.5 * (samples.quantum_m or 0.0), rounding_m), params.checks.harmonics)
@@ -247,24 +247,18 @@ def _oscillation(
             misfits.append(shape.misfit)
             found.append(harmonics_finding(shape, unit))
             unexplained = residuals = residuals.less(shape.at_samples)
-        if (held := find_held(samples, residuals)) is not None:
-            misfits.append(held.misfit)
-            found.append(held_finding(held.count, held.interval_s, unit))
+        if (misfit := held(samples, residuals)) is not None:
+            misfits.append(misfit)
+            found.append(held_finding(held_count(samples), residuals.interval_s, unit))
             unexplained = None
         elif not windows.noise_m > max(rounding_m, (samples.quantum_m or 0.0) / COARSE):
             unexplained = None  # rounding, or coarse steps, which the finding "quantised" reports
-        elif (
-            smoothed := find_joined(samples, residuals, params.checks.sensor)
-            or find_smoothing(residuals, params.checks.sensor)
-        ) is not None:
-            if smoothed.certain:
-                unexplained = None
-            if matters(smoothed, residuals, damping.best.joint["A0"].u, smoothing, params.checks.sensor):
-                misfits.append(smoothed.misfit)
-                if smoothed.certain:
-                    found.append(smoothing_finding(smoothed, unit))
+        elif (smoothed := find_smoothing(residuals, damping.best.joint["A0"].u, smoothing)) is not None:
+            shortest = math.ceil(2.0 * smoothed.samples)
+            misfits.append(smoothed.misfit)
+            found.append(smoothing_finding(smoothed, unit))
     if by_windows:
-        model = check_model(fitted, unexplained, _settling_fit(fitted, samples, params), params.checks.model)
+        model = check_model(fitted, unexplained, shortest, _settling_fit(fitted, samples, params), params.checks.model)
         misfits += model.misfits
         found.append(model_finding(model, unit))
 
@@ -344,8 +338,8 @@ def _two_modes(samples: Conditioned, two: TwoModes, scene: Scene, params: Params
 def _still(samples: Conditioned, why: NoOscillation, scene: Scene, params: Params) -> Analysis:
     """Return the analysis of a recording without a motion to fit."""
     findings = [Finding("no_oscillation", "error", f"No oscillation: {why.why}.")]
-    if (held := held_count(samples)) > 1:
-        findings.append(held_finding(held, held / samples.track.rate_hz, samples.track.unit))
+    if (count := held_count(samples)) > 1:
+        findings.append(held_finding(count, 1.0 / samples.track.rate_hz, samples.track.unit))
     return _ended(samples, Still(why.why), tuple(findings), _at_rest(samples), scene, params)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pipeline.checks import harmonics, model, plausibility, sensor
+from pipeline.checks import harmonics, model, plausibility
 from pipeline.damping import select as damping
 from pipeline.motion import equation_fit, overdamped, phase, waveform_fit
 from pipeline.results import derive
@@ -20,12 +20,12 @@ class CheckParams:
 
     Parameters
     ----------
-    harmonics, sensor, model, plausibility
+    harmonics, model, plausibility
         Options of the checks with the same names in :mod:`pipeline.checks`.
     """
 
     harmonics: harmonics.Params = field(default_factory=harmonics.Params)
-    sensor: sensor.Params = field(default_factory=sensor.Params)
+
     model: model.Params = field(default_factory=model.Params)
     plausibility: plausibility.Params = field(default_factory=plausibility.Params)
 

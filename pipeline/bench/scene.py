@@ -67,7 +67,6 @@ _QUANTITIES: dict[tuple[str, str], _Quantity] = {
     ("air", "relative_humidity"): _Quantity("air_relative_humidity", "", 0.0, 1.0, mistaken=_PERCENT),
     ("sensor", "sigma_m"): _Quantity("sensor_sigma_m", "m", 1e-12, 1e3, (1e-8, 0.05), _LENGTHS),
     ("sensor", "mean_samples"): _Quantity("sensor_mean_samples", "", 1.0, 1e4, (1.0, 1e3)),
-    ("sensor", "median_samples"): _Quantity("sensor_median_samples", "", 1.0, 1e4, (1.0, 1e3)),
     ("sensor", "lag_s"): _Quantity("sensor_lag_s", "s", 0.0, 1e3, (0.0, 2.0), (("milliseconds", 0.0, 1e-3),)),
     ("start", "displacement_m"): _Quantity("start_displacement_m", "m", -1e3, 1e3, (-1.0, 1.0), _LENGTHS),
     ("start", "velocity_m_per_s"): _Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6, (-20.0, 20.0), _SPEEDS),
@@ -101,7 +100,6 @@ class Scene:
     sensor_sigma_m: Estimate | None = None
     sensor_position: str | None = None
     sensor_mean_samples: Estimate | None = None
-    sensor_median_samples: Estimate | None = None
     sensor_lag_s: Estimate | None = None
     start_displacement_m: Estimate | None = None
     start_velocity_m_per_s: Estimate | None = None

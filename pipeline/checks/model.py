@@ -100,6 +100,7 @@ class ModelCheck:
 def check_model(
     fitted: Fitted,
     residuals: Residuals | None,
+    shortest: int,
     fit_waveform: Callable[[], Fitted] | None,
     params: Params | None = None,
 ) -> ModelCheck:
@@ -111,6 +112,8 @@ def check_model(
         The fit by windows.
     residuals : Residuals or None
         The residuals that no other check explains; None if another check explains all of them.
+    shortest : int
+        Shortest lag at which correlations of the residuals are not explained by another check.
     fit_waveform : callable or None
         Function that fits the whole waveform; it is called if the halves disagree. None if this fit was done already,
         or takes too long.
@@ -134,7 +137,7 @@ def check_model(
     free = (demodulated.t.size - phase.coefficients.size) / phase.correlation
     if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - params.false_alarm, free) / free:
         found.append(Contradiction.PHASE)
-    correlation, lag_s = (0.0, 0.0) if residuals is None else _colour(residuals, params)
+    correlation, lag_s = (0.0, 0.0) if residuals is None else _colour(residuals, shortest, params)
     if correlation:
         found.append(Contradiction.COLOUR)
     halves = _halves(fitted, params.least_windows)
@@ -157,7 +160,7 @@ def check_model(
     )
 
 
-def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
+def _colour(residuals: Residuals, shortest: int, params: Params) -> tuple[float, float]:
     """Return the strongest correlation of the residuals and its lag, s; 0 and 0 if it is below the limits.
 
     The correlations of n samples of white noise have a standard deviation of :math:`n^{-1/2}`. With the probability
@@ -179,7 +182,9 @@ def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
         return 0.0, 0.0
     enough = pairs > 0.25 * pairs[0]
     correlation = np.where(enough, sums / np.maximum(pairs, 1.0), 0.0) / (sums[0] / pairs[0])
-    lag = 1 + int(np.argmax(np.abs(correlation[1:])))
+    if shortest > lags:
+        return 0.0, 0.0
+    lag = shortest + int(np.argmax(np.abs(correlation[shortest:])))
     white = -float(ndtri(params.false_alarm / (2.0 * lags))) / math.sqrt(pairs[lag] or 1.0)
     # With fewer pairs than samples the estimate may exceed 1, which a correlation cannot.
     strongest = max(-1.0, min(float(correlation[lag]), 1.0))

@@ -215,27 +215,13 @@ def smoothing_finding(found: Smoothing, unit: str) -> Finding:
     unit : str
         Unit of the samples.
     """
-    if found.lag_s:
-        kind = f"a first-order lag of {found.lag_s:.2g} s"
-    elif found.joined_samples:
-        return Finding(
-            "smoothed_sensor",
-            "warning",
-            f"Slow readings, about {found.joined_samples:.2g} samples apart, were joined by straight lines.",
-            f"That makes the amplitude too small by {found.loss:.1%}; the uncertainties include it. Neighbouring "
-            f"{plural(unit)} are correlated ({found.correlation:.2f}).",
-            {"correlation": found.correlation, "amplitude_loss": found.loss, "late_s": found.late_s},
-            "Record the sensor's own readings, without interpolation.",
-        )
-    else:
-        kind = f"a running mean or median over {found.mean_samples:.0f} samples"
     return Finding(
         "smoothed_sensor",
         "warning",
         f"Neighbouring {plural(unit)} are correlated ({found.correlation:.2f}): the sensor smooths its readings.",
-        f"The correlation is that of {kind}. It makes the amplitude too small by {found.loss:.1%} and the motion late "
-        f"by {found.late_s:.2g} s; the uncertainties include that. State it in the scene ([sensor] mean_samples, "
-        "median_samples or lag_s) to correct for it.",
+        f"The readings are alike over {found.samples:.2g} samples, as after a running mean or a lag. It makes the "
+        f"amplitude too small by up to {found.loss:.1%} and the motion late by {found.late_s:.2g} s; the uncertainties "
+        "include that. State it in the scene ([sensor] mean_samples or lag_s) to correct for it.",
         {"correlation": found.correlation, "amplitude_loss": found.loss, "late_s": found.late_s},
     )
 

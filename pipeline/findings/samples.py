@@ -143,15 +143,18 @@ def _cluster_details(clusters: Clusters | None, unit: str) -> str:
     )
 
 
-def held_finding(count: int, interval_s: float, unit: str) -> Finding:
-    """Return the finding on a sensor slower than its recording."""
+def held_finding(count: int, step_s: float, unit: str) -> Finding:
+    """Return the finding on a sensor slower than its recording; a count of 1 means readings joined by lines."""
+    if count == 1:
+        message = f"The {plural(unit)} lie on straight lines: the readings of a slower sensor were interpolated."
+    else:
+        message = f"Each {noun(unit)} is repeated {count} times: the sensor measures only every {count * step_s:.3g} s."
     return Finding(
         "held_samples",
         "warning",
-        f"Each {noun(unit)} is repeated {count} times: the sensor measures only every {interval_s:.3g} s.",
-        f"The held values are late by {0.5 * interval_s * (count - 1) / count:.2g} s on average. The uncertainties of "
-        "amplitude and phase include that.",
-        {"count": count, "interval_s": interval_s},
+        message,
+        "The uncertainties of amplitude and phase include that.",
+        {"count": count, "interval_s": count * step_s},
     )
 
 

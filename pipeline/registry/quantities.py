@@ -134,8 +134,6 @@ INPUTS: Mapping[str, Input] = {
     "calibrated_scale": Input("calibration of the scale"),
     "sensor_zero": Input("calibration of the zero", "z", "m", of_record=True),
     "sensor_mean_samples": Input("running mean of the sensor"),
-    "sensor_median_samples": Input("running median of the sensor"),
-    "sensor_median_cut": Input("crests cut by a running median"),
     "sensor_lag": Input("lag of the sensor", "tau", "s"),
     # Contradictions between the recording and its model.
     "model_misfit": Input("what differs from a sinusoid in every period"),

@@ -536,13 +536,11 @@ class _Filtered:
         self.delay: Any = 0.0
         if smoothing is None:
             return
-        names = ("sensor_mean_samples", "sensor_median_samples", "sensor_lag")
         sizes = [
             inputs.add(name, size, "B") if size.u > 0.0 else size.value
-            for name, size in zip(names, smoothing.sizes, strict=True)
+            for name, size in (("sensor_mean_samples", smoothing.mean_samples), ("sensor_lag", smoothing.lag_s))
         ]
-        cut = inputs.add("sensor_median_cut", Estimate(0.0, smoothing.u_cut(float(omega.nominal_value)), ""), "B")
-        self.gain = function_of(smoothing.gain, omega, *sizes) + cut
+        self.gain = function_of(smoothing.gain, omega, *sizes)
         self.delay = function_of(smoothing.delay, omega, *sizes)
 
 
