@@ -18,7 +18,6 @@ PRESETS = {
         STANDARD,
         damping=DampingParams(laws=FAST_LAWS, otherwise=DampingParams().laws),
         disturbances=DisturbancesParams(modes=False),
-        settle=False,
     ),
     "standard": STANDARD,
     "best": replace(STANDARD, full=WaveformParams()),

@@ -7,7 +7,7 @@ module. If a stage must run again, on fewer samples or after a disturbance was r
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,7 +44,6 @@ from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equati
 from pipeline.motion.fitted import Fitted, fit_by_equation, fit_by_windows, fit_waveform
 from pipeline.motion.overdamped import find_overdamped, spring_constant
 from pipeline.motion.two_modes import TwoModes, find_two_modes
-from pipeline.motion.waveform_fit import Params as WaveformParams
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import median
@@ -258,9 +257,7 @@ def _oscillation(
             misfits.append(smoothed.misfit)
             found.append(smoothing_finding(smoothed, unit))
     if by_windows:
-        model = check_model(fitted, unexplained, shortest, _settling_fit(fitted, samples, params), params.checks.model)
-        misfits += model.misfits
-        found.append(model_finding(model, unit))
+        found.append(model_finding(check_model(fitted, unexplained, shortest, params.checks.model), unit))
 
     effects = tabulate(
         scene, damping, phase, rest, noise_m=windows.noise_m, instrument=instrument, disturbances=disturbances
@@ -297,14 +294,6 @@ def _oscillation(
     )
     motion = Oscillation(windows, disturbances, damping, phase, rest, waveform, fitted.full, part.cycles, derived)
     return Analysis(track, scene, params, samples, motion, effects, findings, derived.estimates)
-
-
-def _settling_fit(fitted: Fitted, samples: Conditioned, params: Params) -> Callable[[], Fitted] | None:
-    """Return a function that fits the whole waveform if the halves disagree; None if it was fitted or is too long."""
-    if not params.settle or fitted.full is not None or len(samples.track) > params.most_settled:
-        return None
-    # Only the selected law is fitted: the comparison needs amplitude and phase, but no selection among laws.
-    return lambda: fit_waveform(fitted, samples, WaveformParams(besides=())).in_unit(samples.track.unit)
 
 
 def _without_period(samples: Conditioned, why: NoOscillation, scene: Scene, params: Params) -> Analysis:

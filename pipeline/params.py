@@ -40,10 +40,6 @@ class Params:
         Options of the stages with the same names.
     full : pipeline.motion.waveform_fit.Params, optional
         Options of the fit of the whole waveform; None omits this fit.
-    settle : bool
-        Whether the whole waveform is also fitted if the two halves of a run contradict the model fitted to the windows.
-    most_settled : int
-        Maximum number of samples for which ``settle`` applies: the fit takes about a second for 50,000 samples.
     most_parts : int
         Maximum number of times that a freely moving part is sought within the part found before.
     early, late : float
@@ -64,8 +60,6 @@ class Params:
     phase: phase.Params = field(default_factory=phase.Params)
     derive: derive.Params = field(default_factory=derive.Params)
     full: waveform_fit.Params | None = None
-    settle: bool = True
-    most_settled: int = 50_000
     most_parts: int = 4
     early: float = 0.25
     late: float = 0.75

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.checks.misfit import Misfit
 from pipeline.checks.residuals import Residuals
-from pipeline.damping.average import average_over_laws
 from pipeline.motion.fitted import Fitted
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
@@ -82,8 +79,6 @@ class ModelCheck:
         Difference between the halves, in standard uncertainties.
     correlation, lag_s : float
         The strongest correlation of the residuals and its lag; 0 if it is below the limit.
-    misfits : tuple of Misfit
-        Difference to a fit of the whole waveform if the halves disagree; otherwise empty.
     """
 
     contradictions: tuple[Contradiction, ...]
@@ -94,14 +89,12 @@ class ModelCheck:
     halves: float
     correlation: float
     lag_s: float
-    misfits: tuple[Misfit, ...]
 
 
 def check_model(
     fitted: Fitted,
     residuals: Residuals | None,
     shortest: int,
-    fit_waveform: Callable[[], Fitted] | None,
     params: Params | None = None,
 ) -> ModelCheck:
     """Return how far a run contradicts the model that was fitted to it.
@@ -114,18 +107,13 @@ def check_model(
         The residuals that no other check explains; None if another check explains all of them.
     shortest : int
         Shortest lag at which correlations of the residuals are not explained by another check.
-    fit_waveform : callable or None
-        Function that fits the whole waveform; it is called if the halves disagree. None if this fit was done already,
-        or takes too long.
     params : Params, optional
 
     Notes
     -----
     The residuals of amplitudes and phases, over their standard uncertainties, are fitted by a straight line in each
     half. If the model is correct, the differences in level and slope are four standard normal numbers, of which the
-    largest is tested. If it is not, the fits by windows and by the whole waveform weight its error differently, and
-    neither is known to be better. So the values of the windows are kept, and their differences from those of the
-    waveform are standard uncertainties.
+    largest is tested.
     """
     from scipy.special import ndtri
 
@@ -141,12 +129,8 @@ def check_model(
     if correlation:
         found.append(Contradiction.COLOUR)
     halves = _halves(fitted, params.least_windows)
-    misfits: tuple[Misfit, ...] = ()
     if halves > -float(ndtri(params.false_alarm / 8.0)):
         found.append(Contradiction.HALVES)
-        whole = None if fit_waveform is None else fit_waveform()
-        if whole is not None and whole.full is not None and whole.full.converged:
-            misfits = (_difference(fitted, whole),)
     return ModelCheck(
         tuple(found),
         fitted.waveform.rms_m,
@@ -156,7 +140,6 @@ def check_model(
         halves,
         correlation,
         lag_s,
-        misfits,
     )
 
 
@@ -217,26 +200,3 @@ def _apart(first: F8, second: F8) -> float:
     level = abs(float(change.sum())) / math.sqrt(2.0 * n)
     slope = abs(float(x @ change)) / math.sqrt(2.0 * float(x @ x))
     return max(level, slope)
-
-
-def _difference(fitted: Fitted, whole: Fitted) -> Misfit:
-    """Return the differences between the estimates by windows and by the whole waveform."""
-    omega = fitted.phase.angular_frequency.value
-    size_m, rate = (b - a for a, b in zip(_at_start(fitted), _at_start(whole), strict=True))
-    return Misfit(
-        name="choice_of_fit",
-        amplitude_m=abs(size_m),
-        offset_m=abs(whole.rest.mean.value - fitted.rest.mean.value),
-        phase_rad=abs(math.remainder(whole.phase.phase.value - fitted.phase.phase.value, 2.0 * math.pi)),
-        damping_rate=abs(rate),
-        clock=abs(whole.phase.angular_frequency.value / omega - 1.0),
-    )
-
-
-def _at_start(fitted: Fitted) -> tuple[float, float]:
-    """Return amplitude, m, and damping rate, 1/s, at the start, averaged over the laws."""
-    laws = average_over_laws(fitted.damping, math.sqrt(float(np.mean(fitted.demodulated.amplitude**2))))
-    return (
-        sum(one.weight * float(one.fit.joint.values[0]) for one in laws),
-        sum(one.weight * one.fit.rate_at_start() for one in laws),
-    )

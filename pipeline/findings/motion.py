@@ -245,8 +245,7 @@ def model_finding(check: ModelCheck, unit: str) -> Finding | None:
         )
     elif Contradiction.HALVES in check.contradictions:
         message = (
-            f"The two halves of the run disagree by {check.halves:.2g} standard uncertainties; the uncertainties were "
-            "increased."
+            f"The two halves of the run disagree by {check.halves:.2g} standard uncertainties of one model."
         )
     elif Contradiction.COLOUR in check.contradictions:
         message = (
@@ -267,13 +266,6 @@ def model_finding(check: ModelCheck, unit: str) -> Finding | None:
         details.append(f"The residuals have a correlation of {check.correlation:.2f} at a lag of {check.lag_s:.3g} s.")
     if Contradiction.HALVES in check.contradictions:
         details.append(f"The halves differ from one model by {check.halves:.2g} standard uncertainties.")
-        if check.misfits:
-            other = check.misfits[0]
-            details.append(
-                "The whole waveform was fitted too, as --accuracy best does: its amplitude differs by "
-                f"{amount(other.amplitude_m, unit)} and its damping rate by {other.damping_rate:.2g} 1/s, which the "
-                "uncertainties include."
-            )
     return Finding(
         "model_misfit",
         "warning",

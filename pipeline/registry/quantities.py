@@ -137,7 +137,6 @@ INPUTS: Mapping[str, Input] = {
     "sensor_lag": Input("lag of the sensor", "tau", "s"),
     # Contradictions between the recording and its model.
     "model_misfit": Input("what differs from a sinusoid in every period"),
-    "choice_of_fit": Input("difference between the fits of windows and of the whole waveform"),
     "held_samples": Input("distances held by the sensor"),
     "sensor_smoothing": Input("smoothing by the sensor"),
     "implausible_motion": Input("motion that no bob on a spring makes"),
