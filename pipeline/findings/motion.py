@@ -16,7 +16,6 @@ from pipeline.findings.finding import Finding
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit
 from pipeline.motion.fitted import Fitted
 from pipeline.motion.overdamped import Overdamped
-from pipeline.motion.phase import words_on_exponent
 from pipeline.motion.waveform import Rest
 from pipeline.motion.waveform_fit import FullFit
 from pipeline.numerics.quantity import amount, plural
@@ -118,7 +117,7 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Find
         )
     if phase.backbone is not None:
         start = phase.damping.best.joint["A0"].value
-        shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
+        shift = phase.backbone.value * start**2 / phase.angular_frequency.value
         # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
         by_drag = (phase.damping.best.rate_at_start() / phase.angular_frequency.value) ** 2
         if abs(shift) > by_drag:
@@ -127,9 +126,9 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Find
                 "warning",
                 f"At {amount(start, unit, '.0f')} the frequency is {100.0 * abs(shift):.2g} % "
                 f"{'higher' if shift > 0 else 'lower'} than in very small swings; the period is an average.",
-                f"The frequency changes with {words_on_exponent(phase.exponent)}. The stated period is the average "
+                "The frequency changes with the square of the amplitude. The stated period is the average "
                 "over the run; its uncertainty does not cover the period at other amplitudes.",
-                {"relative_shift": shift, "amplitude_m": start, "exponent": phase.exponent},
+                {"relative_shift": shift, "amplitude_m": start},
             )
     # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
@@ -244,9 +243,7 @@ def model_finding(check: ModelCheck, unit: str) -> Finding | None:
             f"({amount(check.noise_m, unit)}); the uncertainties were increased."
         )
     elif Contradiction.HALVES in check.contradictions:
-        message = (
-            f"The two halves of the run disagree by {check.halves:.2g} standard uncertainties of one model."
-        )
+        message = f"The two halves of the run disagree by {check.halves:.2g} standard uncertainties of one model."
     elif Contradiction.COLOUR in check.contradictions:
         message = (
             f"Residuals are correlated ({check.correlation:.2f} at a lag of {check.lag_s:.2g} s): they are not noise."

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.regression import beating_length, correlation_length, scatter, smooth_curve
+from pipeline.numerics.regression import correlation_length, scatter, smooth_curve
 from pipeline.track import F8, UNUSABLE, Track
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
@@ -64,9 +64,7 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
     weight = 1.0 / spread.u[spread.kept]
     mean = float(np.average(offset[spread.kept], weights=weight**2))
     left = (offset[spread.kept] - mean) * weight
-    if (length := beating_length(left)) is None:
-        length = max(spread.correlation, correlation_length(left))
-    widened = length * max(1.0, float(left @ left) / max(left.size - 1, 1))
+    widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), "m")
     curve = np.asarray(polynomial(t), np.float64)
     return Rest(estimate, float(np.ptp(curve)), gain > evidence, t, curve)

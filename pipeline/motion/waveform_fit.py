@@ -15,12 +15,12 @@ from pipeline.damping.law_fit import joint_of
 from pipeline.damping.laws import LAWS, Law, free_power
 from pipeline.damping.laws import in_units as in_length_units
 from pipeline.damping.select import Damping, LawFit
-from pipeline.motion.phase import PhaseFit, amplitude_integral, backbone_unit, wrapped
+from pipeline.motion.phase import PhaseFit, amplitude_integral, wrapped
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_model import Chooser, Record, Rows, State, WaveformModel
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.regression import beating_length, correlation_length, solve_weighted
+from pipeline.numerics.regression import correlation_length, solve_weighted
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
@@ -155,7 +155,7 @@ def fit_record(
 
     Notes
     -----
-    The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^p\\bigr)`, where
+    The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^2\\bigr)`, where
     :math:`\\tau` is the time from the middle of the record; there frequency and phase are uncorrelated. A drifting
     rest position and further columns enter linearly and are projected out
     (:class:`pipeline.motion.waveform_model.WaveformModel`). A constant rest position is a parameter like the others.
@@ -177,7 +177,7 @@ def fit_record(
     else:
         theta = damping.best.joint.values
         area = area_of(theta) if phase.coefficients.size == 3 else None
-        start = _state(record, damping.best.law, theta, phase.coefficients, area, phase.exponent)
+        start = _state(record, damping.best.law, theta, phase.coefficients, area)
         if phase.lag is not None:
             start = replace(start, lag=(phase.lag[0] - phase.middle, phase.lag[1]))
     solved = _settled(record, chooser, start, area_of, params)
@@ -208,18 +208,16 @@ def fit_record(
     )
 
 
-def _state(
-    record: Record, law: Law, theta: F8, turning: F8, area: tuple[F8, F8] | None = None, exponent: float = 2.0
-) -> State:
+def _state(record: Record, law: Law, theta: F8, turning: F8, area: tuple[F8, F8] | None = None) -> State:
     constant = record.order == 0
-    return State(law, np.concatenate([theta, turning, [0.0] * constant]), constant, area, exponent)
+    return State(law, np.concatenate([theta, turning, [0.0] * constant]), constant, area)
 
 
 def _area(record: Record, fit: LawFit, phase: PhaseFit, theta: F8) -> tuple[F8, F8]:
     """Return the backbone's column for the parameters ``theta`` of the law."""
     last = phase.t0 + float(record.elapsed.max())
     fit = replace(fit, joint=replace(fit.joint, values=theta))
-    return amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last, phase.exponent)
+    return amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last)
 
 
 def _solve(record: Record, state: State, rows: Rows, params: Params) -> _Solved:
@@ -322,10 +320,7 @@ def _covariance(solved: _Solved, demodulated: Demodulated) -> tuple[F8, F8]:
             ratio = float(squares.sum())
             independent = ratio**2 / max(float(squares @ squares), 1e-300)
             significant = ratio > 1.0 + 3.3 * math.sqrt(2.0 / max(independent, 1.0))
-            # The last parameter is the constant rest position, in which a beat causes oscillating deviations.
-            beats = beating_length(pull) if solved.state.constant and k == u.size - 1 else None
-            length = correlation_length(pull) if beats is None else beats
-            factors[k] = math.sqrt((ratio if significant else 1.0) * length)
+            factors[k] = math.sqrt((ratio if significant else 1.0) * correlation_length(pull))
     return inverse * solved.noise_m**2 * np.outer(factors, factors), factors
 
 
@@ -355,7 +350,7 @@ def _refined_phase(
     backbone = None
     if state.area is not None:
         gradient[2] = float(np.interp(before, *state.area)[0])
-        backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), backbone_unit(phase.exponent))
+        backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), "rad/(s m^2)")
         tau = demodulated.t - phase.middle
         u = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
         line = solve_weighted(np.stack([np.ones(tau.size), tau], axis=1), state.steady_angle(tau), u)
@@ -391,5 +386,5 @@ def _refined_waveform(solved: _Solved, track: Track) -> Waveform:
 def _velocity(state: State, amplitude: F8, tau: F8) -> F8:
     angle, rate = state.angle(tau), state.turning[1]
     if state.area is not None:
-        rate = rate + state.turning[2] * np.abs(amplitude) ** state.exponent
+        rate = rate + state.turning[2] * amplitude**2
     return np.asarray(state.law.rate(amplitude, state.theta) * np.cos(angle) - amplitude * rate * np.sin(angle))

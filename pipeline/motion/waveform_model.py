@@ -114,14 +114,12 @@ class State:
     law : Law
     values : (q,) float64
         The law's parameters, the phase in the middle (rad) and the angular frequency (rad/s). With ``area`` the
-        backbone (rad/(s m^p)) of :math:`\\omega(A) = \\omega_0 + \\kappa A^p` follows. If the rest position is
+        backbone (rad/(s m^2)) of :math:`\\omega(A) = \\omega_0 + \\kappa A^2` follows. If the rest position is
         constant, it comes last, minus the record's level (m).
     constant : bool
         Whether the rest position is constant.
     area : tuple of (g,) float64, or None
-        Times from the middle (s) and the integral of A^p (m^p s); only with a backbone.
-    exponent : float
-        The exponent p.
+        Times from the middle (s) and the integral of A^2 (m^2 s); only with a backbone.
     lag : tuple of (g,) float64, or None
         Times from the middle (s) and the delays of a period's fitted sinusoid at these times (rad). They are fixed at
         those of the windows' law, because their change with the parameters is of second order.
@@ -131,7 +129,6 @@ class State:
     values: F8
     constant: bool
     area: tuple[F8, F8] | None = None
-    exponent: float = 2.0
     lag: tuple[F8, F8] | None = None
 
     @property

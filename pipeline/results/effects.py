@@ -17,7 +17,7 @@ from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.select import Damping
-from pipeline.motion.phase import PhaseFit, words_on_exponent
+from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
 from pipeline.numerics.quantity import amount, in_unit
 from pipeline.registry.effects import check_effect
@@ -156,10 +156,10 @@ def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
         why = "a constant frequency describes the phase: an ideal spring needs no more"
         return Effect(name, None, None, unit, False, why)
     start = damping.best.joint["A0"].value
-    shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
+    shift = phase.backbone.value * start**2 / phase.angular_frequency.value
     why = (
         f"the phase bends: the frequency shifts by {shift:.2g} of itself from rest to the first amplitude, "
-        f"with {words_on_exponent(phase.exponent)}, far beyond its uncertainty"
+        "with the square of the amplitude, far beyond its uncertainty"
     )
     return Effect(name, None, shift, unit, True, why)
 
