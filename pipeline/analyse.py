@@ -160,10 +160,11 @@ def _free_part(samples: Conditioned, params: Params) -> _FreePart | NoOscillatio
         t = samples.track.t[samples.used]
         half_s = float(np.median(t))
         later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
-        samples, segments = condition(later.flagged(samples.track), params.condition), later.within(segments)
-        trimmed, stopped = _cycles(samples, params, params.early)
-        if isinstance(trimmed, NoOscillation):
+        trial = condition(later.flagged(samples.track), params.condition)
+        trimmed, stopped = _cycles(trial, params, params.early)
+        if isinstance(trimmed, NoOscillation) or check_sinusoid(trial, demodulate(trial, trimmed, params.demodulate)):
             return cycles
+        samples, segments = trial, later.within(segments)
         cycles = trimmed
     for _ in range(params.most_parts):
         windows = demodulate(samples, cycles, params.demodulate)

@@ -153,7 +153,8 @@ def _fitted(windows: Windows, basis: F8, inside: Bools, least: float) -> tuple[_
     """Fit every window's sinusoid to selected samples without false echoes; return it and the noise, m."""
     usable = windows.usable > 0
     solution = solve(basis, (inside & usable).astype(np.float64))
-    sigma = max(least, mad_sigma(solution.residual[inside & usable & solution.good[:, None]]))
+    middle = solution.residual[inside & usable & solution.good[:, None]]
+    sigma = max(least, mad_sigma(middle)) if middle.size else least
     refit(basis, solution, (inside & usable & (np.abs(solution.residual) < FAR_OFF * sigma)).astype(np.float64))
     rest, a, b = solution.coefficients.T
     part = basis[:, :3]
