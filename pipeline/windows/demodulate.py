@@ -9,14 +9,13 @@ fit and the tuning of its basis. This module contains the passes: let clusters g
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.regression import scatter, smooth_curve
 from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma, median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, U8, Quality
@@ -26,9 +25,6 @@ from pipeline.windows.sinusoids import Solution, Tuning, Windows, quantile, refi
 __all__ = ["Demodulated", "Params", "demodulate", "model_error", "polar"]
 
 WEAK = 7.0  # amplitude in standard uncertainties below which its phase is uncertain by more than 0.14 rad
-DISTURBING, DRIFTING = 0.1, 0.5  # a drift's bias over the amplitudes' uncertainty; its size over the motion's
-FEWEST_STEADIED = 8  # windows needed to correct a drift
-VERY_STRONG = 10.0  # difference of BIC: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773
 FINEST = 1e-4  # scatter relative to the amplitude; only computed records have less
 HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, with quantiles of |x| for normal x
 
@@ -138,8 +134,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     _rescue(windows, basis, solution, spread, tuning, params)
     _clip(windows, basis, solution, spread, rough, params)
     weights = solution.weights
-    # Fit again with each window's own frequency and decay, after correcting the drift of the rest position.
-    windows = _steadied(windows, solution, spread, tuning.angular_frequency)
+    # Fit again with each window's own frequency and decay.
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
@@ -226,32 +221,6 @@ def _neighbours(n: int) -> NDArray[np.int64]:
 def _spread(usable: F8, residual: F8) -> F8:
     """Return (w,): the standard deviation of each window's samples about its fit, from their median deviation."""
     return quantile(np.abs(residual), usable, HALF[0]) / HALF[1]
-
-
-def _steadied(windows: Windows, solution: Solution, spread: F8, omega: float) -> Windows:
-    """Subtract the drift of the rest position within each window, where it would bias the amplitudes.
-
-    A window fits a constant rest position. If this moves by R over a record of length T, all amplitudes are biased by
-    up to :math:`2R/\\omega T`, equally where windows begin at equal phases. Let a straight line through the N rest
-    positions, of standard deviation :math:`\\sigma`, lower chi-square by X. The bias is then
-    :math:`\\sqrt{24 X}/\\omega T` times the uncertainty of the mean amplitude, :math:`\\sqrt{2/N}\\sigma`.
-    """
-    good = solution.good
-    if np.count_nonzero(good) < FEWEST_STEADIED:
-        return windows
-    t, rest = windows.centre[good], solution.coefficients[good, 0]
-    u = _typical(spread, windows, solution) / np.sqrt(solution.normal[good, 0, 0])
-    deviation = (rest - rest.mean()) / u
-    if 24.0 * (float(deviation @ deviation) - t.size) < (DISTURBING * omega * (t[-1] - t[0])) ** 2:
-        return windows
-    curve, gain = smooth_curve(t, rest, scatter(t, rest, u))
-    if not gain > VERY_STRONG:
-        return windows
-    moved = curve(windows.centre[:, None] + windows.tau) - curve(windows.centre)[:, None]
-    size = np.hypot(solution.coefficients[good, 1], solution.coefficients[good, 2])
-    if np.any(np.abs(moved[good]).max(axis=1) > DRIFTING * np.hypot(size, spread[good])):
-        return windows  # moved by a hand or another motion, not a drift of the rest position
-    return replace(windows, y=np.where(windows.placed, windows.y - moved, 0.0))
 
 
 def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
