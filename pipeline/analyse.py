@@ -275,7 +275,7 @@ def _oscillation(
     findings = by_severity(
         part_findings(part.segments),
         motion_findings(part.cycles, fitted, rest),
-        damping_findings(damping, derived.coefficients),
+        damping_findings(damping),
         (finding for finding in found if finding is not None),
         sample_findings(
             samples,

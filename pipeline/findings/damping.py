@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
-from pipeline.damping.laws import free_power, words_of
-from pipeline.damping.mixture import MixedDrag, find_mixed
+from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
 from pipeline.findings.finding import Finding
-from pipeline.numerics.estimate import Estimate
 
 __all__ = ["damping_findings"]
 
@@ -17,14 +15,12 @@ __all__ = ["damping_findings"]
 VERY_STRONG = 10.0
 
 
-def damping_findings(damping: Damping, stated: Mapping[str, Estimate]) -> Iterator[Finding]:
+def damping_findings(damping: Damping) -> Iterator[Finding]:
     """Yield findings on laws that fit, laws that are rejected and laws that cannot be distinguished.
 
     Parameters
     ----------
     damping : Damping
-    stated : mapping of str to Estimate
-        The coefficients in the results, with all contributions to their uncertainties.
     """
     rejected = [name for name, fit in damping.fits.items() if fit.rejected]
     if damping.fits and len(rejected) == len(damping.fits):
@@ -41,8 +37,6 @@ def damping_findings(damping: Damping, stated: Mapping[str, Estimate]) -> Iterat
         yield contradicted
     if rejected or damping.unfitted:
         yield _rejections(damping, len(rejected))
-    if (mixed := find_mixed(damping)) is not None:
-        yield _mixed(mixed, damping, stated)
     if len(damping.admissible) > 1:
         names = [words_of(damping.fits[name].law) for name in damping.admissible]
         undamped = any(len(damping.fits[name].law.parameters) == 1 for name in damping.admissible)
@@ -78,30 +72,6 @@ def _stated_law(damping: Damping) -> Finding | None:
         f"{words_of(stated.law)} has a reduced chi-square of {_number(stated.reduced_chi2)}, {words_of(other.law)} has "
         f"{_number(other.reduced_chi2)}; the BIC of the stated law is higher by {_number(excess)}.",
         {"reduced_chi2": stated.reduced_chi2, "bic_excess": excess},
-    )
-
-
-def _mixed(mixed: MixedDrag, damping: Damping, stated: Mapping[str, Estimate]) -> Finding:
-    fit = mixed.fit
-    # A coefficient has the same uncertainty here as in the results.
-    given = stated if set(stated) == set(fit.joint.names[1:]) else fit.joint.estimates()
-    terms = " and ".join(f"{name} = {given[name]}" for name in fit.joint.names[1:])
-    alone = ", ".join(f"{words_of(damping.fits[name].law)} {_number(excess)}" for name, excess in mixed.against.items())
-    details = f"{terms}. The BIC of one kind alone is higher by: {alone}."
-    if fit.rejected:
-        details += (
-            f" The coefficients change with the amplitude (reduced chi-square {_number(fit.reduced_chi2)}), so the "
-            "uncertainties and the BIC are based on the residuals."
-        )
-        for other in damping.fits.values():
-            if name := free_power(other.law):
-                details += f" A free power of the amplitude gives {name} = {other.joint[name]}."
-    return Finding(
-        "mixed_drag",
-        "info",
-        f"The damping needs {words_of(fit.law)}: one kind alone does not fit.",
-        details,
-        {name: given[name].value for name in fit.joint.names[1:]},
     )
 
 

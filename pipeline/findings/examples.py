@@ -33,7 +33,6 @@ EXAMPLES: Mapping[str, str] = {
     "no_law_fits": "No damping law fits: the best has a reduced chi-square of 5.98, not about 1.",
     "law_rejected": "2 of the 9 damping laws tried fit this recording; 7 do not.",
     "laws_not_separable": "7 damping laws fit this run equally well; a longer run may distinguish them.",
-    "mixed_drag": "The damping needs linear and quadratic drag together: one kind alone does not fit.",
     # Distances.
     "clipped": "542 of 2000 samples are cut off at 324.2 mm; they were left out.",
     "false_echoes": "701 of 12000 samples (5.8%) are false echoes; they were left out.",

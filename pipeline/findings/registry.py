@@ -229,12 +229,6 @@ FINDINGS: Mapping[str, FindingKind] = {
         "The recording cannot distinguish these damping laws.",
         "The run is too short, or its amplitude falls too little.",
     ),
-    "mixed_drag": FindingKind(
-        _INFO,
-        Symptom.DAMPING,
-        "The damping needs two kinds of drag together.",
-        "A disc in air has viscous and quadratic drag; a clamp adds friction.",
-    ),
     # Distances.
     "clipped": FindingKind(
         _WARNING,

@@ -17,7 +17,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.checks.misfit import Misfit
-from pipeline.damping.average import Weighted, average_over_laws, scaled, spread_counts
+from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Law, free_power
 from pipeline.damping.select import Damping
@@ -274,8 +274,7 @@ def derive(
 
     Results that depend on the damping law are averages over laws
     (:func:`pipeline.damping.average.average_over_laws`): :math:`x = \\sum_i w_i x_i` and
-    :math:`u^2 = \\sum_i w_i (u_i^2 + c (x_i - x)^2)`, where the factor c weights the spread between laws
-    (:func:`pipeline.damping.average.spread_counts`).
+    :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
 
     References
     ----------
@@ -569,8 +568,7 @@ class _Laws:
         if weights.size > 1:
             factors = [by_parameters @ _root(one.fit.joint.covariance) for one, _, by_parameters in found]
             apart = each - self.values
-            counts = spread_counts(weights, apart[:, 1], np.array([factor[1] @ factor[1] for factor in factors]))
-            covariance = counts * (weights[:, None] * apart).T @ apart
+            covariance = (weights[:, None] * apart).T @ apart
             for factor, one, weight in zip(factors, self.weighted, weights, strict=True):
                 if one.fit is not self.stated:
                     covariance += weight * factor @ factor.T
