@@ -13,7 +13,7 @@ from pipeline.motion.fitted import Fitted
 from pipeline.motion.overdamped import Overdamped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
-from pipeline.params import Params
+from pipeline.options import Options
 from pipeline.registry.quantities import check_quantity
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
@@ -21,8 +21,6 @@ from pipeline.results.kinematics import Smoothed, kinematics
 from pipeline.samples.condition import Conditioned
 from pipeline.track import U8, Track
 from pipeline.windows.cycles import Cycles
-
-__all__ = ["Analysis", "Motion", "Oscillation", "Overdamped", "Still"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +61,7 @@ class Analysis:
     ----------
     track : Track
     scene : Scene
-    params : Params
+    options : Options
     conditioned : Conditioned
     motion : Oscillation, Overdamped or Still
         For an overdamped motion, ``estimates`` contains the relaxation rates. For a still bob it contains only the
@@ -82,7 +80,7 @@ class Analysis:
 
     track: Track
     scene: Scene
-    params: Params
+    options: Options
     conditioned: Conditioned
     motion: Motion
     effects: tuple[Effect, ...]

@@ -12,8 +12,6 @@ from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.laws import LAW_NAMES
 
-__all__ = ["PLACES", "Scene"]
-
 POSITIONS = ("below", "above")
 _CHOICES = {("sensor", "position"): ("sensor_position", POSITIONS), ("damping", "law"): ("damping_law", LAW_NAMES)}
 """Keys of a scene file with text values: the attribute for each key, and the allowed texts."""

@@ -18,7 +18,16 @@ from pipeline.motion.fitted import Fitted
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 
-__all__ = ["Contradiction", "ModelCheck", "Params", "check_model"]
+# Maximum ratio of the residuals of the whole model to the noise within a period. Above it the model counts as
+# incomplete, because the part that it does not describe is about as large as the noise.
+EXCESS = 1.5
+FALSE_ALARM = 1e-4  # probability that the phases, or the halves, of a run that follows its model contradict it
+COLOUR = 0.5  # correlation of the residuals, at any lag, above which they are not noise
+LEAST_SHARE = 0.01  # minimum of the predictable part of the residuals, over the amplitude: users can act on one percent
+LEAST_WINDOWS = 8  # minimum number of windows in a half for the halves to be compared
+# Minimum number of samples in a window for the correlation of residuals to be tested. With fewer samples, the fit of
+# five parameters correlates the residuals.
+LEAST_SAMPLES = 20
 
 
 class Contradiction(enum.Enum):
@@ -28,36 +37,6 @@ class Contradiction(enum.Enum):
     PHASE = "phase"
     HALVES = "halves"
     COLOUR = "colour"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`check_model`.
-
-    Parameters
-    ----------
-    excess : float
-        Maximum ratio of the residuals of the whole model to the noise within a period. Above it the model counts as
-        incomplete, because the part that it does not describe is about as large as the noise.
-    false_alarm : float
-        Probability that the phases, or the halves, of a run that follows its model contradict it.
-    colour : float
-        Correlation of the residuals, at any lag, above which they are not noise.
-    least_share : float
-        Minimum of the predictable part of the residuals, over the amplitude: users can act on one percent.
-    least_windows : int
-        Minimum number of windows in a half for the halves to be compared.
-    least_samples : int
-        Minimum number of samples in a window for the correlation of residuals to be tested. With fewer samples, the
-        fit of five parameters correlates the residuals.
-    """
-
-    excess: float = 1.5
-    false_alarm: float = 1e-4
-    colour: float = 0.5
-    least_share: float = 0.01
-    least_windows: int = 8
-    least_samples: int = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +74,6 @@ def check_model(
     fitted: Fitted,
     residuals: Residuals | None,
     shortest: int,
-    params: Params | None = None,
 ) -> ModelCheck:
     """Return how far a run contradicts the model that was fitted to it.
 
@@ -107,7 +85,6 @@ def check_model(
         The residuals that no other check explains; None if another check explains all of them.
     shortest : int
         Shortest lag at which correlations of the residuals are not explained by another check.
-    params : Params, optional
 
     Notes
     -----
@@ -117,19 +94,18 @@ def check_model(
     """
     from scipy.special import ndtri
 
-    params = params or Params()
     demodulated, phase, noise_m = fitted.demodulated, fitted.phase, fitted.demodulated.noise_m
     found = []
-    if noise_m > 0.0 and fitted.waveform.rms_m > params.excess * noise_m:
+    if noise_m > 0.0 and fitted.waveform.rms_m > EXCESS * noise_m:
         found.append(Contradiction.RESIDUALS)
     free = (demodulated.t.size - phase.coefficients.size) / phase.correlation
-    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - params.false_alarm, free) / free:
+    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - FALSE_ALARM, free) / free:
         found.append(Contradiction.PHASE)
-    correlation, lag_s = (0.0, 0.0) if residuals is None else _colour(residuals, shortest, params)
+    correlation, lag_s = (0.0, 0.0) if residuals is None else _colour(residuals, shortest)
     if correlation:
         found.append(Contradiction.COLOUR)
-    halves = _halves(fitted, params.least_windows)
-    if halves > -float(ndtri(params.false_alarm / 8.0)):
+    halves = _halves(fitted, LEAST_WINDOWS)
+    if halves > -float(ndtri(FALSE_ALARM / 8.0)):
         found.append(Contradiction.HALVES)
     return ModelCheck(
         tuple(found),
@@ -143,7 +119,7 @@ def check_model(
     )
 
 
-def _colour(residuals: Residuals, shortest: int, params: Params) -> tuple[float, float]:
+def _colour(residuals: Residuals, shortest: int) -> tuple[float, float]:
     """Return the strongest correlation of the residuals and its lag, s; 0 and 0 if it is below the limits.
 
     The correlations of n samples of white noise have a standard deviation of :math:`n^{-1/2}`. With the probability
@@ -152,7 +128,7 @@ def _colour(residuals: Residuals, shortest: int, params: Params) -> tuple[float,
     from scipy.fft import irfft, next_fast_len, rfft
     from scipy.special import ndtri
 
-    if residuals.samples_per_window < params.least_samples:
+    if residuals.samples_per_window < LEAST_SAMPLES:
         return 0.0, 0.0
     lags = residuals.used.size // 2
     size = next_fast_len(residuals.used.size + lags, real=True)
@@ -168,11 +144,11 @@ def _colour(residuals: Residuals, shortest: int, params: Params) -> tuple[float,
     if shortest > lags:
         return 0.0, 0.0
     lag = shortest + int(np.argmax(np.abs(correlation[shortest:])))
-    white = -float(ndtri(params.false_alarm / (2.0 * lags))) / math.sqrt(pairs[lag] or 1.0)
+    white = -float(ndtri(FALSE_ALARM / (2.0 * lags))) / math.sqrt(pairs[lag] or 1.0)
     # With fewer pairs than samples the estimate may exceed 1, which a correlation cannot.
     strongest = max(-1.0, min(float(correlation[lag]), 1.0))
     predictable_m = math.sqrt(abs(strongest) * sums[0] / pairs[0])
-    if abs(strongest) <= max(params.colour, white) or predictable_m < params.least_share * residuals.amplitude_m:
+    if abs(strongest) <= max(COLOUR, white) or predictable_m < LEAST_SHARE * residuals.amplitude_m:
         return 0.0, 0.0
     return strongest, lag * residuals.interval_s
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.damping.select import Damping, LawFit
+from pipeline.damping.law_fit import LawFit
+from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
 from pipeline.track import F8
@@ -16,22 +17,9 @@ from pipeline.windows.demodulate import Demodulated
 TABLE = 2049  # number of points in the tables of the lag and of the integral of the amplitude
 MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
 NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`fit_phase`.
-
-    Parameters
-    ----------
-    evidence : float
-        Minimum decrease of the BIC for the frequency to count as amplitude-dependent; 10 is "very strong" evidence.
-    rejection : float
-        Probability that the chi-square test rejects residuals that are only noise.
-    """
-
-    evidence: float = 10.0
-    rejection: float = 1e-3
+# Minimum decrease of the BIC for the frequency to count as amplitude-dependent; 10 is "very strong" evidence.
+EVIDENCE = 10.0
+REJECTION = 1e-3  # probability that the chi-square test rejects residuals that are only noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,14 +85,13 @@ class PhaseFit:
         return omega
 
 
-def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None = None) -> PhaseFit:
+def fit_phase(demodulated: Demodulated, damping: Damping) -> PhaseFit:
     """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
 
     Parameters
     ----------
     demodulated : Demodulated
     damping : Damping
-    params : Params, optional
 
     Returns
     -------
@@ -121,7 +108,6 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
 
     The delay of a period's fitted sinusoid (:func:`lag_of`) follows from the damping law and is removed first.
     """
-    params = params or Params()
     t, lag = demodulated.t, lag_of(damping.best, damping.t0, demodulated)
     phase = demodulated.phase if lag is None else demodulated.phase + np.interp(t, *lag)
     noise = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
@@ -141,9 +127,9 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
         curve = _design(points, middle, damping, bent=True)
         trial = solve_weighted(curve[:-1][kept], phase[kept], u)
         gain = (straight.chi2 - trial.chi2) / spread.correlation - math.log(u.size / spread.correlation)
-        if gain > params.evidence:
+        if gain > EVIDENCE:
             bent, design = trial, curve
-    widened, length = _widening(straight, u, spread, params)
+    widened, length = _widening(straight, u, spread)
     covariance = straight.covariance * widened
     model = bent or straight
     start = np.array([1.0, damping.t0 - middle])
@@ -240,13 +226,13 @@ def amplitude_integral(fit: LawFit, t0: float, middle: float, first: float, last
     return grid, np.asarray(integral - np.interp(0.0, grid, integral))
 
 
-def _widening(line: Line, u: F8, spread: Scatter, params: Params) -> tuple[float, float]:
+def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
     """Return the factor that widens the straight line's covariance, and the correlation length used for it."""
     free = line.residual.size - 2
     if free < 1:
         return 1.0, 1.0
     length = max(correlation_length(line.residual / u), spread.correlation)
-    too_large = line.chi2 > chi2_quantile(1.0 - params.rejection, free)
+    too_large = line.chi2 > chi2_quantile(1.0 - REJECTION, free)
     return length * (line.chi2 / free if too_large else 1.0), length
 
 

@@ -16,8 +16,6 @@ from pipeline.track import F8, UNUSABLE, Track
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
 
-__all__ = ["Rest", "Waveform", "fit_rest", "reconstruct"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rest:

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.damping.evidence import BARE_MENTION
-from pipeline.damping.law_fit import joint_of
+from pipeline.damping.law_fit import LawFit, joint_of
 from pipeline.damping.laws import LAWS, Law, free_power
 from pipeline.damping.laws import in_units as in_length_units
-from pipeline.damping.select import Damping, LawFit
+from pipeline.damping.select import Damping
 from pipeline.motion.phase import PhaseFit, amplitude_integral, wrapped
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_model import Chooser, Record, Rows, State, WaveformModel
@@ -25,36 +25,17 @@ from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["FullFit", "Params", "fit_record"]
-
 FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`fit_record`.
-
-    Parameters
-    ----------
-    clip_sigmas : float
-        Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
-    rounds : int
-        Maximum number of rounds of clipping and refitting.
-    steady : float
-        Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas
-        and with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
-    steps : int
-        Maximum number of evaluations of the model in one fit.
-    besides : tuple of str
-        Laws that are fitted in addition to the selected and the admissible ones, even if the windows contradict them.
-        The default is the single exponential, the usual reference for comparisons.
-    """
-
-    clip_sigmas: float = 4.0
-    rounds: int = 5
-    steady: float = 1e-4
-    steps: int = 25
-    besides: tuple[str, ...] = ("linear",)
+# Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
+CLIP_SIGMAS = 4.0
+ROUNDS = 5  # maximum number of rounds of clipping and refitting
+# Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
+# with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
+STEADY = 1e-4
+STEPS = 25  # maximum number of evaluations of the model in one fit
+# Laws that are fitted in addition to the selected and the admissible ones, even if the windows contradict them. The
+# default is the single exponential, the usual reference for comparisons.
+BESIDES = ("linear",)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +117,6 @@ def fit_record(
     waveform: Waveform,
     *,
     extra: F8 | None = None,
-    params: Params | None = None,
 ) -> FullFit:
     """Fit rest position, damping law and phase to all samples together.
 
@@ -147,7 +127,6 @@ def fit_record(
         Outputs of the stages with these names: the start values, and the results if the fit fails.
     extra : (n, k) float64, optional
         Columns that enter linearly in addition to the rest position: cosine and sine of a sideways mode, and steps.
-    params : Params, optional
 
     Returns
     -------
@@ -167,31 +146,30 @@ def fit_record(
     If residuals are not white the covariance is that of the score summed over whole periods, including correlation
     between neighbouring periods, if it exceeds the white covariance significantly.
     """
-    params = params or Params()
     record = Record.of(conditioned, demodulated, phase, rest, extra)
-    chooser = Chooser(conditioned, demodulated, record, params.clip_sigmas)
+    chooser = Chooser(conditioned, demodulated, record, CLIP_SIGMAS)
     area_of = functools.partial(_area, record, damping.best, phase)
     if demodulated.t.size < FEW_WINDOWS and not damping.by_statement:
         phase = replace(phase, lag=None)  # only no damping and linear drag are tried, whose lag is constant
-        damping, start = _select_short(record, chooser.by_windows, demodulated, damping, phase, params)
+        damping, start = _select_short(record, chooser.by_windows, demodulated, damping, phase)
     else:
         theta = damping.best.joint.values
         area = area_of(theta) if phase.coefficients.size == 3 else None
         start = _state(record, damping.best.law, theta, phase.coefficients, area)
         if phase.lag is not None:
             start = replace(start, lag=(phase.lag[0] - phase.middle, phase.lag[1]))
-    solved = _settled(record, chooser, start, area_of, params)
+    solved = _settled(record, chooser, start, area_of)
     if isinstance(solved, str):
         noise_m = demodulated.noise_m
         return FullFit(False, solved, damping, phase, rest, waveform, demodulated.flags, noise_m, {})
     covariance, factors = _covariance(solved, demodulated)
     fits = dict(damping.fits)
-    for name in {damping.selected, *damping.admissible, *params.besides} & fits.keys():
+    for name in {damping.selected, *damping.admissible, *BESIDES} & fits.keys():
         if name == damping.selected:
             fits[name] = _with_joint(fits[name], solved, covariance)
             continue
         start = solved.state.with_law(fits[name].law, fits[name].joint.values)
-        own = _solve(record, start, solved.rows, params)
+        own = _solve(record, start, solved.rows)
         if own.fit.converged:
             fits[name] = _with_joint(fits[name], own, _covariance(own, demodulated)[0])
     damping = replace(damping, fits=fits)
@@ -220,17 +198,16 @@ def _area(record: Record, fit: LawFit, phase: PhaseFit, theta: F8) -> tuple[F8, 
     return amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last)
 
 
-def _solve(record: Record, state: State, rows: Rows, params: Params) -> _Solved:
+def _solve(record: Record, state: State, rows: Rows) -> _Solved:
     model = WaveformModel(record, state, rows)
-    options = least_squares.Params(steps=params.steps)
     if free_power(state.law) is None:
-        fit = least_squares.minimise(model.residuals, state.values, model.jacobian, options)
+        fit = least_squares.minimise(model.residuals, state.values, model.jacobian, steps=STEPS)
     else:
-        fit = _solve_by_amplitude(model, state, options)
+        fit = _solve_by_amplitude(model, state)
     return _Solved(record, replace(state, values=fit.values), model, rows, fit)
 
 
-def _solve_by_amplitude(model: WaveformModel, state: State, options: least_squares.Params) -> least_squares.Fit:
+def _solve_by_amplitude(model: WaveformModel, state: State) -> least_squares.Fit:
     """Fit with lengths in units of the first amplitude; in metres a free power and its factor are nearly degenerate."""
     own, count = state.law, state.theta.size
     length = abs(float(state.theta[0])) or 1.0
@@ -248,35 +225,33 @@ def _solve_by_amplitude(model: WaveformModel, state: State, options: least_squar
         lambda at: model.residuals(in_metres(at)),
         in_units(state.values, length),
         lambda at: model.jacobian(in_metres(at)) @ turn(at),
-        options,
+        steps=STEPS,
     )
     covariance = turn(fit.values) @ fit.covariance @ turn(fit.values).T
     return replace(fit, values=in_metres(fit.values), covariance=covariance)
 
 
-def _settled(
-    record: Record, chooser: Chooser, state: State, area_of: Callable[[F8], tuple[F8, F8]], params: Params
-) -> _Solved | str:
+def _settled(record: Record, chooser: Chooser, state: State, area_of: Callable[[F8], tuple[F8, F8]]) -> _Solved | str:
     """Fit repeatedly until the samples that lie on the model no longer change; return a text if that fails."""
     rows, state = chooser.settled(state, chooser.by_windows)
-    for _ in range(params.rounds):
+    for _ in range(ROUNDS):
         if np.count_nonzero(rows) < 2 * (state.values.size + record.basis.shape[1]):
             return f"only {np.count_nonzero(rows)} samples lie on the model"
         if state.area is not None:
             # The backbone's column so far belongs to the previous amplitudes.
             state = replace(state, area=area_of(state.theta))
-        solved = _solve(record, state, rows, params)
+        solved = _solve(record, state, rows)
         if not solved.fit.converged:
             return solved.fit.tried
         chosen = chooser.near(record.y - solved.position, rows)
-        if np.count_nonzero(chosen != rows) <= params.steady * rows.size:
+        if np.count_nonzero(chosen != rows) <= STEADY * rows.size:
             break
         rows, state = chooser.settled(solved.state, chosen)
     return solved
 
 
 def _select_short(
-    record: Record, rows: Rows, demodulated: Demodulated, damping: Damping, phase: PhaseFit, params: Params
+    record: Record, rows: Rows, demodulated: Demodulated, damping: Damping, phase: PhaseFit
 ) -> tuple[Damping, State]:
     """Select no damping or linear drag for a record of few periods: fit both to the waveform and compare by BIC."""
     fits: dict[str, LawFit] = {}
@@ -287,7 +262,7 @@ def _select_short(
     starts = {"none": np.array([amplitude]), "linear": np.array([amplitude * math.exp(rate * elapsed), rate])}
     for name, theta in starts.items():
         law = LAWS[name]
-        solved = _solve(record, _state(record, law, theta, phase.coefficients[:2]), rows, params)
+        solved = _solve(record, _state(record, law, theta, phase.coefficients[:2]), rows)
         if not solved.fit.converged:
             continue
         states[name] = solved.state

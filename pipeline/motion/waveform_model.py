@@ -16,8 +16,6 @@ from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated, model_error
 
-__all__ = ["Chooser", "Record", "Rows", "State", "WaveformModel"]
-
 Rows = NDArray[np.bool_]
 
 DEPENDENT = 1e-13  # eigenvalue, relative to the largest, below which columns count as linearly dependent

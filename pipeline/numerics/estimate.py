@@ -11,8 +11,6 @@ import numpy as np
 
 from pipeline.track import F8
 
-__all__ = ["Estimate", "Joint", "UpperLimit", "format_limit", "format_value", "in_brackets"]
-
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Estimate:

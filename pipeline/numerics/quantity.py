@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-__all__ = ["SHOWN", "Shown", "amount", "in_unit", "noun", "plural"]
-
 
 @dataclass(frozen=True, slots=True)
 class Shown:

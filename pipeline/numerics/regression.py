@@ -13,20 +13,6 @@ from numpy.typing import NDArray
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.track import F8
 
-__all__ = [
-    "Line",
-    "Scatter",
-    "beyond",
-    "chi2_quantile",
-    "correlation_length",
-    "covariance_of",
-    "decompose",
-    "scatter",
-    "smooth_columns",
-    "smooth_curve",
-    "solve_weighted",
-]
-
 LAGS = 16  # lags computed together; most residuals are uncorrelated beyond these
 
 

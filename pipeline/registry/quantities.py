@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from pipeline.numerics.quantity import in_unit
 
-__all__ = ["INPUTS", "QUANTITIES", "Input", "Quantity", "check_input", "check_quantity"]
-
 
 @dataclass(frozen=True, slots=True)
 class Quantity:

@@ -18,8 +18,6 @@ from pipeline.numerics.threads import one_thread
 from pipeline.results.derive import Derived
 from pipeline.track import F8
 
-__all__ = ["Comparison", "SpringRun", "compare_springs"]
-
 NEARER = 0.01  # maximum tension with two runs exchanged, over that without: chance does not reduce it so much
 SOLVED = 0.5  # maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it
 LARGEST_SPRING = 0.6  # maximum mass of a spring, over the lightest bob: a heavier spring is noticed and weighed

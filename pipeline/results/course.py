@@ -14,8 +14,6 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 
-__all__ = ["Agreement", "Cause", "CourseRun", "Suspect", "agreement", "suspects"]
-
 Cause = Literal[
     "masses exchanged", "unit of the mass", "unit of the distance", "clipped", "wrong disc", "wrong spring", "unknown"
 ]

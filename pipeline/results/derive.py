@@ -33,24 +33,10 @@ from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["Derived", "Params", "derive", "limited"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`derive`.
-
-    Parameters
-    ----------
-    u_clock_nominal : float
-        Relative standard uncertainty of a clock from the specification of its crystal: 50 ppm is the half-width of a
-        rectangular distribution. It does not decrease by averaging.
-    u_air_temperature_k : float
-        Standard uncertainty of an air temperature stated without one, K.
-    """
-
-    u_clock_nominal: float = U_CRYSTAL
-    u_air_temperature_k: float = 0.5
+# Relative standard uncertainty of a clock from the specification of its crystal: 50 ppm is the half-width of a
+# rectangular distribution. It does not decrease by averaging.
+U_CLOCK_NOMINAL = U_CRYSTAL
+U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +208,6 @@ def derive(
     effects: tuple[Effect, ...],
     *,
     instrument: Instrument,
-    params: Params | None = None,
     misfits: tuple[Misfit, ...] = (),
     smoothing: SensorFilter | None = None,
 ) -> Derived:
@@ -238,7 +223,6 @@ def derive(
         The effects table, which says which masses are included.
     instrument : Instrument
         Clock and scale of the sensor.
-    params : Params, optional
     misfits : tuple of Misfit
         Contradictions between the record and its model; they are inputs of kind B with the mean zero.
     smoothing : SensorFilter, optional
@@ -284,9 +268,8 @@ def derive(
     inputs = Inputs()
     laws = _Laws(damping, inputs, demodulated)
     unit = rest.mean.unit
-    params = params or Params()
     terms, coefficients = _terms(
-        demodulated, damping, phase, rest, scene, effects, instrument, params, misfits, smoothing, laws, inputs
+        demodulated, damping, phase, rest, scene, effects, instrument, misfits, smoothing, laws, inputs
     )
     found: dict[str, tuple[Any, str]] = {}
     parts: dict[str, tuple[Any, str]] = {}
@@ -309,7 +292,6 @@ def derive(
             scene,
             effects,
             instrument=instrument,
-            params=params,
             misfits=misfits,
             smoothing=smoothing,
         )
@@ -425,14 +407,13 @@ def _terms(
     scene: Scene,
     effects: tuple[Effect, ...],
     instrument: Instrument,
-    params: Params,
     misfits: tuple[Misfit, ...],
     smoothing: SensorFilter | None,
     laws: _Laws,
     inputs: Inputs,
 ) -> tuple[dict[str, Any], dict[str, tuple[Any, str]]]:
     """Return the terms of the formulas by name, as far as record and scene give them, and the coefficients."""
-    ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
+    ambient = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
     amiss = _Amiss(misfits, inputs)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
     unit = rest.mean.unit

@@ -12,8 +12,6 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
-__all__ = ["Conditioned", "Cut", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
-
 # Variance of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
 QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
@@ -21,20 +19,9 @@ TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
 BLOCK = 256  # samples over which a local curvature is estimated
 LARGEST = 1e100  # magnitude of a measured value; anything beyond is a missing sample
 ROUNDING = 1e-9  # fraction of the largest value; smaller differences are rounding errors of one value
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`condition`.
-
-    Parameters
-    ----------
-    spike_sigmas : float
-        Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in
-        standard deviations of the noise.
-    """
-
-    spike_sigmas: float = 8.0
+# Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in standard
+# deviations of the noise.
+SPIKE_SIGMAS = 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,13 +84,12 @@ class Conditioned:
         return replace(self, track=replace(self.track, y=self.track.y - taken_m))
 
 
-def condition(track: Track, params: Params | None = None) -> Conditioned:
+def condition(track: Track) -> Conditioned:
     """Flag missing samples, duplicate and backward times, and isolated false echoes.
 
     Parameters
     ----------
     track : Track
-    params : Params, optional
 
     Returns
     -------
@@ -130,7 +116,6 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
     >>> int(found.flags[500]), int(np.count_nonzero(found.flags))
     (2, 1)
     """
-    params = params or Params()
     flags = track.flags.copy()
     measured = np.abs(track.y) < LARGEST  # and not NaN
     flags[~measured] |= np.uint8(Quality.MISSING)
@@ -147,7 +132,7 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
         )
     y, rows = track.y[clean], np.flatnonzero(clean)
     half_step = 0.5 * (track.quantum_m or 0.0)
-    spikes = _spikes(y, half_step, params.spike_sigmas)
+    spikes = _spikes(y, half_step, SPIKE_SIGMAS)
     flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
     y_kept, rows = y[~spikes], rows[~spikes]
     noise_m = fourth_difference_noise(y_kept)

@@ -22,27 +22,11 @@ from pipeline.track import F8, U8, Quality
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.sinusoids import Solution, Tuning, Windows, quantile, refit, retune, solve, unwrap
 
-__all__ = ["Demodulated", "Params", "demodulate", "model_error", "polar"]
-
 WEAK = 7.0  # amplitude in standard uncertainties below which its phase is uncertain by more than 0.14 rad
 FINEST = 1e-4  # scatter relative to the amplitude; only computed records have less
 HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, with quantiles of |x| for normal x
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`demodulate`.
-
-    Parameters
-    ----------
-    clip_sigmas : float
-        Residuals beyond this many standard deviations are false echoes and are excluded from the fit.
-    rounds : int
-        Number of reweighted fits of windows with false echoes, before the final fits.
-    """
-
-    clip_sigmas: float = 4.0
-    rounds: int = 3
+CLIP_SIGMAS = 4.0  # residuals beyond this many standard deviations are false echoes and are excluded from the fit
+ROUNDS = 3  # number of reweighted fits of windows with false echoes, before the final fits
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +80,13 @@ class Demodulated:
         return math.sqrt(float((dof * self.noise**2).sum()) / float(dof.sum()))
 
 
-def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None = None) -> Demodulated:
+def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
     """Fit rest position, amplitude and phase robustly in every window.
 
     Parameters
     ----------
     conditioned : Conditioned
     cycles : Cycles
-    params : Params, optional
 
     Returns
     -------
@@ -124,26 +107,25 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     are excluded permanently. A second pass uses the decay :math:`g` of each window. Without it, the conjugate line
     would bias the amplitude by the fraction :math:`g/2\\omega`.
     """
-    params = params or Params()
     windows = Windows.cut(conditioned, cycles.bounds)
     tuning = Tuning.constant(2.0 * math.pi * cycles.frequency_hz, len(windows.y))
     basis = windows.basis(tuning.turning, tuning.decay)
     rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
     basis = windows.decaying(basis, rough.decay)
-    solution, spread = _let_go(windows, basis, conditioned.noise_m, params)
-    _rescue(windows, basis, solution, spread, tuning, params)
-    _clip(windows, basis, solution, spread, rough, params)
+    solution, spread = _let_go(windows, basis, conditioned.noise_m)
+    _rescue(windows, basis, solution, spread, tuning)
+    _clip(windows, basis, solution, spread, rough)
     weights = solution.weights
     # Fit again with each window's own frequency and decay.
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
     spread = _spread(windows.usable, solution.residual)
-    _clip(windows, basis, solution, spread, tuning, params)
+    _clip(windows, basis, solution, spread, tuning)
     return _finish(conditioned, windows, solution, tuning)
 
 
-def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tuple[Solution, F8]:
+def _let_go(windows: Windows, basis: F8, noise_m: float) -> tuple[Solution, F8]:
     """Fit every window; where the scatter exceeds the noise, use weights that ignore clusters of echoes.
 
     Returns the fits and the spreads (w,) of the samples about them.
@@ -153,12 +135,12 @@ def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tupl
     odd = np.flatnonzero(spread > 1.3 * noise_m)
     if odd.size:
         size, least = np.abs(solution.residual[odd]), noise_m + windows.tiny
-        solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, HALF, least, params.rounds))
+        solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, HALF, least, ROUNDS))
         spread[odd] = _spread(windows.usable[odd], solution.residual[odd])
     return solution, spread
 
 
-def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
+def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning) -> None:
     """Fit windows that disagree with their neighbours again, starting from the neighbours' prediction.
 
     The solution and its spreads are updated in place.
@@ -180,7 +162,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
     expected = np.stack([rest, smooth.real, smooth.imag], axis=1)
     away = np.abs(solution.coefficients - expected).max(axis=1)
     level = _typical(spread, windows, solution)
-    bound = params.clip_sigmas * level
+    bound = CLIP_SIGMAS * level
     before = np.sum((np.abs(solution.residual) <= bound) * windows.usable, axis=1)
     few = before < 0.7 * windows.usable.sum(axis=1)
     odd = np.flatnonzero((away > 5.0 * mad_sigma(away)) | few | ~solution.good)
@@ -189,7 +171,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
     part, usable = basis[odd], windows.usable[odd]
     size = np.abs(part[:, 3] - (expected[odd, None, :] @ part[:, :3])[:, 0])
     # Only the best third of the samples sets the scale, so that echoes may make up more than half of a window.
-    trial = _reweighted(part, usable, size, THIRD, level, params.rounds)
+    trial = _reweighted(part, usable, size, THIRD, level, ROUNDS)
     after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])
     solution.put(odd[better], trial.part(better))
@@ -228,13 +210,13 @@ def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
     return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
-def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
+def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning) -> None:
     """Exclude samples with residuals beyond the clipping bound and fit again."""
     level = _typical(spread, windows, solution)
     # One window's spread is uncertain, and a cluster of echoes widens it, so it is kept near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
     least = model_error(size, tuning.decay, tuning.angular_frequency)
-    bound = params.clip_sigmas * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
+    bound = CLIP_SIGMAS * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
     refit(basis, solution, np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0))
 
 

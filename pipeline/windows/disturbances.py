@@ -3,40 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
-from pipeline.windows import sideways as swings
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import Demodulated, demodulate
-from pipeline.windows.demodulate import Params as Demodulation
 from pipeline.windows.modes import Sideways
 from pipeline.windows.sideways import find_sideways
 
-__all__ = ["Disturbances", "Params", "separate"]
-
 SHARE = 0.1  # maximum bias of an effect that is not modelled, relative to the uncertainty
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`separate`.
-
-    Parameters
-    ----------
-    sideways : pipeline.windows.sideways.Params
-    modes : bool
-        Whether to search for modes at all.
-    rounds : int
-        Maximum number of searches for modes. Each but the first uses the windows fitted without the modes found.
-    """
-
-    sideways: swings.Params = field(default_factory=swings.Params)
-    modes: bool = True
-    rounds: int = 2
+ROUNDS = 2  # maximum number of searches for modes. Each but the first uses the windows fitted without the modes found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,8 +59,8 @@ def separate(
     conditioned: Conditioned,
     cycles: Cycles,
     demodulated: Demodulated,
-    params: Params | None = None,
-    demodulation: Demodulation | None = None,
+    *,
+    modes: bool = True,
 ) -> tuple[Demodulated, Disturbances]:
     """Search for modes, and demodulate again without them.
 
@@ -89,8 +68,8 @@ def separate(
     ----------
     conditioned, cycles, demodulated
         Outputs of the stages with these names.
-    params : Params, optional
-    demodulation : pipeline.windows.demodulate.Params, optional
+    modes : bool
+        Whether to search for modes at all.
 
     Returns
     -------
@@ -105,17 +84,16 @@ def separate(
     amplitude's standard uncertainty for every mode, the modes are reported but not subtracted. If they are subtracted,
     the windows' variances are increased, because the modes are estimated from the same samples.
     """
-    params = params or Params()
-    sideways = find_sideways(conditioned, demodulated, params.sideways) if params.modes else Sideways((), None)
+    sideways = find_sideways(conditioned, demodulated) if modes else Sideways((), None)
     leak_m = _leak(sideways)
     modelled = bool(sideways) and leak_m > SHARE * _u_amplitude(demodulated)
     t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
-    for again in range(params.rounds if modelled else 0):
+    for again in range(ROUNDS if modelled else 0):
         if again:
             # Windows fitted without the modes separate false echoes from the main oscillation better.
-            sideways = find_sideways(conditioned, demodulated, params.sideways) or sideways
+            sideways = find_sideways(conditioned, demodulated) or sideways
         taken = sideways.position(t)
-        demodulated = demodulate(conditioned.less(taken), cycles, demodulation)
+        demodulated = demodulate(conditioned.less(taken), cycles)
     if modelled:
         demodulated = replace(demodulated, covariance=demodulated.covariance * _price(sideways))
     return demodulated, Disturbances(conditioned.less(taken), sideways, modelled, leak_m, taken)

@@ -10,8 +10,6 @@ import numpy as np
 
 from pipeline.track import F8
 
-__all__ = ["Law", "Unit", "free_power", "in_units", "units_of", "words_of"]
-
 
 class Unit(NamedTuple):
     """The exponents of metre and second in the unit of a parameter.

@@ -20,8 +20,6 @@ from pipeline.numerics.least_squares import central_differences
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.track import F8
 
-__all__ = ["FunctionLaw", "make_law"]
-
 STEP_S = 1e-3  # time step of the difference for the rate; the relative error is a third of the squared relative change
 AGREE = 1e-5  # relative tolerance of the tests that a law must pass
 PROBE_S = np.linspace(0.0, 10.0, 21)

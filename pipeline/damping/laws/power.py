@@ -11,8 +11,6 @@ from pipeline.damping.laws.drag import Drag
 from pipeline.damping.laws.law import Unit
 from pipeline.track import F8
 
-__all__ = ["Power"]
-
 _MIXED = Drag("guess", "", (1, 2))
 
 

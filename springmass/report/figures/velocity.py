@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.results.kinematics import Smoothed
 from pipeline.numerics.quantity import SHOWN
+from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
     BLUE,

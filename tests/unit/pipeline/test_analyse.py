@@ -14,11 +14,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, Still, analyse
-from pipeline.damping.select import Params as DampingParams
 from pipeline.errors import AnalysisError, PipelineError
 from pipeline.numerics.estimate import Estimate
+from pipeline.options import options_for
 from pipeline.track import Track
 from tests.sampling import sampled
 
@@ -55,8 +54,8 @@ def test_agrees_with_a_waveform_fit_by_lmfit(
     y = synthetic.noisy(truth, t, sigma_m, 12)
     model = lmfit.Model(lambda x, c, a, g, w, p: c + a * np.exp(-g * x) * np.cos(w * x + p), independent_vars=["x"])
     other = model.fit(y, x=t, c=truth.offset, a=truth.amplitude, g=truth.gamma, w=truth.omega, p=truth.phase)
-    params = replace(params_for(accuracy), damping=DampingParams(laws=("linear",)))
-    result = analyse(Track.from_arrays(t, y), params=params)
+    options = replace(options_for(accuracy), laws=("linear",))
+    result = analyse(Track.from_arrays(t, y), options=options)
     motion = motion_of(result)
     period = other.params["w"]
     pairs = {

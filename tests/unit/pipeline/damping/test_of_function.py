@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS, find_law
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
-from pipeline.damping.select import Params
 from pipeline.errors import AnalysisError
+from pipeline.options import Options, options_for
 from pipeline.track import Track
 
 T = np.arange(6000) / 100
@@ -41,8 +40,8 @@ def three_halves(**options: Any) -> FunctionLaw:
 def analysed(amplitude: Any, *laws: Any, accuracy: str = "standard", seed: int = 1) -> tuple[Analysis, Oscillation]:
     """Return the analysis of a minute with this amplitude, with these laws beside all others."""
     noise_m = 1e-4 * np.random.default_rng(seed).standard_normal(T.size)
-    params = replace(params_for(accuracy), damping=Params(laws=(*LAWS, *laws)))
-    found = analyse(Track.from_arrays(T, 0.2 + amplitude * np.cos(8.0 * T) + noise_m), params=params)
+    options = replace(options_for(accuracy), laws=(*LAWS, *laws))
+    found = analyse(Track.from_arrays(T, 0.2 + amplitude * np.cos(8.0 * T) + noise_m), options=options)
     assert isinstance(found.motion, Oscillation)
     return found, found.motion
 
@@ -126,9 +125,8 @@ def test_a_coefficient_means_nothing_by_its_name(name: str) -> None:
         lambda t, a: (lambda line: (line[1] ** -2, 2.0 * line[0]))(np.polyfit(t, a**-0.5, 1)),
     )
     bench = Scene.from_mapping({"bob": {"mass_kg": 0.2}, "disc": {"diameter_m": 0.1}, "air": {"temperature_c": 20.0}})
-    params = params_for("standard")
-    params = replace(params, damping=replace(params.damping, laws=(law,), otherwise=()))
-    found = analyse(Track.from_arrays(t, y), bench, params)
+    options = Options(laws=(law,))
+    found = analyse(Track.from_arrays(t, y), bench, options)
     assert isinstance(found.motion, Oscillation)
     own = found.motion.derived.coefficients
     assert set(own) == {name}
