@@ -14,7 +14,6 @@ import numpy as np
 
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
-from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import minimise
 from pipeline.track import F8, UNUSABLE, Track
