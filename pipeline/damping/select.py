@@ -65,16 +65,6 @@ class Damping:
         return bool(self.stated) and self.selected == self.stated
 
     @property
-    def ahead(self) -> bool:
-        """Whether the selected law is clearly ahead: every other admissible law needs more coefficients.
-
-        It is False if the selected law has no coefficients, or if the record rejects it.
-        """
-        count = len(self.best.law.parameters)
-        others = (len(self.fits[name].law.parameters) for name in self.admissible if name != self.selected)
-        return count > 1 and self.selected in self.admissible and all(more > count for more in others)
-
-    @property
     def best(self) -> LawFit:
         """The fit of the selected law."""
         return self.fits[self.selected]

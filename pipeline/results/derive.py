@@ -5,8 +5,8 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,9 +61,6 @@ class Derived:
     law : str
         Name of the law by which the results are stated; empty if they are an average over laws. They count as an
         average also if the record selects one drag and the results use both, of which it is a special case.
-    alone : callable or None
-        Function that returns the results by the law that is clearly ahead
-        (:attr:`pipeline.damping.select.Damping.ahead`). None if no law is ahead, or if ``law`` is not empty.
     """
 
     estimates: Mapping[str, Estimate]
@@ -72,7 +69,6 @@ class Derived:
     laws: tuple[Weighted, ...]
     parts: Mapping[str, tuple[Any, str]]
     law: str
-    alone: Callable[[], Derived] | None = None
 
     @cached_property
     def of_law(self) -> frozenset[str]:
@@ -83,18 +79,6 @@ class Derived:
             if any(c.name in ("damping_law", "choice_of_law") for c in self.budgets[name].contributions)
         )
 
-    @cached_property
-    def leading(self) -> Derived | None:
-        """The results if the law that is clearly ahead is true; None if no law is ahead, or if the results use it."""
-        return None if self.alone is None else self.alone()
-
-    def coefficients_of(self, law: str) -> Mapping[str, Estimate]:
-        """Return the coefficients of a law as the results state them; empty if they state none of this law."""
-        for stated in (self, self.leading):
-            if stated is not None and stated.laws[0].fit.name == law:
-                return stated.coefficients
-        return {}
-
     def parameters_of(self, fit: LawFit) -> dict[str, Estimate]:
         """Return the parameters of a law by name, in true seconds and metres, with all known contributions.
 
@@ -103,10 +87,9 @@ class Derived:
         """
         from uncertainties import correlated_values
 
-        coefficients = self.coefficients_of(fit.name)
-        for stated in (self, self.leading):
-            if stated is not None and stated.law == fit.name:
-                return {"A0": stated.estimates["amplitude"], **coefficients}
+        coefficients = self.coefficients if self.laws[0].fit.name == fit.name else {}
+        if self.law == fit.name:
+            return {"A0": self.estimates["amplitude"], **coefficients}
         joint = scaled(fit).joint
         variables = list(correlated_values(joint.values.tolist(), joint.covariance))
         found = {
@@ -281,20 +264,6 @@ def derive(
     parts |= {name: (terms[name], "") for name in ("rates", "lengths")}
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
     law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == damping.selected else ""
-    alone = None
-    if damping.ahead and not law:
-        alone = partial(
-            derive,
-            demodulated,
-            replace(damping, stated=damping.selected),
-            phase,
-            rest,
-            scene,
-            effects,
-            instrument=instrument,
-            misfits=misfits,
-            smoothing=smoothing,
-        )
     return Derived(
         estimates={name: budgets[name].estimate for name in found},
         coefficients={name: limited(laws.stated.law, name, budgets[name].estimate) for name in coefficients},
@@ -302,7 +271,6 @@ def derive(
         laws=laws.weighted,
         parts=parts,
         law=law,
-        alone=alone,
     )
 
 

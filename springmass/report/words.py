@@ -188,7 +188,7 @@ def damping_sentence(analysis: Analysis, *, coefficients: bool = False) -> str:
     if damping.by_statement:
         text += ", as you stated"
     if coefficients:
-        stated = derived.coefficients_of(damping.selected)
+        stated = derived.coefficients if derived.laws[0].fit.name == damping.selected else {}
         text += "".join(f", {_unbroken(equation(name, x))}" for name, x in stated.items())
     if damping.by_statement:
         return f"{text}."
@@ -212,14 +212,9 @@ def _listed(words: Sequence[str]) -> str:
 
 
 def _damping_rates(motion: Oscillation) -> str:
-    """Return the damping rate at the start and, if one law is clearly ahead, its value under that law."""
+    """Return the damping rate at the start and what it assumes."""
     derived = motion.derived
-    rate = kept(derived.estimates["damping_rate"])
-    if derived.law:
-        return f"{rate} by that law"
-    if derived.leading is None:
-        return f"{rate} for any law"
-    return f"{rate} for any law, {kept(derived.leading.estimates['damping_rate'])} if that law holds"
+    return f"{kept(derived.estimates['damping_rate'])} {'by that law' if derived.law else 'for any law'}"
 
 
 def caption(name: str, analysis: Analysis) -> str:
