@@ -239,10 +239,10 @@ def _oscillation(
     misfits += plausible.misfits
     found += plausibility_findings(plausible, track)
     # Strong damping distorts every period, which would look like harmonics; its fit describes the whole motion anyway.
+    rounding_m = median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
     residuals = residuals_of(samples, windows, disturbances, phase) if by_windows else None
     unexplained, shortest = residuals, 1
     if residuals is not None:
-        rounding_m = median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
         shape = find_harmonics(residuals, max(0.5 * (samples.quantum_m or 0.0), rounding_m))
         if shape is not None:
             misfits.append(shape.misfit)
@@ -259,7 +259,7 @@ def _oscillation(
             misfits.append(smoothed.misfit)
             found.append(smoothing_finding(smoothed, unit))
     if by_windows:
-        found.append(model_finding(check_model(fitted, unexplained, shortest), unit))
+        found.append(model_finding(check_model(fitted, unexplained, shortest, rounding_m), unit))
 
     effects = tabulate(
         scene, damping, phase, rest, noise_m=windows.noise_m, instrument=instrument, disturbances=disturbances

@@ -17,6 +17,7 @@ from pipeline.checks.residuals import Residuals
 from pipeline.motion.fitted import Fitted
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
+from pipeline.windows.demodulate import ROUNDING
 
 # Maximum ratio of the residuals of the whole model to the noise within a period. Above it the model counts as
 # incomplete, because the part that it does not describe is about as large as the noise.
@@ -74,6 +75,7 @@ def check_model(
     fitted: Fitted,
     residuals: Residuals | None,
     shortest: int,
+    least_m: float,
 ) -> ModelCheck:
     """Return how far a run contradicts the model that was fitted to it.
 
@@ -85,6 +87,8 @@ def check_model(
         The residuals that no other check explains; None if another check explains all of them.
     shortest : int
         Shortest lag at which correlations of the residuals are not explained by another check.
+    least_m : float
+        Error of the sinusoidal model, m, which is larger than the noise of computed records.
 
     Notes
     -----
@@ -96,7 +100,7 @@ def check_model(
 
     demodulated, phase, noise_m = fitted.demodulated, fitted.phase, fitted.demodulated.noise_m
     found = []
-    if noise_m > 0.0 and fitted.waveform.rms_m > EXCESS * noise_m:
+    if fitted.waveform.rms_m > EXCESS * max(noise_m, least_m):
         found.append(Contradiction.RESIDUALS)
     free = (demodulated.t.size - phase.coefficients.size) / phase.correlation
     if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - FALSE_ALARM, free) / free:
@@ -160,7 +164,7 @@ def _halves(fitted: Fitted, least_windows: int) -> float:
         return 0.0
     amplitudes = demodulated.amplitude - damping.best.amplitude(demodulated.t - damping.t0)
     phases = demodulated.phase - phase.total(demodulated.t)
-    u_phase = np.sqrt(demodulated.covariance[:, 1, 1])
+    u_phase = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), ROUNDING)
     half = demodulated.t.size // 2
     return max(_apart(part[:half], part[-half:]) for part in (amplitudes / damping.scatter.u, phases / u_phase))
 

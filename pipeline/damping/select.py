@@ -14,7 +14,7 @@ from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.track import F8
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import ROUNDING, Demodulated
 
 REJECTION = 1e-3  # probability with which chi-square rejects a true law
 # A law is not admissible if its BIC exceeds the lowest by more than this, which is "strong" evidence: R. E. Kass,
@@ -134,8 +134,8 @@ def fit_damping(
     if t.size < 3:
         # One or two points determine no law: the decrease of the amplitude since the start then counts as uncertainty.
         noise = np.hypot(noise, amplitude * demodulated.decay * t)
-    # Even computed data contain rounding errors: without a minimum noise, chi-square would divide by zero.
-    noise = np.maximum(noise, 1e-12 * float(np.max(amplitude)) + 1e-100)
+    # Even for computed data the windows are not exact.
+    noise = np.maximum(noise, ROUNDING * float(np.max(amplitude)) + 1e-100)
     points = _Points(t0, t, amplitude, noise, scatter(t, amplitude, noise))
     known = None if stated is None else find_law(stated)
     found = _fit_laws(points, laws, known)

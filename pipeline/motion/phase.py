@@ -12,7 +12,7 @@ from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
 from pipeline.track import F8
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import ROUNDING, Demodulated
 
 TABLE = 2049  # number of points in the tables of the lag and of the integral of the amplitude
 MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
@@ -110,7 +110,7 @@ def fit_phase(demodulated: Demodulated, damping: Damping) -> PhaseFit:
     """
     t, lag = demodulated.t, lag_of(damping.best, damping.t0, demodulated)
     phase = demodulated.phase if lag is None else demodulated.phase + np.interp(t, *lag)
-    noise = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
+    noise = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), ROUNDING)
     if t.size < 2:
         return _single(demodulated, damping, float(noise[0]))
     turning = phase - demodulated.angular_frequency * (t - t[0])

@@ -156,6 +156,10 @@ def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
     if not 0 < np.count_nonzero(apart) <= 0.5 * ordered.size:
         return stated_m
     least = float(steps[apart].min())
+    # Values in steps are whole steps apart; those of a computed motion that repeats itself are not.
+    near = steps[apart & (steps < 50.0 * least)] / least
+    if np.mean(np.abs(near - np.rint(near)) > 0.1) > 0.1:
+        return stated_m
     return least if stated_m is None or least > 1.5 * stated_m else stated_m
 
 

@@ -23,6 +23,7 @@ from pipeline.windows.cycles import Cycles
 from pipeline.windows.sinusoids import Solution, Tuning, Windows, quantile, refit, retune, solve, unwrap
 
 WEAK = 7.0  # amplitude in standard uncertainties below which its phase is uncertain by more than 0.14 rad
+ROUNDING = 2e-6  # relative error of a window's sinusoid after two passes, for computed records without noise
 FINEST = 1e-4  # scatter relative to the amplitude; only computed records have less
 HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, with quantiles of |x| for normal x
 CLIP_SIGMAS = 4.0  # residuals beyond this many standard deviations are false echoes and are excluded from the fit
