@@ -68,6 +68,7 @@ MOST_PARTS = 4  # maximum number of times that a freely moving part is sought wi
 # Share of the amplitude by which typical periods differ from the fitted oscillation, above which two modes are fitted:
 # the difference if one mode is a third of the other.
 BEATING = 0.3
+CLEAR = 0.25  # maximum noise over the amplitude for a motion that only the later half shows
 
 
 @one_thread
@@ -169,7 +170,10 @@ def _free_part(samples: Conditioned, options: Options) -> _FreePart | NoOscillat
         later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
         trial = condition(later.flagged(samples.track))
         trimmed, stopped = _cycles(trial, options, options.early)
-        if isinstance(trimmed, NoOscillation) or check_sinusoid(trial, demodulate(trial, trimmed)):
+        if isinstance(trimmed, NoOscillation):
+            return cycles
+        windows = demodulate(trial, trimmed)
+        if windows.noise_m > CLEAR * median(windows.amplitude) or check_sinusoid(trial, windows) is not None:
             return cycles
         samples, segments = trial, later.within(segments)
         cycles = trimmed

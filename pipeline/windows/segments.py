@@ -27,6 +27,7 @@ MOST_DECAY = 300.0  # largest exponent of a decay, against overflow
 ALONE = 0.1
 LEAST_AFTER = 64  # samples needed after a trigger to leave out the part before it
 HANGING = 0.25  # fraction of the range after the trigger within which a bob hangs still before it
+STILL = 0.02  # amplitude over that of the motion after the release, below which a bob hangs still
 NEAR = 5  # number of windows beside a break or still windows from which the motion is extrapolated
 LEAST_WINDOWS = 5  # minimum number of windows in a part that is analysed; a damped oscillation has four parameters
 # Minimum amplitude of a part relative to the largest one. A smaller motion is a remnant after handling and is not
@@ -167,7 +168,7 @@ def find_free_part(conditioned: Conditioned, windows: Demodulated) -> Segments |
     if moving < (1.0 - REST_SHARE) * series.t.size:
         return _faded(series, moving)
     if series.fall > MOST_FALL:
-        return None
+        return _released(series)
     return _chosen(series, series.parts(), conditioned)
 
 
@@ -330,6 +331,19 @@ def _break(series: _Series, stop: int, start: int) -> Break:
     else:
         kind = BreakKind.PHASE_JUMP if alone else BreakKind.TOUCHED
     return Break(kind, 0.5 * (first_s + last_s), 0.25 * (last_s - first_s), math.expm1(ratio), angle)
+
+
+def _released(series: _Series) -> Segments | None:
+    """Return the record from the release on, before which the amplitude was far smaller; a free one only falls."""
+    most = int(np.argmax(series.size))
+    small = np.flatnonzero(series.size[:most] < SHARE * series.size[most])
+    if not small.size or series.t.size - most < LEAST_WINDOWS:
+        return None
+    # The next window may contain the release.
+    first = int(small[-1]) + 2
+    begin_s, first_s = float(series.t[0]) - 0.5 * series.spacing, float(series.t[first]) - 0.5 * series.spacing
+    kind = SpanKind.AT_REST if np.max(series.size[small]) < STILL * series.size[most] else SpanKind.HANDLED
+    return Segments(first_s, math.inf, (Span(kind, begin_s, first_s),))
 
 
 def _faded(series: _Series, moving: int) -> Segments | None:

@@ -358,11 +358,23 @@ def test_a_cluster_of_echoes_does_not_reach_the_result(synthetic: ModuleType, si
     assert abs(pull(found["period"], truth.period)) < 3.5
 
 
-@pytest.mark.parametrize("phase", [0.0, 1.6])
-def test_a_rest_position_that_creeps_biases_nothing(synthetic: ModuleType, phase: float) -> None:
-    """A rest position that creeps by 20 mm within seconds leaves amplitude, period and rate within 4 u."""
-    truth, t = synthetic.Truth(gamma=0.0065, phase=phase), synthetic.times(60)
+def test_a_rest_position_that_creeps_is_named(synthetic: ModuleType) -> None:
+    """A rest position that creeps by 20 mm within seconds leaves the period within 4 u and is a warning."""
+    truth, t = synthetic.Truth(gamma=0.0065, phase=1.6), synthetic.times(60)
     y = synthetic.noisy(truth, t, 2e-4, 14) + 0.02 * (1.0 - np.exp(-t / 8.0))
-    found = analyse(Track.from_arrays(t, y)).estimates
-    for name, value in (("amplitude", truth.amplitude), ("period", truth.period), ("damping_rate", 0.0065)):
-        assert abs(pull(found[name], value)) < 4.0, name
+    found = analyse(Track.from_arrays(t, y))
+    assert abs(pull(found.estimates["period"], truth.period)) < 4.0
+    assert "rest_drift" in {finding.code for finding in found.findings}
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "standard", "best"])
+def test_a_computed_sine_has_no_warning(synthetic: ModuleType, accuracy: str) -> None:
+    """A sine without noise and damping gives no damping, no warning, and its own amplitude."""
+    for period, seconds in ((0.790066, 20), (0.757, 60), (1.3, 30)):
+        t = synthetic.times(seconds)
+        found = analyse(
+            Track.from_arrays(t, 0.219 + 0.052 * np.cos(2.0 * np.pi * t / period)), None, options_for(accuracy)
+        )
+        assert [one.code for one in found.findings if one.severity != "info"] == []
+        assert motion_of(found).damping.selected == "none"
+        assert abs(pull(found.estimates["amplitude"], 0.052)) < 4.0
