@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["B1", "F8", "I8", "U8", "UNITS", "Block", "Flag", "concatenate"]
-
 B1 = NDArray[np.bool_]
 F8 = NDArray[np.float64]
 I8 = NDArray[np.int64]
@@ -107,15 +105,9 @@ class Block:
 
 
 def concatenate(blocks: Iterable[Block]) -> Block:
-    """Join blocks into one, in the given order.
+    """Join blocks of one quantity, in the given order; the result is empty if there are no blocks.
 
-    A column that only some of the blocks have is filled up in the others: velocities with NaN, host times with -1. The
-    result is empty if there are no blocks.
-
-    Raises
-    ------
-    ValueError
-        If the quantities of the blocks differ.
+    A column that only some of the blocks have is filled up in the others: velocities with NaN, host times with -1.
     """
     parts = list(blocks)
     if not parts:

@@ -1,18 +1,4 @@
-"""The exception hierarchy of acquisition.
-
-::
-
-    AcquisitionError
-    |-- FormatError          a recording cannot be read        springmass exits with 3
-    |   |-- UnknownFormat    no family recognises the content
-    |   `-- NeedsAnswer      the file lacks something that must not be guessed (rate, unit, channel)
-    |-- SourceError          a source failed during delivery
-    |-- SensorError          an unknown family of rangefinders, or an option that the family lacks
-    |-- PortError            a port that cannot be opened: absent, busy, no permission   springmass exits with 4
-    `-- CalibrationError     numbers that cannot be a calibration
-
-Every message is one line: ``where: what is wrong, got VALUE; what to do``.
-"""
+"""The exceptions of acquisition; every message is one line: ``where: what is wrong, got VALUE; what to do``."""
 
 from __future__ import annotations
 
@@ -23,29 +9,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from acquisition.recordings.questions import Question
 
-__all__ = [
-    "AcquisitionError",
-    "CalibrationError",
-    "FormatError",
-    "NeedsAnswer",
-    "PortError",
-    "SensorError",
-    "SourceError",
-    "UnknownFormat",
-    "visible",
-]
-
 
 def visible(text: str) -> str:
     """Return a text as one line, with every unprintable character replaced by its escape sequence.
 
     Titles, names and units come from files. A control sequence in them could clear the screen or fake a line, and
     a direction mark could reverse a name.
-
-    Examples
-    --------
-    >>> visible("Bob\\x1b[2J 3\\n")
-    'Bob\\\\x1b[2J 3\\\\n'
     """
     return text if text.isprintable() else "".join(c if c.isprintable() else _escaped(c) for c in text)
 

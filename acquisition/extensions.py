@@ -11,8 +11,6 @@ from acquisition.errors import AcquisitionError
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = ["entry_points_of", "load_entry"]
-
 
 @cache
 def entry_points_of(group: str) -> dict[str, EntryPoint]:
@@ -25,13 +23,7 @@ def entry_points_of(group: str) -> dict[str, EntryPoint]:
 def load_entry(
     entry: EntryPoint, what: str, refused: type[AcquisitionError], checked: Callable[[Any], Any] = lambda loaded: loaded
 ) -> Any:
-    """Load an entry point, pass the loaded object to ``checked`` and return the result.
-
-    Raises
-    ------
-    refused
-        If loading or checking raises any exception; the message is one line.
-    """
+    """Load an entry point and return what ``checked`` makes of it; any exception becomes a ``refused`` of one line."""
     try:
         return checked(entry.load())
     except Exception as error:

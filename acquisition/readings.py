@@ -6,11 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import F8, I8, U8, Flag
-
-__all__ = ["COLUMNS", "NO_READINGS", "Read", "Reading", "Readings", "carried"]
+from acquisition.block import B1, F8, I8, U8, Flag
 
 NAN = math.nan
 
@@ -48,25 +45,10 @@ class Reading(NamedTuple):
     temperature_c: float = NAN
 
 
-COLUMNS = (*Reading._fields, "flags")
-"""Names of the columns of :class:`Readings`."""
-
-
-def carried(values: F8, known: NDArray[np.bool_], before: float) -> F8:
-    """Return the (n,) values with unknown ones replaced by the last known value before them, initially ``before``."""
-    if known.all():
-        return values
-    latest = np.maximum.accumulate(np.where(known, np.arange(values.size), -1))
-    return np.where(latest >= 0, values[latest], before)
-
-
 class Readings(tuple[Reading, ...]):
-    """Consecutive readings of one rangefinder: a tuple of rows, with its columns available as arrays.
+    """Consecutive readings of one rangefinder: a tuple of rows, with the columns of the samples as arrays on demand.
 
-    Notes
-    -----
-    During a recording, a read of the port usually completes one frame. Seven arrays for one row would take longer than
-    decoding it, so the arrays are created only on demand.
+    During a recording, a read usually completes one frame. Arrays for one row would take longer than decoding it.
     """
 
     __slots__ = ()
@@ -75,16 +57,6 @@ class Readings(tuple[Reading, ...]):
     def host_ns(self) -> I8:
         """Host times in ns, (n,) int64."""
         return np.array([row.host_ns for row in self], np.int64)
-
-    @property
-    def sequence(self) -> I8:
-        """Counter values, (n,) int64; -1 for readings without one."""
-        return np.array([row.sequence for row in self], np.int64)
-
-    @property
-    def device_us(self) -> I8:
-        """Device clock times in us, (n,) int64; -1 for readings without one."""
-        return np.array([row.device_us for row in self], np.int64)
 
     @property
     def echo_us(self) -> F8:
@@ -97,11 +69,6 @@ class Readings(tuple[Reading, ...]):
         return np.array([row.distance_m for row in self], np.float64)
 
     @property
-    def temperature_c(self) -> F8:
-        """Temperatures in degC, (n,) float64; NaN for readings without one."""
-        return np.array([row.temperature_c for row in self], np.float64)
-
-    @property
     def flags(self) -> U8:
         """Flags, (n,) uint8: ``Flag.MISSING`` for readings with neither an echo time nor a distance, else 0."""
         silent = np.isnan(self.echo_us) & np.isnan(self.distance_m)
@@ -109,4 +76,11 @@ class Readings(tuple[Reading, ...]):
 
 
 NO_READINGS = Readings()
-"""The result of a decoder if the bytes complete no frame."""
+
+
+def carried(values: F8, known: B1, before: float) -> F8:
+    """Return the (n,) values with unknown ones replaced by the last known value before them, initially ``before``."""
+    if known.all():
+        return values
+    latest = np.maximum.accumulate(np.where(known, np.arange(values.size), -1))
+    return np.where(latest >= 0, values[latest], before)

@@ -7,8 +7,6 @@ import os
 import stat
 from io import BufferedReader, FileIO, TextIOWrapper
 
-__all__ = ["open_regular", "open_regular_text", "read_regular"]
-
 _OTHERS = (
     (stat.S_ISDIR, "directory"),
     (stat.S_ISFIFO, "pipe"),
@@ -22,18 +20,8 @@ def open_regular(path: str | os.PathLike[str]) -> FileIO:
     """Open a regular file for unbuffered reading.
 
     Opening a pipe without a writer blocks forever, and reading a terminal or a device may never end. The kind of
-    file is therefore checked before and after opening, and the opening itself does not block.
-
-    Raises
-    ------
-    OSError
-        If the path is not a regular file or cannot be opened; ``strerror`` gives the reason in a few words.
-
-    Examples
-    --------
-    >>> open_regular("/dev/null")
-    Traceback (most recent call last):
-    OSError: [Errno 22] expected a regular file, got a device: '/dev/null'
+    file is therefore checked before and after opening, and the opening itself does not block. The ``strerror`` of the
+    OSError gives the reason in a few words.
     """
     _demand_regular(path, os.stat(path).st_mode)
     return open(path, "rb", buffering=0, opener=_open)

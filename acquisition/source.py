@@ -8,8 +8,6 @@ from typing import Literal, Protocol, Self
 
 from acquisition.block import Block
 
-__all__ = ["ClockKind", "Kind", "Source", "SourceInfo"]
-
 Kind = Literal["live", "replay", "simulated"]
 ClockKind = Literal["nominal", "device", "host"]
 
@@ -46,11 +44,7 @@ class SourceInfo:
 
 
 class Source(Protocol):
-    """An iterable of blocks, used inside a ``with`` statement.
-
-    The iteration ends when the source ends. A fault raises :class:`acquisition.errors.SourceError`; ``None`` is never
-    delivered.
-    """
+    """An iterable of blocks, used inside a ``with`` statement; the iteration ends when the source ends."""
 
     @property
     def info(self) -> SourceInfo:

@@ -64,18 +64,15 @@ class LockstepClock:
 
 
 class SimulatedPort:
-    """A port without a descriptor: each read returns the bytes that a sensor sends in a tenth of a second."""
+    """A port each of whose reads returns the bytes that a sensor sends in a tenth of a second."""
 
     name = "simulated day"
+    is_network = False
 
     def __init__(self, clock: LockstepClock) -> None:
         self._clock = clock
         self._encoder = LineProtocolEncoder()
         self._sent = 0
-
-    def fileno(self) -> int:
-        """Return -1, because there is no descriptor."""
-        return -1
 
     def read(self, wait_s: float = 0.25) -> bytes:
         """Return the next frames; empty if the session does not wait."""
@@ -102,9 +99,6 @@ class SimulatedPort:
 
     def discard_input(self) -> None:
         """Do nothing, because no input is buffered."""
-
-    def reopen(self) -> None:
-        """Do nothing, because the port is always open."""
 
     def close(self) -> None:
         """Do nothing, because there is nothing to close."""

@@ -31,8 +31,7 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
-from acquisition.live.line import Line
-from acquisition.live.reader import PortReader
+from acquisition.live.reader import Line, PortReader
 from acquisition.live.serial_port import SerialPort
 from acquisition.readings import Read
 from springmass.session.reads import Tee
@@ -81,7 +80,7 @@ class TimedTee(Tee):
         self.delays_us: list[int] = []
 
     def reads(self, reads: Sequence[Read]) -> None:
-        """Pass on the reads of one wake-up, and measure the delays of their readings."""
+        """Pass on the reads of a port, and measure the delays of their readings."""
         super().reads(reads)
         now_us = time.monotonic_ns() // 1000
         for channel in {channel for channel, _, _ in reads}:

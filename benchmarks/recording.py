@@ -1,4 +1,4 @@
-"""Measure the cost of a recording relative to its limit of 4 % of a core: `python benchmarks/recording.py`.
+"""Measure the cost of a recording relative to its limit of 3 % of a core: `python benchmarks/recording.py`.
 
 A simulated sensor runs in a separate process; `springmass record` reads it twice, in a short and a long run. The
 difference of the two is the cost of recording and of building the run file at the end, without that of the start.
@@ -21,7 +21,7 @@ from pathlib import Path
 
 from springmass import load
 
-LIMIT = 0.04
+LIMIT = 0.03
 """Maximum share of a core, for one sensor at 100 Hz."""
 
 SENSOR = """

@@ -7,7 +7,7 @@ module. If a stage must run again, on fewer samples or after a disturbance was r
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,18 +27,18 @@ from pipeline.checks.sensor import find_smoothing, held, held_count
 from pipeline.damping.select import Damping, fit_damping
 from pipeline.errors import AnalysisError
 from pipeline.findings.damping import damping_findings
-from pipeline.findings.finding import Finding, by_severity
+from pipeline.findings.finding import Found, worded
 from pipeline.findings.motion import (
     fit_findings,
-    harmonics_finding,
-    model_finding,
+    harmonics_findings,
+    model_findings,
     motion_findings,
-    overdamped_finding,
+    overdamped_findings,
     plausibility_findings,
-    smoothing_finding,
+    smoothing_findings,
 )
 from pipeline.findings.parts import part_findings
-from pipeline.findings.samples import COARSE, clock_findings, held_finding, sample_findings
+from pipeline.findings.samples import COARSE, clock_findings, held_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion import overdamped
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equation
@@ -238,10 +238,10 @@ def _oscillation(
     by_windows = not isinstance(solved, EquationFit)
 
     misfits: list[Misfit] = []
-    found: list[Finding | None] = []
+    found: list[Found] = []
     plausible = check_plausibility(samples, windows, phase)
     misfits += plausible.misfits
-    found += plausibility_findings(plausible, track)
+    found += plausibility_findings(plausible)
     # Strong damping distorts every period, which would look like harmonics; its fit describes the whole motion anyway.
     rounding_m = median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
     residuals = residuals_of(samples, windows, disturbances, phase) if by_windows else None
@@ -250,20 +250,20 @@ def _oscillation(
         shape = find_harmonics(residuals, max(0.5 * (samples.quantum_m or 0.0), rounding_m))
         if shape is not None:
             misfits.append(shape.misfit)
-            found.append(harmonics_finding(shape, unit))
+            found += harmonics_findings(shape)
             unexplained = residuals = residuals.less(shape.at_samples)
         if (misfit := held(samples, residuals)) is not None:
             misfits.append(misfit)
-            found.append(held_finding(held_count(samples), residuals.interval_s, unit))
+            found += held_findings(held_count(samples), residuals.interval_s)
             unexplained = None
         elif not windows.noise_m > max(rounding_m, (samples.quantum_m or 0.0) / COARSE):
             unexplained = None  # rounding, or coarse steps, which the finding "quantised" reports
         elif (smoothed := find_smoothing(residuals, damping.best.joint["A0"].u, smoothing)) is not None:
             shortest = math.ceil(2.0 * smoothed.samples)
             misfits.append(smoothed.misfit)
-            found.append(smoothing_finding(smoothed, unit))
+            found += smoothing_findings(smoothed)
     if by_windows:
-        found.append(model_finding(check_model(fitted, unexplained, shortest, rounding_m), unit))
+        found += model_findings(check_model(fitted, unexplained, shortest, rounding_m))
 
     effects = tabulate(
         scene, damping, phase, rest, noise_m=windows.noise_m, instrument=instrument, disturbances=disturbances
@@ -280,11 +280,12 @@ def _oscillation(
         smoothing=smoothing,
     )
     swing_m = (derived.estimates["offset"].value, float(damping.best.amplitude(np.zeros(1))[0]))
-    findings = by_severity(
-        part_findings(part.segments),
+    findings = worded(
+        unit,
+        part_findings(part.segments, float(track.t[0]), float(track.t[-1])),
         motion_findings(part.cycles, fitted, rest),
         damping_findings(damping),
-        (finding for finding in found if finding is not None),
+        found,
         sample_findings(
             samples,
             windows.flags,
@@ -314,39 +315,34 @@ def _without_period(samples: Conditioned, why: NoOscillation, scene: Scene, opti
 def _overdamped(samples: Conditioned, found: Overdamped, scene: Scene, options: Options) -> Analysis:
     """Return the analysis of a motion that damping ends within a few cycles, or before one cycle is complete."""
     estimates = {**_at_rest(samples), **found.estimates, **spring_constant(found, scene)}
-    return _ended(samples, found, (overdamped_finding(found),), estimates, scene, options)
+    return _ended(samples, found, overdamped_findings(found), estimates, scene, options)
 
 
 def _two_modes(samples: Conditioned, two: TwoModes, scene: Scene, options: Options) -> Analysis:
     """Return the analysis of a recording of two oscillations, neither of which is the main one."""
-    finding = Finding(
-        "two_modes",
-        "error",
-        "Two oscillations of similar strength overlap, so there is no single period.",
-        f"{two.why}.",
-        {name: estimate.value for name, estimate in two.estimates.items()},
-    )
+    finding = Found("two_modes", {name: x.value for name, x in two.estimates.items()} | {"why": two.why})
     return _ended(samples, Still(two.why), (finding,), {**_at_rest(samples), **two.estimates}, scene, options)
 
 
 def _still(samples: Conditioned, why: NoOscillation, scene: Scene, options: Options) -> Analysis:
     """Return the analysis of a recording without a motion to fit."""
-    findings = [Finding("no_oscillation", "error", f"No oscillation: {why.why}.")]
+    findings = [Found("no_oscillation", {"why": why.why})]
     if (count := held_count(samples)) > 1:
-        findings.append(held_finding(count, 1.0 / samples.track.rate_hz, samples.track.unit))
-    return _ended(samples, Still(why.why), tuple(findings), _at_rest(samples), scene, options)
+        findings += held_findings(count, 1.0 / samples.track.rate_hz)
+    return _ended(samples, Still(why.why), findings, _at_rest(samples), scene, options)
 
 
 def _ended(
     samples: Conditioned,
     motion: Motion,
-    first: tuple[Finding, ...],
+    first: Iterable[Found],
     estimates: Mapping[str, Estimate],
     scene: Scene,
     options: Options,
 ) -> Analysis:
     track = samples.track
-    findings = by_severity(
+    findings = worded(
+        track.unit,
         first,
         sample_findings(samples, samples.flags, samples.noise_m),
         clock_findings(track, Instrument.of(track)),

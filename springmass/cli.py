@@ -114,8 +114,7 @@ def _exit_code(error: Exception) -> int | None:
         return error.exit_code
     from acquisition.errors import AcquisitionError, CalibrationError, PortError, SensorError
     from pipeline.errors import DynamicsError, PipelineError, SceneError
-    from storage.disk import DiskNearlyFull
-    from storage.errors import QueryRefused, StorageError, WriteFailed
+    from storage.errors import DiskNearlyFull, QueryRefused, StorageError, WriteFailed
 
     if isinstance(error, PortError | CalibrationError | DiskNearlyFull):
         return SENSOR

@@ -313,7 +313,7 @@ def simulate(*, options: SimulateOptions, read: ChannelOptions = ChannelOptions(
 def convert(
     path: Annotated[File, _argument("IN", "recording, run file or wire log")],
     output: Annotated[
-        File | None, _argument("OUT", ".h5 (run file), .txt (pair), .lvm or .csv; or a folder to copy the original to")
+        File | None, _argument("OUT", ".h5 (run file), .txt (pair) or .csv; or a folder to copy the original to")
     ] = None,
     /,
     *,

@@ -5,7 +5,7 @@ wheel alike. Import them from here; the modules that define them may move.
 
 Examples
 --------
->>> from springmass.extend import Channel, ColumnFormat, Contents, Formula, Sheet
+>>> from springmass.extend import Column, ColumnFormat, Formula, Header, Heading, Table, text_format
 >>> from springmass.extend import Family, FramedDecoder, LineSplitter, Reading
 >>> from springmass.extend import Law, Unit, make_law
 >>> from springmass.extend import Integrator, OneStep, acceleration
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
     from acquisition.decoders.framed import FramedDecoder
     from acquisition.decoders.lines import LineSplitter
-    from acquisition.decoders.replies import ReplyForm
     from acquisition.decoders.sum_frames import SumFrames, with_sum
     from acquisition.errors import FormatError, NeedsAnswer, SensorError
     from acquisition.readings import Reading, Readings
@@ -29,24 +28,24 @@ if TYPE_CHECKING:
     from acquisition.recordings.families.declared import dialect
     from acquisition.recordings.questions import Missing, MissingItem, Question
     from acquisition.recordings.recording import Original, Recording, Trap
-    from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Formula, Sheet
-    from acquisition.recordings.tables.sheet import ColumnFormat
-    from acquisition.recordings.tables.text import head_lines, text_of
+    from acquisition.recordings.tables.dialect import Header, text_format
+    from acquisition.recordings.tables.format import ColumnFormat
+    from acquisition.recordings.tables.headings import Heading
+    from acquisition.recordings.tables.table import Column, Formula, Table
     from acquisition.source import SourceInfo
-    from pipeline.damping.laws.law import Law, Unit
+    from pipeline.damping.laws.law import Law
     from pipeline.damping.laws.of_function import make_law
     from pipeline.dynamics import Equation, Integrator, Problem, Trajectory, get_integrator
     from pipeline.dynamics.halving import auto
     from pipeline.dynamics.methods import OneStep, acceleration
     from pipeline.errors import AnalysisError, DynamicsError
+    from pipeline.numerics.quantity import Unit
 
 __all__ = [
     "AnalysisError",
-    "Arrays",
     "Block",
-    "Channel",
+    "Column",
     "ColumnFormat",
-    "Contents",
     "Decoder",
     "DynamicsError",
     "Encoder",
@@ -57,6 +56,8 @@ __all__ = [
     "FormatError",
     "Formula",
     "FramedDecoder",
+    "Header",
+    "Heading",
     "Identity",
     "Integrator",
     "Law",
@@ -72,12 +73,11 @@ __all__ = [
     "Reading",
     "Readings",
     "Recording",
-    "ReplyForm",
     "SensorError",
-    "Sheet",
     "SourceInfo",
     "SumFrames",
     "SurveyFormat",
+    "Table",
     "Trajectory",
     "Trap",
     "Unit",
@@ -85,9 +85,8 @@ __all__ = [
     "auto",
     "dialect",
     "get_integrator",
-    "head_lines",
     "make_law",
-    "text_of",
+    "text_format",
     "with_sum",
 ]
 
@@ -96,7 +95,6 @@ _WHERE = {
     "acquisition.decoders.family": ("Decoder", "Encoder", "Family", "Identity", "Poll"),
     "acquisition.decoders.framed": ("FramedDecoder",),
     "acquisition.decoders.lines": ("LineSplitter",),
-    "acquisition.decoders.replies": ("ReplyForm",),
     "acquisition.decoders.sum_frames": ("SumFrames", "with_sum"),
     "acquisition.errors": ("FormatError", "NeedsAnswer", "SensorError"),
     "acquisition.readings": ("Reading", "Readings"),
@@ -104,9 +102,10 @@ _WHERE = {
     "acquisition.recordings.families.declared": ("dialect",),
     "acquisition.recordings.questions": ("Missing", "MissingItem", "Question"),
     "acquisition.recordings.recording": ("Original", "Recording", "Trap"),
-    "acquisition.recordings.tables.contents": ("Arrays", "Channel", "Contents", "Formula", "Sheet"),
-    "acquisition.recordings.tables.sheet": ("ColumnFormat",),
-    "acquisition.recordings.tables.text": ("head_lines", "text_of"),
+    "acquisition.recordings.tables.dialect": ("Header", "text_format"),
+    "acquisition.recordings.tables.format": ("ColumnFormat",),
+    "acquisition.recordings.tables.headings": ("Heading",),
+    "acquisition.recordings.tables.table": ("Column", "Formula", "Table"),
     "acquisition.source": ("SourceInfo",),
     "pipeline.damping.laws.law": ("Law", "Unit"),
     "pipeline.damping.laws.of_function": ("make_law",),

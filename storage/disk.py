@@ -2,47 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
-from storage.errors import WriteFailed, one_line
-
-__all__ = ["DiskNearlyFull", "check_disk"]
+from storage.errors import DiskNearlyFull, WriteFailed, one_line
 
 
-class DiskNearlyFull(WriteFailed):
-    """A disk with too little space for a run, found before the run starts."""
-
-
-def check_disk(path: str | os.PathLike[str], needed_bytes: int) -> int:
-    """Return the free bytes of the disk on which a file will be written.
-
-    Parameters
-    ----------
-    path : str or PathLike
-        The file; its folder must exist.
-    needed_bytes : int
-        Number of bytes that the run will write.
-
-    Raises
-    ------
-    DiskNearlyFull
-        If less space is free.
-    WriteFailed
-        If the folder does not exist.
-    """
-    folder = Path(path).absolute().parent
+def check_disk(path: Path, needed_bytes: int) -> None:
+    """Raise DiskNearlyFull if the disk of a file has less space, and WriteFailed if the file's folder is missing."""
     try:
-        free = shutil.disk_usage(folder).free
+        free = shutil.disk_usage(path.absolute().parent).free
     except OSError as error:
         problem = f"its folder cannot be read ({error.strerror or one_line(error)})"
         raise WriteFailed(path, problem, "make the folder first") from error
     if free < needed_bytes:
-        problem = f"the run needs {_megabytes(needed_bytes)}, but {_megabytes(free)} are free"
+        problem = f"the run needs {needed_bytes / 1e6:.1f} MB, but {free / 1e6:.1f} MB are free"
         raise DiskNearlyFull(path, problem, "free disk space, record for a shorter time or use another disk")
-    return free
-
-
-def _megabytes(size: int) -> str:
-    return f"{size / 1e6:.1f} MB"

@@ -9,8 +9,6 @@ from typing import Any, Protocol
 from acquisition.errors import SensorError
 from acquisition.readings import Readings
 
-__all__ = ["RESONATOR_PPM", "Decoder", "DeviceStatus", "Encoder", "Family", "Identity", "Poll", "Polled"]
-
 RESONATOR_PPM = 10_000.0
 """Limit for the error of a ceramic resonator, ppm: about the sum of 5000 when new, 3000 by temperature and 3000 by
 aging (Murata P16E)."""
@@ -42,25 +40,13 @@ class Identity:
 class DeviceStatus:
     """Information that a device sends besides readings; its decoder has it as the attribute ``status``.
 
-    Parameters
-    ----------
-    identity : Identity or None
-        Last identity that the device sent.
-    conditions : dict of str to int
-        Counts of readings without a measured value, by the reason that the device gave.
-    complaint : str
-        Fault that the device currently reports, with advice on what to check; empty if it reports none.
+    ``conditions`` counts the readings without a measured value by the reason that the device gave. ``complaint`` is the
+    fault that the device currently reports, with advice on what to check.
     """
 
     identity: Identity | None = None
     conditions: dict[str, int] = field(default_factory=dict)
     complaint: str = ""
-
-    @staticmethod
-    def of(decoder: Decoder) -> DeviceStatus:
-        """Return the status of the device of a decoder; it is empty if the device sends none."""
-        status = getattr(decoder, "status", None)
-        return status if isinstance(status, DeviceStatus) else DeviceStatus()
 
 
 class Decoder(Protocol):
@@ -88,19 +74,6 @@ class Decoder(Protocol):
         ...
 
 
-class Polled(Decoder, Protocol):
-    """The decoder of a sensor that sends only on request.
-
-    Only replies and flushes determine the next request, so replayed bytes are decoded as in the recording. If bytes are
-    ``pending`` when a request is due, call ``flush`` first, because a late or surplus byte would shift every reply.
-    """
-
-    @property
-    def request(self) -> bytes:
-        """The next request: usually ``Poll.request``, sometimes the request for the temperature."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Poll:
     """How to poll a sensor that sends only on request.
@@ -113,11 +86,15 @@ class Poll:
         Time between requests, s.
     timeout_s : float
         Maximum wait for a reply, s. After it, the decoder is flushed and the input discarded.
+    reply_bytes : int
+        Size of a reply. If a part of one has come when the next request is due, that counts as a time-out: without a
+        header, a late or surplus byte would shift every later reply.
     """
 
     request: bytes
     interval_s: float
     timeout_s: float
+    reply_bytes: int = 1
 
 
 class Encoder(Protocol):
@@ -137,7 +114,6 @@ class Family:
     Parameters
     ----------
     name : str
-        Name of the family.
     title : str
         One line for the user that lists the devices of the family.
     baud : int
@@ -152,12 +128,14 @@ class Family:
         One sentence on the limitations that a user must know before relying on the sensor.
     decoder : callable
         Returns a new decoder; its keyword arguments are the names in ``options``.
-    encoder : callable
-        Returns a new encoder for the simulated sensor; it takes the same options.
+    encoder : callable, optional
+        Returns a new encoder, with which ``record --simulate`` can simulate the sensor; it takes the same options.
     poll : Poll or None
         How to poll the sensor; None for a sensor that sends without requests.
     options : mapping of str to str
         Options of the decoder (column, unit, ...): their names, each with a description of one line.
+    past_options : tuple of str
+        Options that only logs of earlier versions have; the decoder still takes them.
     has_device_time : bool
         Whether readings contain a clock time or a counter of the device.
     clock_ppm : float
@@ -179,29 +157,31 @@ class Family:
     range_m: tuple[float, float]
     limits: str
     decoder: Callable[..., Decoder]
-    encoder: Callable[..., Encoder]
+    encoder: Callable[..., Encoder] | None = None
     poll: Poll | None = None
     options: Mapping[str, str] = field(default_factory=dict)
+    past_options: tuple[str, ...] = ()
     has_device_time: bool = False
     clock_ppm: float = RESONATOR_PPM
     identify: bytes = b""
     self_framing: bool = True
     source: str = ""
 
-    def demand_options(self, options: Mapping[str, Any]) -> None:
-        """Check that the family has all the given options.
+    def demand_options(self, options: Mapping[str, Any], *, past: bool = False) -> None:
+        """Check that the family has all the given options, or had them in an earlier version.
 
         Raises
         ------
         SensorError
             If an option is unknown; the message lists the unknown options and the options of the family.
         """
-        unknown = sorted(set(options) - set(self.options))
+        unknown = sorted(set(options) - set(self.options) - set(self.past_options if past else ()))
         if unknown:
             known = ", ".join(self.options) or "none"
             raise SensorError(f"sensor {self.name}: expected options among {known}, got {', '.join(unknown)}")
 
     def describe(self) -> dict[str, Any]:
         """Return the description as plain data, for the JSON list of the sensors."""
-        shown = (item.name for item in fields(self) if item.name not in ("decoder", "encoder", "poll", "identify"))
+        hidden = ("decoder", "encoder", "poll", "identify", "past_options")
+        shown = (item.name for item in fields(self) if item.name not in hidden)
         return {name: getattr(self, name) for name in shown} | {"polled": self.poll is not None}

@@ -8,14 +8,10 @@ DYP modules.
 
 from __future__ import annotations
 
-import math
-
 from acquisition.decoders.family import Family
 from acquisition.decoders.framed import FramedDecoder
-from acquisition.decoders.sum_frames import SumFrames, with_sum
+from acquisition.decoders.sum_frames import SumFrames
 from acquisition.readings import NAN, Reading
-
-__all__ = ["FAMILY", "FfhlsDecoder", "FfhlsEncoder"]
 
 FARTHEST_MM = 10_000
 """Maximum distance of a valid frame, mm: beyond the range of every module, but with a high byte other than 0xFF."""
@@ -23,12 +19,9 @@ FARTHEST_MM = 10_000
 _NO_TARGET = (0, 0xFFFD, 0xFFFE)
 
 
-def _value(frame: bytes) -> int:
-    return frame[1] << 8 | frame[2]
-
-
 def _plausible(frame: bytes) -> bool:
-    return _value(frame) <= FARTHEST_MM or _value(frame) in _NO_TARGET
+    mm = frame[1] << 8 | frame[2]
+    return mm <= FARTHEST_MM or mm in _NO_TARGET
 
 
 class FfhlsDecoder(FramedDecoder):
@@ -39,17 +32,8 @@ class FfhlsDecoder(FramedDecoder):
 
     def reading(self, host_ns: int, frame: bytes) -> Reading:
         """Return the reading of a frame."""
-        mm = _value(frame)
+        mm = frame[1] << 8 | frame[2]
         return Reading(host_ns, distance_m=NAN if mm in _NO_TARGET else mm / 1000)
-
-
-class FfhlsEncoder:
-    """Encodes distances as FF H L SUM."""
-
-    def encode(self, *, distance_m: float, **_: float) -> bytes:
-        """Return one frame, which contains only the distance, rounded to 1 mm."""
-        mm = 0 if math.isnan(distance_m) else round(distance_m * 1000)
-        return with_sum(b"\xff" + (mm if 0 <= mm <= FARTHEST_MM else 0).to_bytes(2, "big"))
 
 
 FAMILY = Family(
@@ -61,6 +45,5 @@ FAMILY = Family(
     range_m=(0.03, 4.5),
     limits="10 Hz at most, and only with the module's pin set to real-time output: the processed output is averaged.",
     decoder=FfhlsDecoder,
-    encoder=FfhlsEncoder,
     source="DFRobot SEN0311 (A02YYUW), SEN0312 (ME007YS), SEN0313 (A01NYUB): UART output; DYP-A22 data sheet",
 )

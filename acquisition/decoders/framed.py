@@ -10,8 +10,6 @@ from acquisition.decoders.lines import LineSplitter
 from acquisition.decoders.sum_frames import SumFrames
 from acquisition.readings import NO_READINGS, Reading, Readings
 
-__all__ = ["FramedDecoder"]
-
 
 class FramedDecoder(ABC):
     """A :class:`acquisition.decoders.family.Decoder` of frames; each family implements :meth:`reading`.

@@ -17,10 +17,7 @@ from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
 from acquisition.readings import NAN, Reading
 
-__all__ = ["FAMILY", "LineProtocolDecoder", "LineProtocolEncoder", "checksum", "frame"]
-
-LONGEST = 96
-"""Maximum length of a line without its line feed, bytes."""
+LONGEST = 96  # maximum length of a line without its line feed, bytes
 
 SETTINGS = ("rate_hz", "near_us", "far_us", "spread_us", "thermometer")
 """Settings in an identity line, after model, version and name: rate, gate limits, ping spread, thermometer."""
@@ -35,14 +32,7 @@ _IDENTITY = re.compile(
 _FIRST_GREETING = b"# springmass rangefinder, line protocol R1"
 _FIRST = Identity("springmass-rangefinder", "1.0.0")
 
-CONDITIONS = {
-    b"N": "no_echo",
-    b"B": "busy",
-    b"C": "too_close",
-    b"F": "too_far",
-    b"A": "no_answer",
-    b"S": "stuck",
-}
+CONDITIONS = {b"N": "no_echo", b"B": "busy", b"C": "too_close", b"F": "too_far", b"A": "no_answer", b"S": "stuck"}
 """Names of the conditions, by status letter; an unknown letter of a later version is counted as ``other``."""
 
 COMPLAINTS = {
@@ -72,8 +62,6 @@ def frame(body: bytes) -> bytes:
 class LineProtocolDecoder(FramedDecoder):
     """Decodes the line protocol.
 
-    Notes
-    -----
     The CRC detects every change of one or two bits, every burst error of up to 16 bits within the body, and all but one
     in 65536 of the other changes. Comment lines (``#``) are counted as ``comment``, and valid lines of a later version
     as ``unknown_record``. Reports that the device did not understand a command are counted as ``refused_command``.
@@ -90,7 +78,7 @@ class LineProtocolDecoder(FramedDecoder):
         """Return the reading of a line, or None; count the fault of a line without a reading."""
         row = _reading(host_ns, frame)
         if row is None:
-            return self._after_noise(host_ns, frame)
+            return self._other(host_ns, frame)
         if row[3] != row[3]:  # there was no echo; the status letter gives the reason
             self._count_no_echo(frame)
         elif self.status.complaint:
@@ -104,20 +92,31 @@ class LineProtocolDecoder(FramedDecoder):
         self.status.conditions[name] = self.status.conditions.get(name, 0) + 1
         self.status.complaint = COMPLAINTS.get(letter, "")
 
-    def _after_noise(self, host_ns: int, line: bytes) -> Reading | None:
+    def _other(self, host_ns: int, line: bytes) -> Reading | None:
         """Return the reading after noise in a line, or None; store an identity, and count the fault of the line."""
         # The bytes before the last $ are noise, or a line whose end was lost; the rest may be a valid line.
         start = max(line.rfind(b"$"), 0)
         reading = _reading(host_ns, line[start:]) if start else None
-        identity = _identity(line, start)
-        if reading or identity:
-            self.status.identity = identity or self.status.identity
+        envelope = _ENVELOPE.fullmatch(line, start)
+        sound = envelope is not None and checksum(envelope[1]) == int(envelope[2], 16)
+        identity = _IDENTITY.fullmatch(envelope[1]) if envelope is not None and sound else None
+        if identity is not None:
+            model, version, name, *numbers = (field.decode("ascii") for field in identity.groups())
+            settings = dict(zip(SETTINGS, map(int, numbers), strict=True))
+            self.status.identity = Identity(model, version, name, settings)
+        if reading is not None or identity is not None:
             if start:
                 self._count("bad_frame", start)
             return reading
         if line.startswith(_FIRST_GREETING):
             self.status.identity = _FIRST
-        self._count(_fault(line, start), len(line) + 1)
+        if envelope is None:
+            fault = "comment" if line.startswith(b"#") else "bad_frame"
+        elif not sound:
+            fault = "bad_checksum"
+        else:
+            fault = "refused_command" if envelope[1] == b"X1,command" else "unknown_record"
+        self._count(fault, len(line) + 1)
         return None
 
 
@@ -134,28 +133,6 @@ def _reading(host_ns: int, line: bytes) -> Reading | None:
     echo_us = float(echo) if status == b"E" and echo else 0.0
     celsius = int(temperature) / 100 if temperature else NAN
     return Reading(host_ns, count, clock_us, echo_us or NAN, NAN, celsius)
-
-
-def _identity(line: bytes, start: int) -> Identity | None:
-    """Return the identity of the device from the line that begins at ``start``, or None if it gives no identity."""
-    envelope = _ENVELOPE.fullmatch(line, start)
-    if envelope is None or checksum(envelope[1]) != int(envelope[2], 16):
-        return None
-    identity = _IDENTITY.fullmatch(envelope[1])
-    if identity is None:
-        return None
-    model, version, name, *numbers = (field.decode("ascii") for field in identity.groups())
-    return Identity(model, version, name, dict(zip(SETTINGS, map(int, numbers), strict=True)))
-
-
-def _fault(line: bytes, start: int) -> str:
-    """Return the name of the fault of a line without a reading."""
-    envelope = _ENVELOPE.fullmatch(line, start)
-    if envelope is None:
-        return "comment" if line.startswith(b"#") else "bad_frame"
-    if checksum(envelope[1]) != int(envelope[2], 16):
-        return "bad_checksum"
-    return "refused_command" if envelope[1] == b"X1,command" else "unknown_record"
 
 
 class LineProtocolEncoder:

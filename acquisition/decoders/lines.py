@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["LineSplitter"]
-
 
 class LineSplitter:
     """Returns complete lines and keeps an incomplete one until its end arrives.
@@ -50,12 +48,10 @@ class LineSplitter:
             self.faults["garbage_bytes"] += len(self._held)
             self._held = b""
             self._overlong = True
-        if len(data) > self._limit and lines and max(map(len, lines)) > self._limit:
-            for line in lines:
-                if len(line) > self._limit:
-                    self._drop(line, "bad_frame")
-            lines = [line for line in lines if len(line) <= self._limit]
-        return lines
+        for line in lines:
+            if len(line) > self._limit:
+                self._drop(line, "bad_frame")
+        return [line for line in lines if len(line) <= self._limit]
 
     def flush(self) -> None:
         """Discard the incomplete line."""

@@ -6,7 +6,6 @@ entry point in the group ``springmass.sensors`` that refers to a :class:`acquisi
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
@@ -17,52 +16,39 @@ from acquisition.extensions import entry_points_of, load_entry
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = ["describe_bytes", "families", "get_family", "probe"]
-
 GROUP = "springmass.sensors"
 
-_TABLE: dict[str, tuple[str, str]] = {
-    "line-protocol": ("acquisition.decoders.line_protocol", "FAMILY"),
-    "maxbotix-lv": ("acquisition.decoders.maxbotix", "FAMILIES"),
-    "maxbotix-lv-p": ("acquisition.decoders.maxbotix", "FAMILIES"),
-    "maxbotix-xl": ("acquisition.decoders.maxbotix", "FAMILIES"),
-    "maxbotix-xl-long": ("acquisition.decoders.maxbotix", "FAMILIES"),
-    "maxbotix-hr": ("acquisition.decoders.maxbotix", "FAMILIES"),
-    "maxbotix-wr": ("acquisition.decoders.maxbotix", "FAMILIES"),
-    "ffhls": ("acquisition.decoders.ffhls", "FAMILY"),
-    "us100": ("acquisition.decoders.us100", "FAMILY"),
-    "urm37": ("acquisition.decoders.urm37", "FAMILY"),
-    "sen0149": ("acquisition.decoders.sen0149", "FAMILY"),
-    "text-lines": ("acquisition.decoders.text_lines", "FAMILY"),
+_TABLE = {
+    "line-protocol": "acquisition.decoders.line_protocol",
+    "maxbotix-lv": "acquisition.decoders.maxbotix",
+    "maxbotix-lv-p": "acquisition.decoders.maxbotix",
+    "maxbotix-xl": "acquisition.decoders.maxbotix",
+    "maxbotix-xl-long": "acquisition.decoders.maxbotix",
+    "maxbotix-hr": "acquisition.decoders.maxbotix",
+    "maxbotix-wr": "acquisition.decoders.maxbotix",
+    "ffhls": "acquisition.decoders.ffhls",
+    "us100": "acquisition.decoders.us100",
+    "urm37": "acquisition.decoders.urm37",
+    "sen0149": "acquisition.decoders.sen0149",
+    "text-lines": "acquisition.decoders.text_lines",
 }
+"""The module of each family; it has the object FAMILY, or FAMILIES by name."""
 
 _ENOUGH = 0.5
 """Minimum fraction of bytes in valid frames for a family to be recognised."""
 
 
 def families() -> tuple[Family, ...]:
-    """Return all families, with those of this package first.
-
-    Examples
-    --------
-    >>> families()[0].name
-    'line-protocol'
-    """
-    added = [_load(entry) for name, entry in _entry_points().items() if name not in _TABLE]
+    """Return all families, with those of this package first."""
+    added = [_load(entry) for name, entry in entry_points_of(GROUP).items() if name not in _TABLE]
     return (*map(_built_in, _TABLE), *added)
 
 
 def get_family(name: str) -> Family:
-    """Return the family with a given name.
-
-    Raises
-    ------
-    SensorError
-        If there is no such family, or the package that provides it cannot be loaded.
-    """
+    """Return the family with a given name; the SensorError of an unknown name lists the known ones."""
     if name in _TABLE:
         return _built_in(name)
-    entries = _entry_points()
+    entries = entry_points_of(GROUP)
     if name in entries:
         return _load(entries[name])
     known = ", ".join(dict.fromkeys([*_TABLE, *entries]))
@@ -74,11 +60,6 @@ def probe(data: bytes) -> list[str]:
 
     A family recognises bytes if at least half of them are in valid frames. A family without marker or checksum is
     returned only if no other family is recognised, and the bytes give at least two replies, all in range.
-
-    Examples
-    --------
-    >>> probe(bytes.fromhex("ff07a1a7 ff07a2a8"))
-    ['ffhls']
     """
     all_families = families()
     shares = {family.name: _share(family, data) for family in all_families if family.self_framing}
@@ -89,24 +70,17 @@ def probe(data: bytes) -> list[str]:
 
 
 def describe_bytes(data: bytes) -> str:
-    """Return a one-line description of bytes from a port, for the user.
-
-    Examples
-    --------
-    >>> describe_bytes(b"")
-    'silence'
-    >>> describe_bytes(b"Ready.\\r\\nwaiting\\r\\n")
-    "looks like text lines without a distance ('Ready.')"
-    """
+    """Return a one-line description of bytes from a port, for the user."""
     if not data:
         return "silence"
-    names = probe(data)
-    if names:
+    if names := probe(data):
         return "looks like " + " or ".join(f"{get_family(name).title} [{name}]" for name in names)
     if len(set(data)) == 1:
         return f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?"
-    if _is_text(data):
-        return f"looks like text lines without a distance ({_sample(data)!r})"
+    if b"\n" in data and sum(byte in b"\t\r\n" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data):
+        lines = data.decode("ascii", "replace").splitlines()
+        sample = next((line.strip()[:40] for line in lines if line.strip()), "")
+        return f"looks like text lines without a distance ({sample!r})"
     return "looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?"
 
 
@@ -123,19 +97,9 @@ def _all_in_range(family: Family, data: bytes) -> bool:
     return len(readings) > 1 and not readings.flags.any()
 
 
-def _is_text(data: bytes) -> bool:
-    return b"\n" in data and sum(byte in b"\t\r\n" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data)
-
-
-def _sample(data: bytes) -> str:
-    """Return up to 40 characters of the first non-blank line."""
-    lines: Iterable[str] = data.decode("ascii", "replace").splitlines()
-    return next((line.strip()[:40] for line in lines if line.strip()), "")
-
-
 def _built_in(name: str) -> Family:
-    module, attribute = _TABLE[name]
-    return _checked(name, getattr(import_module(module), attribute))
+    module = import_module(_TABLE[name])
+    return _checked(name, module.FAMILIES if hasattr(module, "FAMILIES") else module.FAMILY)
 
 
 def _checked(name: str, loaded: Any) -> Family:
@@ -144,10 +108,6 @@ def _checked(name: str, loaded: Any) -> Family:
     if not isinstance(family, Family):
         raise SensorError(f"sensor {name!r}: expected a Family, got {type(family).__name__}; repair the package")
     return family
-
-
-def _entry_points() -> dict[str, EntryPoint]:
-    return entry_points_of(GROUP)
 
 
 def _load(entry: EntryPoint) -> Family:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["SumFrames", "with_sum"]
-
 
 def with_sum(body: bytes) -> bytes:
     """Return a frame that consists of the body and the low eight bits of its sum.
@@ -21,6 +19,9 @@ def with_sum(body: bytes) -> bytes:
 class SumFrames:
     """Cuts a stream into frames, byte by byte from the left; the boundaries of reads do not affect the frames.
 
+    After an invalid frame the search continues at its second byte. So an incomplete frame causes the loss of itself and
+    of at most the next frame.
+
     Parameters
     ----------
     size : int
@@ -30,11 +31,6 @@ class SumFrames:
     plausible : callable
         Returns whether the sensor can send a frame whose sum is correct. One wrong frame in 256 has a correct eight-bit
         sum, and a constant distance can repeat it forever. This check keeps the decoder from staying misaligned.
-
-    Notes
-    -----
-    After an invalid frame the search continues at its second byte. So an incomplete frame causes the loss of itself and
-    of at most the next frame.
     """
 
     def __init__(self, size: int, starts: bytes, plausible: Callable[[bytes], bool]) -> None:

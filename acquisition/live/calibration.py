@@ -13,8 +13,6 @@ from numpy.typing import ArrayLike
 from acquisition.block import F8
 from acquisition.errors import CalibrationError
 
-__all__ = ["Calibration", "StillPoint", "against_ruler", "from_still"]
-
 SPEED_OF_SOUND_M_PER_S = 344.0
 RANGES = {"scale": (1e-3, 1e3), "offset_m": (-1e4, 1e4), "u_scale": (0.0, 1e3), "u_offset_m": (0.0, 1e4)}
 MAD_TO_SIGMA = 1.482602218505602
@@ -25,18 +23,7 @@ class Calibration:
     """The conversion of readings to distances.
 
     An echo time gives :math:`d = s\\,c\\,\\tau/2 + d_0`; a distance stated by the device gives
-    :math:`d = s\\,d_r + d_0`.
-
-    Parameters
-    ----------
-    speed_of_sound_m_per_s : float
-        Speed of sound for echo times. The recording contains echo times, so another speed can be applied later.
-    scale : float
-        Scale factor of the distances, determined from known distances.
-    offset_m : float
-        Offset added to the distances, m, because the face of the transducer is not the zero of the scale.
-    u_scale, u_offset_m : float
-        Standard uncertainties of ``scale`` and of ``offset_m`` in m.
+    :math:`d = s\\,d_r + d_0`. The offset is there because the face of the transducer is not the zero of the scale.
     """
 
     speed_of_sound_m_per_s: float = SPEED_OF_SOUND_M_PER_S
@@ -85,16 +72,7 @@ class Calibration:
 
 @dataclass(frozen=True, slots=True)
 class StillPoint:
-    """A measurement of the bob at rest.
-
-    Parameters
-    ----------
-    rest_m, u_rest_m : float
-        Rest position and its standard uncertainty, m.
-    noise_m : float
-        Standard deviation of one distance, m.
-    samples : int
-    """
+    """A measurement of the bob at rest: position, its uncertainty, and the standard deviation of one distance, m."""
 
     rest_m: float
     u_rest_m: float
@@ -105,11 +83,7 @@ class StillPoint:
 def from_still(distance: F8) -> StillPoint:
     """Return the rest position and the noise from (n,) distances in m, measured while the bob hangs still.
 
-    Raises
-    ------
-    CalibrationError
-        If there are fewer than ten distances, or the bob moves: the distances scatter by more than five times the
-        noise and by more than 0.5 mm.
+    The bob moves if the distances scatter by more than five times the noise and by more than 0.5 mm.
     """
     known = distance[np.isfinite(distance)]
     if known.size < 10:
@@ -121,8 +95,7 @@ def from_still(distance: F8) -> StillPoint:
     total = MAD_TO_SIGMA * float(np.median(np.abs(known - rest_m)))
     # First differences contain the noise, but almost no slow motion.
     steps = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(known)))) / math.sqrt(2.0)
-    floor = max(steps, 1e-6)
-    if total > 5.0 * floor and total > 5e-4:
+    if total > max(5.0 * steps, 5e-4):
         raise CalibrationError(
             f"the bob moves: its positions scatter by {total * 1e3:.2g} mm, but the noise is {steps * 1e3:.2g} mm; "
             "wait until it hangs still"
@@ -134,25 +107,10 @@ def from_still(distance: F8) -> StillPoint:
 def against_ruler(
     measured: tuple[StillPoint, ...], known_m: tuple[float, ...], u_known_m: float, base: Calibration | None = None
 ) -> Calibration:
-    """Return the calibration that maps measured rest positions to known distances.
+    """Return the calibration that maps rest positions, measured with ``base``, to known distances.
 
-    Parameters
-    ----------
-    measured : tuple of StillPoint
-        Rest positions measured with the calibration ``base``.
-    known_m : tuple of float
-        Distances by the ruler, m. One distance gives the offset. Two or more also give the scale, if their range is at
-        least a tenth of the largest distance.
-    u_known_m : float
-        Standard uncertainty of one ruler reading, m.
-    base : Calibration, optional
-        Calibration of the measurements; by default ``Calibration()``.
-
-    Raises
-    ------
-    CalibrationError
-        If there are no measurements, or not one for each ruler distance, or if the scale differs from 1 by more than a
-        tenth, for example because of a wrong unit.
+    One distance by the ruler gives the offset. Two or more also give the scale, if their range is at least a tenth of
+    the largest distance. A scale that differs from 1 by more than a tenth is refused, for example a wrong unit.
     """
     base = base or Calibration()
     if not measured or len(measured) != len(known_m):

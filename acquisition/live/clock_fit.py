@@ -8,14 +8,13 @@ excluded.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
-
-__all__ = ["COUNTER_PPM", "ClockFit", "ClockSamples", "fit_clock"]
 
 COUNTER_PPM = 100_000.0
 """Maximum rate error of a counter, ppm: a program that waits 10 ms in a loop also needs the time of the ping."""
@@ -34,42 +33,28 @@ NANO = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class ClockFit:
-    """The comparison of the sensor's clock with the host's.
+    """The comparison of the sensor's clock with the host's; the names are those of the provenance of a run file.
 
-    Parameters
-    ----------
-    rate_error_ppm : float
-        Relative rate by which the sensor's clock runs faster than the host's, ppm; NaN if the host times do not
-        determine it.
-    u_rate_error_ppm : float
-        Standard uncertainty of the rate error from the scatter of the host times, ppm; the error of the host's crystal
-        is not included.
-    jitter_s : float
-        Standard deviation of the host times about the fitted line, s.
-    readings : int
-        Number of readings given to the fit, including the excluded ones.
-    held : int
-        Number of readings that were delayed by a stall and excluded.
-    stalls : int
-        Number of stalls; the delayed readings of each stall came as a burst.
-    longest_stall_s : float
-        Maximum delay by a stall, s.
-    steps : int
-        Number of permanent jumps of one clock relative to the other, because the host slept, or the device paused or
-        restarted its counter. The readings before and after a jump are fitted with separate offsets.
-    span_s : float
-        Longest duration without a jump, s.
+    The rate error is the relative rate by which the sensor's clock runs faster; NaN if the host times do not give it.
+    Its uncertainty does not include the error of the host's crystal. ``host_jitter_s`` is the standard deviation of the
+    host times about the line. ``held_readings`` were delayed by one of the ``stalls`` and excluded.
+
+    ``steps`` counts the permanent jumps of one clock relative to the other, because the host slept, or the device
+    paused or restarted its counter. ``span_s`` is the longest duration without a jump.
     """
 
-    rate_error_ppm: float
-    u_rate_error_ppm: float
-    jitter_s: float
-    readings: int
-    held: int = 0
+    rate_error_ppm: float = math.nan
+    u_rate_error_ppm: float = math.inf
+    host_jitter_s: float = math.nan
+    held_readings: int = 0
     stalls: int = 0
     longest_stall_s: float = 0.0
     steps: int = 0
     span_s: float = 0.0
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the comparison as plain data, with None for what the host times do not give."""
+        return {name: value if math.isfinite(value) else None for name, value in asdict(self).items()}
 
 
 class ClockSamples:
@@ -102,18 +87,10 @@ class ClockSamples:
 
 
 def fit_clock(t: F8, host_ns: I8) -> ClockFit:
-    """Fit a line to the host times as a function of the sensor times, and return the comparison of the clocks.
+    """Fit a line to the (n,) host times as a function of the sensor times in s, and return the comparison of clocks.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        Sensor times of the readings: the ping times, if the device sends a clock time. Reflection times are unsuitable,
-        because they vary with the position of the bob.
-    host_ns : (n,) int64, ns
-        Host times of the same readings.
+    The sensor times are those of the pings: times of reflection vary with the position of the bob.
 
-    Notes
-    -----
     A host time is never early, because transport and scheduling can only delay it. The run is divided into twelve
     stretches; the minimum delays of the stretches lie on a line whose slope gives the rate error. This determines the
     slope far better than least squares through all host times [1]_. The host times may scatter to both sides (a bridge
@@ -129,24 +106,18 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     If the minimum delay jumps permanently, the lines before and after the jump have the same slope but different
     offsets. The importers of LSL (lab streaming layer) treat restarted streams in the same way [2]_.
 
-    References
-    ----------
     .. [1] S. B. Moon, P. Skelly, D. Towsley, "Estimation and removal of clock skew from network delay measurements",
        IEEE INFOCOM 1999, doi:10.1109/INFCOM.1999.749287.
     .. [2] C. Kothe et al., "The lab streaming layer for synchronized multimodal recording", Imaging Neuroscience 3,
        2025, doi:10.1162/IMAG.a.136.
     """
-    n = int(t.size)
-    no_fit = ClockFit(math.nan, math.inf, math.nan, n)
-    if n < MIN_SAMPLES or not np.isfinite(t).all() or t[-1] <= t[0]:
-        return no_fit
-    # No clock gives host times so far apart, and their difference would overflow.
-    if int(host_ns.max()) - int(host_ns.min()) >= 1 << 62:
-        return no_fit
-    if not (ahead := np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])).all():
-        t, host_ns = t[ahead], host_ns[ahead]  # exclude repeated times and times that run backward
-        if t.size < MIN_SAMPLES:
-            return no_fit
+    # No clock gives host times 2^62 ns apart, and their difference would overflow.
+    if t.size < MIN_SAMPLES or not np.isfinite(t).all() or int(host_ns.max()) - int(host_ns.min()) >= 1 << 62:
+        return ClockFit()
+    ahead = np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])
+    t, host_ns = t[ahead], host_ns[ahead]  # exclude repeated times and times that run backward
+    if t.size < MIN_SAMPLES:
+        return ClockFit()
     x = t - 0.5 * (t[0] + t[-1])
     delay = (host_ns - host_ns[0]) * NANO - (t - t[0])
     late = _lateness(x, delay)
@@ -154,26 +125,25 @@ def fit_clock(t: F8, host_ns: I8) -> ClockFit:
     held = np.zeros(t.size, np.bool_)
     for start, stop in stalls:
         held[start:stop] = True
-    stall_facts = (int(held.sum()), len(stalls), max((float(late[a:b].max()) for a, b in stalls), default=0.0))
-    if stalls:
-        x, delay = x[~held], delay[~held]
-        if x.size < MIN_SAMPLES or x[-1] <= x[0]:
-            return ClockFit(math.nan, math.inf, math.nan, n, *stall_facts)
+    longest_s = max((float(late[start:stop].max()) for start, stop in stalls), default=0.0)
+    without = ClockFit(held_readings=int(held.sum()), stalls=len(stalls), longest_stall_s=longest_s)
+    x, delay = x[~held], delay[~held]
+    if x.size < MIN_SAMPLES:
+        return without
     steps = _steps(x, delay)
     part = np.searchsorted(steps, np.arange(x.size), side="right")
     candidates = [_through_minima(x, delay, part), _through_all(x, delay, part)]
     slope, u_slope = min(candidates, key=lambda line: line[1])
     if not (math.isfinite(u_slope) and slope > -1.0):
-        return ClockFit(math.nan, math.inf, math.nan, n, *stall_facts, len(steps))
-    return ClockFit(
+        return replace(without, steps=len(steps))
+    return replace(
+        without,
         # The result is not simply -slope: at 50 ppm the quadratic term is many times the uncertainty of a long run.
-        -slope / (1.0 + slope) * 1e6,
-        u_slope * 1e6,
-        float(np.std(_within(delay - slope * x, part))),
-        n,
-        *stall_facts,
-        len(steps),
-        max(float(np.ptp(rows)) for rows in np.split(x, steps) if rows.size),
+        rate_error_ppm=-slope / (1.0 + slope) * 1e6,
+        u_rate_error_ppm=u_slope * 1e6,
+        host_jitter_s=float(np.std(_within(delay - slope * x, part))),
+        steps=len(steps),
+        span_s=max(float(np.ptp(rows)) for rows in np.split(x, steps) if rows.size),
     )
 
 

@@ -1,10 +1,11 @@
-"""Serial ports: pyserial opens and configures them; they are read by file descriptor if they have one."""
+"""Serial and network ports: pyserial opens and configures them."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import os
+import select
 import socket
 import stat
 from collections.abc import Iterator
@@ -22,51 +23,26 @@ except ImportError:  # on Windows, where the use of a port is always exclusive
     termios = None  # type: ignore[assignment]
     _TERMIOS_ERRORS = ()
 
-__all__ = ["READ_BYTES", "PortFacts", "SerialPort", "list_ports"]
-
 READ_BYTES = 65536
 KEEPALIVE_S = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
 """A silently lost connection is closed after five seconds without data and three probes, two seconds apart."""
+OTHER_TRIES = 10
+"""Number of tries that must find another device on the name of a lost port before it is opened. When a hub is plugged
+in, its ports may get each other's names for a moment."""
 
 
-@dataclass(frozen=True, slots=True)
-class PortFacts:
-    """One port of this computer.
-
-    Parameters
-    ----------
-    device : str
-        Address of the port.
-    description : str
-        Name of the port in the operating system.
-    """
-
-    device: str
-    description: str
-
-
-def list_ports() -> tuple[PortFacts, ...]:
-    """Return the serial ports of this computer, sorted by address."""
+def list_ports() -> list[Any]:
+    """Return the serial ports of this computer as pyserial describes them, sorted by ``device``, their address."""
     from serial.tools.list_ports import comports
 
-    ports = (PortFacts(p.device, p.description or "") for p in comports())
-    return tuple(sorted(ports, key=lambda port: port.device))
+    return sorted(comports(), key=lambda port: port.device)
 
 
 class SerialPort:
-    """A port that is read without blocking.
+    """A device (``/dev/ttyUSB0``, ``COM3``) or a pyserial address (``socket://host:port``, ``rfc2217://...``).
 
-    Parameters
-    ----------
-    address : str
-        A device (``/dev/ttyUSB0``, ``COM3``) or a pyserial address (``socket://host:port``, ``rfc2217://...``).
-    baud : int
-
-    Raises
-    ------
-    PortError
-        If the port is absent (the message lists the existing ports), busy, or not permitted (the message names the
-        group that may use it).
+    The PortError of an absent port lists the existing ports; that of a port without permission names the group that may
+    use it.
     """
 
     def __init__(self, address: str, baud: int) -> None:
@@ -74,38 +50,43 @@ class SerialPort:
         self._baud = baud
         self._port: Any = None
         self._descriptor = -1
+        self._others = 0  # number of consecutive tries that found another device
         try:
             self._open(address)
         except PortError as error:
             raise PortError(_explain(address, error.__cause__ or error)) from error.__cause__
         self._device = _devices().get(os.path.realpath(address))
 
-    def reopen(self) -> None:
-        """Reopen the same device after a loss, even under another name, but never another device under its name.
+    @property
+    def is_network(self) -> bool:
+        """Whether the port is a network address."""
+        return "://" in self.name
 
-        The error does not explain the cause, because a reader may call this method twice a second.
+    def reopen(self) -> str:
+        """Reopen a lost port; return "identified" for the same USB serial number, "another", or else "assumed".
+
+        The device with the serial number of the lost one is opened even under another name. The PortError does not
+        explain the cause, because a reader calls this method twice a second.
         """
         self.close()
-        if self._device is None and "://" not in self.name:
-            present = _devices().get(os.path.realpath(self.name))
-            if present is not None:
-                raise PortError(f"{self.name}: expected the lost port, which was no USB device, got {present}")
-        self._open(self.name if self._device is None else self._current_name(self._device))
-
-    @property
-    def identified(self) -> bool:
-        """Whether the port belongs to a USB device whose serial number distinguishes it from all other devices."""
-        return self._device is not None and bool(self._device.serial_number)
-
-    def _current_name(self, device: _Device) -> str:
-        """Return the current port name of a USB device: the old name, or the port with its serial number."""
-        there = _devices()
-        if there.get(os.path.realpath(self.name)) == device:
-            return self.name
-        for name, present in there.items():
-            if present == device and device.serial_number:
-                return name
-        raise PortError(f"{self.name}: {device} is not connected")
+        if self.is_network:
+            self._open(self.name)
+            return "assumed"
+        there, lost = _devices(), self._device
+        if lost is not None and lost.serial_number:
+            name = next((name for name, device in there.items() if device == lost), None)
+            if name is not None:
+                self._open(self.name if there.get(os.path.realpath(self.name)) == lost else name)
+                self._others = 0
+                return "identified"
+        present = there.get(os.path.realpath(self.name))
+        another = present != lost
+        self._others = self._others + 1 if another and present is not None else 0
+        if another and self._others < OTHER_TRIES:
+            raise PortError(f"{self.name}: expected {lost or 'no USB device'}, got {present or 'none'}")
+        self._open(self.name)
+        self._device, self._others = present, 0
+        return "another" if another else "assumed"
 
     def _open(self, address: str) -> None:
         import serial
@@ -121,20 +102,23 @@ class SerialPort:
         _claim(self._descriptor)
         _keep_alive(port)
 
-    def fileno(self) -> int:
-        """Return the file descriptor to wait on, or -1 if there is none (RFC 2217, Windows)."""
-        return self._descriptor
-
     def read(self, wait_s: float) -> bytes:
-        """Return available bytes, or wait up to ``wait_s`` for some; for an address without a descriptor."""
+        """Return available bytes, or wait up to ``wait_s`` for some; a PortError means that the port was lost."""
         with self._as_port_error("the port was disconnected"):
-            try:
+            if self._descriptor < 0:  # RFC 2217, Windows
                 if self._port.timeout != wait_s:  # setting the timeout makes RFC 2217 renegotiate all port settings
                     self._port.timeout = wait_s
                 data = self._port.read(1)
                 return bytes(data + self._port.read(min(self._port.in_waiting, READ_BYTES))) if data else b""
+            if not select.select([self._descriptor], [], [], wait_s)[0]:
+                return b""
+            try:
+                data = os.read(self._descriptor, READ_BYTES)
             except BlockingIOError:
                 return b""
+            if not data:
+                raise OSError("end of file")
+            return data
 
     def write(self, data: bytes) -> None:
         """Send all bytes."""
@@ -162,11 +146,8 @@ class SerialPort:
         self._port, self._descriptor = None, -1
         if port is not None:
             _claim(descriptor, release=True)
-            try:
+            with contextlib.suppress(OSError):  # a disconnected device has nothing to release
                 port.close()
-            except OSError:
-                # The device is already disconnected, so there is nothing to release.
-                return
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,11 +165,9 @@ class _Device:
 
 def _devices() -> dict[str, _Device]:
     """Return the USB devices among the ports, by port name with symbolic links resolved."""
-    from serial.tools.list_ports import comports
-
     return {
         os.path.realpath(port.device): _Device(port.vid, port.pid or 0, port.serial_number or "")
-        for port in comports()
+        for port in list_ports()
         if port.vid is not None
     }
 

@@ -7,17 +7,12 @@ times.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from acquisition.block import F8, Flag
+from acquisition.block import Flag
 from acquisition.errors import SensorError
 from acquisition.readings import Reading
 from acquisition.source import ClockKind
-
-__all__ = ["KEPT_GAPS", "RATES_HZ", "Gap", "Timebase", "demand_within"]
 
 RATES_HZ = (1e-6, 1e9)
 """Minimum and maximum allowed number of readings per second, far beyond any real experiment."""
@@ -32,17 +27,7 @@ NANO = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """An interval without readings.
-
-    Parameters
-    ----------
-    index : int
-        Index of the first reading after the gap.
-    length_s : float
-        Time between the last reading before the gap and the first after it, s.
-    lost : int
-        Number of readings that are missing in the gap.
-    """
+    """An interval without readings: index of the first reading after it, length in s, number of lost readings."""
 
     index: int
     length_s: float
@@ -50,45 +35,22 @@ class Gap:
 
 
 def demand_within(what: str, value: object, low: float, high: float) -> None:
-    """Check that a value is a number within a range.
-
-    Raises
-    ------
-    SensorError
-        If it is not; the message states the range and the value.
-    """
+    """Raise a SensorError, which states the range and the value, if a value is not a number within a range."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
         raise SensorError(f"{what} of a sensor must be a number from {low:g} to {high:g}, got {value!r}")
 
 
 class Timebase:
-    """Assigns a sensor time to each reading; each run needs a separate timebase.
+    """Assigns a sensor time to each reading; each part of a run needs a separate timebase.
 
-    Parameters
-    ----------
-    rate_hz : float
-        Nominal rate of the readings, Hz. It converts a counter to time, and a gap to a number of lost readings.
-
-    Raises
-    ------
-    SensorError
-        If the rate is outside :data:`RATES_HZ`.
-
-    Notes
-    -----
     With a device clock, the sensor time is the clock's microseconds since the first reading, unwrapped at 2^32. With
-    only a counter, it is the count since the first reading divided by the nominal rate. With neither, it is the host
-    time since the first reading.
+    only a counter, it is the count since the first reading divided by the nominal rate ``rate_hz``. With neither, it is
+    the host time since the first reading.
 
     A device has restarted if its clock runs backward in a way that no wrap explains, or shows less time than the
     preceding silence lasted. The sensor time then continues by the host's clock, and the first reading is flagged. A
     device whose clock continues from its last value has not restarted, even after a long silence: the link stalled and
-    now delivers the delayed readings. After a port came back, the caller has the readings before and after the
-    interruption, and sets the time of the first reading with :meth:`join`.
-
-    If there are only host times, the true times of readings that a stalled link delivers together are unknown. After a
-    silence, readings that follow each other within half a period are flagged as duplicates, until two consecutive
-    readings arrive on time.
+    now delivers the delayed readings.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -100,8 +62,6 @@ class Timebase:
         self.gaps: list[Gap] = []
         self.gaps_left_out = {"count": 0, "lost": 0, "longest_s": 0.0}  # summary of the gaps after the first KEPT_GAPS
         self.restarts = 0
-        self.joins = 0  # restarts after a port came back
-        self._join_s: float | None = None
         self._count = 0
         self._last_raw: int | None = None
         self._last_host_ns = 0
@@ -109,72 +69,37 @@ class Timebase:
         self._anchor_s = 0.0
         self._ticks = 0
         self._latest_s = 0.0
-        self._held = False  # whether the next readings may belong to a burst after a silence
-        self._in_time = 0
-        self._clock: ClockKind | None = None
-        self._counts = False
-
-    @property
-    def clock(self) -> ClockKind:
-        """Origin of the times; it is determined by the first reading."""
-        return self._clock or "host"
-
-    @property
-    def counts(self) -> bool:
-        """Whether times are a counter divided by the nominal rate; this is determined by the first reading."""
-        return self._counts
+        # The first reading determines the origin of the times, and whether they are a counter divided by the rate.
+        self.clock: ClockKind = "host"
+        self.counts = False
 
     def push(self, reading: Reading) -> tuple[float, int]:
         """Return the sensor time of a reading, s, and its flag: 0, a gap before it, a repeated time or a step back."""
         raw, unit_s = self._ticks_of(reading)
-        if self._clock is None:
-            self._clock = "host" if unit_s == NANO else "device"
-            self._counts = reading.device_us < 0 <= reading.sequence
-        first, joined = self._last_raw is None, self._join_s is not None
+        first = self._last_raw is None
+        if first:
+            self.clock = "host" if unit_s == NANO else "device"
+            self.counts = reading.device_us < 0 <= reading.sequence
         restarted = self._advance(raw, unit_s, reading.host_ns)
         self._last_raw, self._last_host_ns = raw, reading.host_ns
         t = self._anchor_s + self._ticks * unit_s
         step_s = t - self._latest_s
+        # A step of host times is a gap only if it is too long to be jitter.
+        longest_s = self._longest_s if unit_s != NANO else max(self._longest_s, self._jitter_s)
         flag = 0
         if not first and step_s == 0.0:
             flag = int(Flag.DUPLICATE_TIME)
         elif step_s < 0.0:
             flag = int(Flag.NON_MONOTONIC_TIME)
-        elif restarted or (step_s > self._longest_s and not self._only_jitter(unit_s, step_s)):
+        elif restarted or step_s > longest_s:
             flag = int(Flag.GAP_BEFORE)
-            # After a port came back with a new counter or clock, the number of lost readings is unknown.
-            lost = 0 if joined else max(round(step_s * self.rate_hz) - 1, 0)
-            self._note_gap(Gap(self._count, step_s, lost))
-            self._held, self._in_time = unit_s == NANO, 0
-        elif self._held:
-            flag = self._burst_flag(step_s)
-        self._latest_s = max(t, self._latest_s)
+            self._note_gap(Gap(self._count, step_s, max(round(step_s * self.rate_hz) - 1, 0)))
+        self._latest_s = max(self._latest_s, t)
         self._count += 1
         return t, flag
 
-    def continued_times(self, readings: Sequence[Reading]) -> F8 | None:
-        """Return the (m,) times, s, of the next n readings, with m <= n, under the assumption that the clock continues.
-
-        There are fewer than n times if the clock or counter runs backward among these readings, or if a reading lacks
-        it. The result is None if the first reading lacks it, or if there was no earlier reading.
-        """
-        _, unit_s = self._ticks_of(readings[0])
-        if self._last_raw is None or unit_s == NANO:
-            return None
-        raws: list[int] = []
-        for reading in readings:
-            raw, unit = self._ticks_of(reading)
-            if unit != unit_s or (raws and raw < raws[-1]):
-                break
-            raws.append(raw)
-        return np.asarray(self._anchor_s + (self._ticks + np.array(raws, np.int64) - self._last_raw) * unit_s)
-
-    def join(self, t: float) -> None:
-        """Set the time of the next reading, s, because the device clock does not continue from its last value."""
-        self._join_s, self._held = t, True
-
     def _ticks_of(self, reading: Reading) -> tuple[int, float]:
-        """Return the raw time of a reading in ticks, and the length of a tick in s."""
+        """Return the device's clock, its counter or the host time as a number of ticks, and the length of a tick, s."""
         if reading.device_us >= 0:
             return reading.device_us, 1e-6
         if reading.sequence >= 0:
@@ -189,26 +114,10 @@ class Timebase:
         left_out["count"], left_out["lost"] = left_out["count"] + 1, left_out["lost"] + gap.lost
         left_out["longest_s"] = max(left_out["longest_s"], gap.length_s)
 
-    def _burst_flag(self, step: float) -> int:
-        """Return the flag of a reading that may belong to a burst, in which host times are not measurement times."""
-        late = step < 0.5 * self._period_s
-        self._in_time = 0 if late else self._in_time + 1
-        self._held = self._in_time < 2
-        return int(Flag.DUPLICATE_TIME) if late else 0
-
-    def _only_jitter(self, unit_s: float, step: float) -> bool:
-        """Return whether a step of host times is short enough to be jitter; only a longer step is a gap."""
-        return unit_s == NANO and step < self._jitter_s
-
     def _advance(self, raw: int, unit_s: float, host_ns: int) -> bool:
         """Advance to a reading; return whether the clock of the device restarted, so that the time was set anew."""
         if self._last_raw is None:
             return False
-        if self._join_s is not None:
-            self._anchor_s, self._ticks = max(self._join_s, self._latest_s + self._period_s), 0
-            self._join_s = None
-            self.restarts, self.joins = self.restarts + 1, self.joins + 1
-            return True
         difference = raw - self._last_raw
         step = difference * unit_s
         if unit_s != NANO and not 0.0 <= step <= self._longest_s:

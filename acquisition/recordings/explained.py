@@ -6,19 +6,15 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from acquisition.errors import FormatError
-from acquisition.recordings.base import read_bytes, read_head
+from acquisition.recordings.base import read_bytes
 from acquisition.recordings.identify import get_format, sniff
-from acquisition.recordings.tables.contents import Arrays, Channel, Sheet, split_heading
-from acquisition.recordings.tables.sheet import ColumnFormat
-
-__all__ = ["Column", "Layout", "explain"]
-
-_FIRST_ROWS = 4
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.table import Table, names_apart
+from acquisition.recordings.tables.text import HEAD_BYTES, Text, is_text
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class ColumnRole:
     """One column: its name, its unit, its interpretation, and the text of its first cells."""
 
     name: str
@@ -28,104 +24,52 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
-    """One table of a file.
-
-    Parameters
-    ----------
-    runs : tuple of str
-        Names of the runs in the table; the name of an unnamed run is an empty text.
-    above : tuple of (int, str)
-        Line number and text of each line above the rows: preamble, names, units.
-    first_line : int or None
-        Line number of the first row; None for a file that is not text.
-    columns : tuple of Column
-    """
+class Explanation:
+    """The rows of some runs: the lines above them, the number of the first (None if it is no text), the columns."""
 
     runs: tuple[str, ...]
     above: tuple[tuple[int, str], ...]
     first_line: int | None
-    columns: tuple[Column, ...]
+    columns: tuple[ColumnRole, ...]
 
 
-def explain(path: str | os.PathLike[str]) -> tuple[str, str, tuple[Layout, ...]]:
-    """Return the family of a file, the evidence for it, and its tables.
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be read, or its family has no columns.
-    """
-    name = os.fspath(path)
-    family = sniff(path)
+def explain(path: str | os.PathLike[str]) -> tuple[str, str, tuple[Explanation, ...]]:
+    """Return the family of a file, the evidence for it, and its rows; any table shows the columns of other formats."""
+    name, family, data = os.fspath(path), sniff(path), read_bytes(path)
     reader = get_format(family)
-    # MotionSensor.vi uses pairs of files; each of them has columns like any table.
-    columns_of = reader if isinstance(reader, ColumnFormat) else get_format("table")
-    if not isinstance(columns_of, ColumnFormat):
-        raise FormatError(name, f"expected a format with columns, got {family}", "leave out the explanation of columns")
-    contents = columns_of.contents(name, read_bytes(path))
-    why = getattr(reader, "evidence", columns_of.evidence)(read_head(path))
-    return family, why, tuple(_layouts(contents.channels))
+    columns = reader if isinstance(reader, ColumnFormat) else get_format("table")
+    tables = names_apart(columns.tables(name, data)) if isinstance(columns, ColumnFormat) else []
+    evidence = getattr(reader, "evidence", lambda _: "")
+    return family, evidence(data[:HEAD_BYTES]), tuple(_explained(tables, data))
 
 
-def _layouts(channels: Sequence[Channel]) -> Iterator[Layout]:
-    sheets: dict[int, list[Channel]] = {}
-    for each in channels:
-        key = (
-            hash(("arrays", each.run)) if isinstance(each.source, Arrays) else id(each.source.text) + each.source.start
-        )
-        sheets.setdefault(key, []).append(each)
+def _explained(tables: Sequence[Table], data: bytes) -> Iterator[Explanation]:
+    by_rows: dict[int, list[Table]] = {}
+    for each in tables:
+        by_rows.setdefault(id(each.lines or each), []).append(each)
     ended = 0
-    for own in sheets.values():
+    for own in by_rows.values():
+        lines, above = own[0].lines, []
+        if lines is not None and is_text(data):
+            above = [(line.number, line.text) for line in Text.of(data).lines() if ended < line.number < lines.first]
+            ended = lines.line(lines.rows - 1)
         runs = tuple(dict.fromkeys(each.run for each in own))
-        source = own[0].source
-        if isinstance(source, Arrays):
-            yield Layout(runs, (), None, tuple(_of_arrays(own)))
-            continue
-        begin = ended if source.text.start < ended <= source.start else source.text.start
-        number = source.first_line - sum(1 for line in source.text.lines(begin) if line.start < source.start)
-        lines = [line for line in source.text.lines(begin, number) if line.start < source.start]
-        above = tuple((line.number, line.text) for line in lines if line.text.strip())
-        yield Layout(runs, above, source.first_line, tuple(_of_sheet(source, own)))
-        ended = source.stop
+        shown = tuple(each for each in above if each[1].strip())
+        yield Explanation(runs, shown, lines.first if lines else None, tuple(_roles(own)))
 
 
-def _of_sheet(sheet: Sheet, channels: Sequence[Channel]) -> Iterator[Column]:
-    rows = [
-        split_heading(line.text, sheet.delimiter)[0] if sheet.delimiter else line.text.split()
-        for line, _ in zip(sheet.text.lines(sheet.start), range(_FIRST_ROWS), strict=False)
-    ]
-    times = {each.time: each.time_unit for each in channels if each.time is not None}
-    own = {each.column: each for each in channels}
-    width = max([len(sheet.names), *(len(row) for row in rows), *(column + 1 for column in own)])
-    for column in range(width):
-        cells = tuple(row[column] if column < len(row) else "" for row in rows)
-        name = sheet.names[column] if column < len(sheet.names) else ""
-        each = own.get(column)
-        if column in times:
-            yield Column(name, times[column], "time", cells)
-        elif each is None:
-            yield Column(name, "", "ignored", cells)
-        else:
-            yield Column(each.name, each.unit, _meaning(each), cells)
-
-
-def _of_arrays(channels: Sequence[Channel]) -> Iterator[Column]:
-    shown_times = set()
-    for each in channels:
-        source = each.source
-        if isinstance(source, Arrays):
-            if source.t is not None and source.time_name not in shown_times:
-                shown_times.add(source.time_name)
-                first = tuple(f"{x:.6g}" for x in source.t[:_FIRST_ROWS])
-                yield Column(source.time_name, each.time_unit, "time", first)
-            yield Column(each.name, each.unit, _meaning(each), tuple(f"{x:.6g}" for x in source.values[:_FIRST_ROWS]))
-
-
-def _meaning(channel: Channel) -> str:
-    meaning = "read only if it is named" if channel.aside else "channel"
-    return (
-        f"{meaning}, times {channel.formula.start_s:g} s + i * {channel.formula.step_s:g} s"
-        if channel.formula
-        else meaning
-    )
+def _roles(tables: Sequence[Table]) -> Iterator[ColumnRole]:
+    channels = {id(column.values): (column, each) for each in tables for column in each.columns}
+    units = {id(each.times.values): each.times.unit for each in tables if each.times is not None}
+    lines = tables[0].lines
+    for at, column in enumerate(tables[0].beside or tables[0].columns):
+        key = id(column.values)
+        printed = [f"{value:.6g}" for value in column.values[:4]]
+        cells = printed if lines is None else [row[at] if at < len(row) else "" for row in lines.cells]
+        name, unit, meaning = column.name, units.get(key, ""), "time" if key in units else "ignored"
+        if key in channels:
+            own, table = channels[key]
+            name, unit, meaning = own.name, own.unit, "read only if it is named" if own.aside else "channel"
+            if table.formula is not None:
+                meaning += f", times {table.formula.start_s:g} s + i * {table.formula.step_s:g} s"
+        yield ColumnRole(name, unit, meaning, tuple(cells))

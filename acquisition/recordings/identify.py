@@ -1,100 +1,69 @@
 """The formats of recordings, and the identification of a file's format.
 
-The table contains only names; the module of a format is imported on demand. Another package adds a format with an
-entry point in the group ``springmass.formats`` that names an object like :class:`acquisition.recordings.base.Format`.
-A user can declare a format without code (:mod:`acquisition.recordings.families.declared`).
+The module of a format is imported on demand. Another package adds a format with an entry point in the group
+``springmass.formats``; a user can declare one without code (:mod:`acquisition.recordings.families.declared`).
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.extensions import entry_points_of, load_entry
-from acquisition.recordings.base import (
-    HEAD_BYTES,
-    Format,
-    PairFormat,
-    SurveyFormat,
-    dialect_folder,
-    read_bytes,
-    read_head,
-)
+from acquisition.recordings.base import Format, Survey, SurveyFormat, dialect_folder, read_bytes
 from acquisition.recordings.foreign import unknown_format
-from acquisition.recordings.inspection import Inspection
 from acquisition.recordings.recording import Recording
+from acquisition.recordings.tables.text import HEAD_BYTES
 
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
-
-__all__ = ["formats", "get_format", "inspect", "open_recording", "sniff"]
-
-GROUP = "springmass.formats"
-
-_TABLE = {
+_MODULES = {
     "motion-sensor": "motion_sensor",
     "lvm": "lvm",
     "tdms": "tdms",
     "workbook": "workbook",
     "zip": "archive",
-    "capstone": "capstone",
-    "datastudio": "datastudio",
-    "vernier": "vernier",
-    "logger-pro": "logger_pro",
-    "phyphox": "phyphox",
-    "cassy": "cassy",
-    "tracker": "tracker",
-    "csv": "csv_units",
-    "bare": "bare",
-    "table": "any_table",
+    "capstone": "dialects:CAPSTONE",
+    "datastudio": "dialects:DATASTUDIO",
+    "vernier": "dialects:VERNIER",
+    "logger-pro": "saved:LOGGER_PRO",
+    "phyphox": "saved:PHYPHOX",
+    "cassy": "saved:CASSY",
+    "tracker": "saved:TRACKER",
 }
-"""The module in ``families`` for each name of a format."""
-_LAST = "table"  # accepts any rows of numbers, so all other formats are tried first
+"""For each name of a format its module in ``families``, and the format's name there if it is not FORMAT."""
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """The family of a file and the evidence for it, and its channels; none if the family cannot list them."""
+
+    format: str
+    title: str
+    why: str
+    surveys: tuple[Survey, ...]
 
 
 def formats() -> tuple[Format, ...]:
-    """Return all formats, from the user's declarations, this package and other packages.
-
-    Examples
-    --------
-    >>> "motion-sensor" in [each.name for each in formats()]
-    True
-    """
-    return tuple(_every())
+    """Return all formats in the order in which they are tried."""
+    return tuple(load() for load in _loaders().values())
 
 
 def get_format(name: str) -> Format:
-    """Return the format with a given name.
-
-    Raises
-    ------
-    UnknownFormat
-        If no format has this name.
-    """
-    if name in _TABLE:
-        return _built_in(name)
-    declared = {each.name: each for each in _declared()}
-    if name in declared:
-        return declared[name]
-    entries = _entry_points()
-    if name in entries:
-        return _load(entries[name])
-    known = ", ".join([*declared, *_TABLE, *entries])
-    raise UnknownFormat(f'format "{name}"', f"must be one of {known}", "name one of these or leave it out")
+    """Return the format with a given name."""
+    loaders = _loaders()
+    if name not in loaders:
+        known = ", ".join(loaders)
+        raise UnknownFormat(f'format "{name}"', f"must be one of {known}", "name one of these or leave it out")
+    return loaders[name]()
 
 
 def sniff(path: str | os.PathLike[str]) -> str:
-    """Return the name of a file's format, identified by its first bytes.
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be opened, or no format recognises it.
-    """
-    return _recognise(os.fspath(path), read_head(path)).name
+    """Return the name of a file's format, identified by its first bytes."""
+    return _recognise(os.fspath(path), read_bytes(path, HEAD_BYTES)).name
 
 
 def open_recording(
@@ -109,99 +78,64 @@ def open_recording(
     time_unit: str | None = None,
     velocity_path: str | os.PathLike[str] | None = None,
 ) -> Recording:
-    """Read a recording of another program.
+    """Read a recording of another program; if anything is missing or faulty, the error says so in one line.
 
-    Parameters
-    ----------
-    path : path
-    format : str, optional
-        Name of the format; by default it is identified by content.
-    channel, rate_hz, unit, run, time, time_unit : optional
-        Information that the file does not state or leaves open; see :meth:`acquisition.recordings.base.Format.read`.
-    velocity_path : path, optional
-        The velocity file that belongs to the position file; the two are joined by time.
-
-    Returns
-    -------
-    Recording
-
-    Raises
-    ------
-    FormatError
-        If the file is faulty; the message is one line for the user.
+    By default the format is identified by content. ``channel``, ``rate_hz``, ``unit``, ``run``, ``time`` and
+    ``time_unit`` are what the file does not state or leaves open; see :meth:`springmass.extend.Format.read`. A velocity
+    file is joined with the position file by time.
     """
     name = os.fspath(path)
-    reader = get_format(format) if format else _recognise(name, read_head(path))
+    reader = get_format(format) if format else _recognise(name, read_bytes(path, HEAD_BYTES))
     data = read_bytes(path)
+    if velocity_path is not None:
+        read_pair = getattr(reader, "read_pair", None)
+        if read_pair is None:
+            problem = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
+            raise UnknownFormat(name, problem, "leave the velocity file out")
+        velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
+        return cast(Recording, read_pair((name, data), velocity, rate_hz=rate_hz))
     optional = {"run": run, "time": time, "time_unit": time_unit}
     answers = {name: value for name, value in optional.items() if value is not None}
-    if velocity_path is None:
-        return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **answers)
-    if not hasattr(reader, "read_pair"):
-        problem = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
-        raise UnknownFormat(name, problem, "leave the velocity file out")
-    velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
-    return cast("PairFormat", reader).read_pair((name, data), velocity, rate_hz=rate_hz)
+    return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **answers)
 
 
 def inspect(path: str | os.PathLike[str]) -> Inspection:
-    """Return the format and the content of a file, before a channel is chosen.
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be opened, no format recognises it, or its content cannot be read.
-    """
-    name = os.fspath(path)
-    head = read_head(path)
-    reader = _recognise(name, head)
-    why = getattr(reader, "evidence", lambda _: "")(head)
-    surveys = reader.survey(name, read_bytes(path)) if isinstance(reader, SurveyFormat) else ()
-    return Inspection(reader.name, reader.title, why, surveys)
+    """Return the format and the content of a file, before a channel is chosen."""
+    head = read_bytes(path, HEAD_BYTES)
+    reader = _recognise(os.fspath(path), head)
+    if not isinstance(reader, SurveyFormat):
+        return Inspection(reader.name, reader.title, "", ())
+    surveys = reader.survey(os.fspath(path), read_bytes(path))
+    return Inspection(reader.name, reader.title, reader.evidence(head), surveys)
 
 
 def _recognise(path: str, head: bytes) -> Format:
-    names = []
-    for candidate in _every():
-        if candidate.recognises(head[:HEAD_BYTES]):
+    loaders = _loaders()
+    for load in loaders.values():
+        if (candidate := load()).recognises(head):
             return candidate
-        names.append(candidate.name)
-    raise unknown_format(path, head, tuple(names))
+    raise unknown_format(path, head, tuple(loaders))
 
 
-def _every() -> Iterator[Format]:
-    """Yield all formats in the order in which they are tried.
-
-    The user's declarations come first, then the formats of this package, then entry points; ``table`` comes last.
-    """
-    yield from _declared()
-    for name in _TABLE:
-        if name != _LAST:
-            yield _built_in(name)
-    for name, entry in _entry_points().items():
-        if name not in _TABLE:
-            yield _load(entry)
-    yield _built_in(_LAST)
-
-
-def _declared() -> Iterator[Format]:
-    """Yield the user's dialects; their reader is imported only if the folder of dialects exists."""
-    if not dialect_folder().is_dir():
-        return
-    for each in import_module("acquisition.recordings.families.declared").dialects():
-        if each.name in _TABLE:
-            where = dialect_folder() / f"{each.name}.toml"
-            raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')
-        yield each
+def _loaders() -> dict[str, Callable[[], Format]]:
+    """Return what loads each format, in the order in which they are tried: the user's first, and any table last."""
+    loaders: dict[str, Callable[[], Format]] = {}
+    if (folder := dialect_folder()).is_dir():
+        for each in import_module("acquisition.recordings.families.declared").dialects():
+            if each.name in (*_MODULES, "table"):
+                where = folder / f"{each.name}.toml"
+                raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')
+            loaders[each.name] = partial(_declared, each)
+    loaders |= {name: partial(_built_in, module) for name, module in _MODULES.items()}
+    for name, entry in entry_points_of("springmass.formats").items():
+        loaders.setdefault(name, partial(load_entry, entry, f'format "{name}"', AcquisitionError))
+    return {**loaders, "table": partial(_built_in, "any_table")}
 
 
-def _built_in(name: str) -> Format:
-    return cast(Format, import_module(f"acquisition.recordings.families.{_TABLE[name]}").FORMAT)
+def _declared(each: Format) -> Format:
+    return each
 
 
-def _entry_points() -> dict[str, EntryPoint]:
-    return entry_points_of(GROUP)
-
-
-def _load(entry: EntryPoint) -> Format:
-    return cast(Format, load_entry(entry, f'format "{entry.name}"', AcquisitionError))
+def _built_in(module: str) -> Format:
+    name, _, variable = module.partition(":")
+    return cast(Format, getattr(import_module(f"acquisition.recordings.families.{name}"), variable or "FORMAT"))

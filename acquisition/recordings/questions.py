@@ -1,17 +1,13 @@
-"""Questions that a reader asks the user, represented as data.
+"""Questions that a reader asks the user, as data, so that a program can choose an answer without parsing text.
 
-A file may lack information that must not be guessed: a unit, a rate, the choice of a channel. The reader then raises
-:class:`acquisition.errors.NeedsAnswer` with a :class:`Question`. The question contains all possible answers, so that a
-program can choose without parsing text. A command line and a script give answers in different ways, so the caller
-writes the instructions for answering.
+A file may lack information that must not be guessed: a unit, a rate, the choice of a channel. The caller words how to
+answer, because a command line and a script give answers in different ways.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-
-__all__ = ["Missing", "MissingItem", "Question", "Times"]
 
 
 class Missing(StrEnum):
@@ -75,15 +71,7 @@ class MissingItem:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """The range of the times of a channel, in the file's unit.
-
-    Parameters
-    ----------
-    name : str
-    first, last : float
-    step : float
-        Median of the first time steps.
-    """
+    """The range of the times of a channel, in the file's unit; ``step`` is the median of the first time steps."""
 
     name: str
     first: float
@@ -112,15 +100,6 @@ class Question:
         The range of the times, or only their name; an empty text if there are no times.
     reason : str
         The reason for the question, if the columns do not show it, for example an answer that does not fit.
-
-    Examples
-    --------
-    >>> unit = MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta")
-    >>> question = Question("pendulum.csv", (unit,), ("theta",), Times("t", 0.0, 31.2, 0.033))
-    >>> question.sentence
-    'columns "t" (0 to 31.2, 0.033 apart) and "theta": what is theta\\'s unit?'
-    >>> question.examples
-    {'unit': 'rad'}
     """
 
     path: str

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from acquisition.block import Block
 from acquisition.source import SourceInfo
 
-__all__ = ["Original", "Recording", "Trap"]
-
 
 @dataclass(frozen=True, slots=True)
 class Original:

@@ -8,17 +8,6 @@ from typing import NamedTuple
 
 from acquisition.block import UNITS
 
-__all__ = [
-    "LENGTHS",
-    "MEASURES",
-    "TIMES",
-    "Measure",
-    "measure_of",
-    "time_factor",
-    "time_power",
-    "unit_words",
-]
-
 LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
 """Units of length, each with the power of ten that converts it to metres."""
 TIMES = {"s": 0, "ms": -3, "us": -6, "ns": -9, "min": 0, "h": 0}
@@ -95,13 +84,7 @@ MEASURES = {
 
 
 def unit_words(unit: str) -> str:
-    """Return the symbol of a spelled-out unit; return other units unchanged.
-
-    Examples
-    --------
-    >>> unit_words(" centimeters "), unit_words("m/s2"), unit_words("rad s⁻¹"), unit_words("V")
-    ('cm', 'm/s^2', 'rad/s', 'V')
-    """
+    """Return the symbol of a spelled-out unit; return other units unchanged."""
     plain = " ".join(unit.split()).strip(".")
     lower = plain.lower()
     if plain in MEASURES:
@@ -117,13 +100,7 @@ def unit_words(unit: str) -> str:
 
 
 def measure_of(unit: str) -> Measure | None:
-    """Return the measure of a unit; None if no sample can have it.
-
-    Examples
-    --------
-    >>> measure_of("mm"), measure_of("Volts").quantity, measure_of("Hz")
-    (Measure(quantity='length', symbol='mm', power=-3, factor=1.0), 'voltage', None)
-    """
+    """Return the measure of a unit; None if no sample can have it."""
     return MEASURES.get(unit_words(unit))
 
 

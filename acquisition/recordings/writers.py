@@ -1,12 +1,11 @@
-"""Write recordings in the formats of other programs: MotionSensor.vi, LVM, and CSV with units.
+"""Write recordings in the formats of other programs: MotionSensor.vi, and CSV with units.
 
 Each format stores less than a run file. Everything that it cannot store is reported.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +15,6 @@ from acquisition.errors import FormatError
 from acquisition.recordings.tables.text import says_simulated
 from acquisition.source import SourceInfo
 
-__all__ = ["WRITERS", "Written", "write_csv", "write_lvm", "write_motion_sensor"]
-
 _TITLE = "Motion Sensor Data File"
 _SHOWN = np.uint8(Flag.MISSING)  # this flag is not lost, because a NaN represents it
 
@@ -26,12 +23,8 @@ _SHOWN = np.uint8(Flag.MISSING)  # this flag is not lost, because a NaN represen
 class Written:
     """The files written for one recording.
 
-    Parameters
-    ----------
-    files : tuple of (str, bytes)
-        Suffix that is added to the user's file name, and content. The suffix is empty for the file with that name.
-    lost : tuple of str
-        One sentence for each kind of information that the format cannot store.
+    ``files`` are the suffix that is added to the user's file name (empty for the file with that name) and the content.
+    ``lost`` has one sentence for each kind of information that the format cannot store.
     """
 
     files: tuple[tuple[str, bytes], ...]
@@ -39,87 +32,27 @@ class Written:
 
 
 def write_motion_sensor(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
-    """Write the pair of files of MotionSensor.vi: position and velocity.
+    """Write the pair of files of MotionSensor.vi: position, and velocity with the suffix ``_velocity``.
 
-    Parameters
-    ----------
-    path : str
-        For messages.
-    samples : Block
-    info : SourceInfo
-    title, start_time : str
-        Taken from the recording; either may be empty.
-
-    Returns
-    -------
-    Written
-        The position under the given name, and the velocity with the suffix ``_velocity``.
-
-    Raises
-    ------
-    FormatError
-        If two samples would get the same time, because the format prints times in whole milliseconds.
-
-    Notes
-    -----
     If the recording has no velocity, the backward difference of the position over one sample is written, as in the
     instrument. It is NaN after a gap and next to a missing sample.
     """
     _demand_times(path, samples.t, 3, "MotionSensor.vi prints times to 1 ms")
     head = title if title.lower().startswith(_TITLE.lower()) else f"{_TITLE} {title or start_time}".strip()
-    head = " ".join(_with_simulated_note(head, info).split())
-    velocity = _velocity(samples, info.rate_hz) if samples.velocity is None else samples.velocity
+    head += " (simulated)" if info.kind == "simulated" and not says_simulated(head) else ""
+    head, velocity = " ".join(head.split()), samples.velocity
+    if velocity is None:
+        whole = np.rint(np.diff(samples.t, prepend=np.nan) * info.rate_hz) == 1
+        velocity = np.where(whole, np.diff(samples.distance, prepend=np.nan) * info.rate_hz, np.nan)
     error = "" if info.stated_error_m is None else f"\t{info.stated_error_m * 100:.3f}"
     columns = "Time (s)\tDistance (cm)" + ("\tDist Error (cm)" if error else "")
-    position = (f"{t:.3f}\t{_fixed(x * 100, 3)}{error}" for t, x in _pairs(samples.t, samples.distance))
-    speeds = (f"{t:.3f}\t{_fixed(v * 100, 3)}" for t, v in _pairs(samples.t, velocity))
-    files = (
-        ("", "\r\n".join([head, columns, *position]).encode()),
-        ("_velocity", "\r\n".join([head, "Time (s)\tVelocity (cm/s)", *speeds]).encode()),
-    )
+
+    def file(columns: str, values: F8, end: str = "") -> bytes:
+        pairs = zip(samples.t.tolist(), values.tolist(), strict=True)
+        return "\r\n".join([head, columns, *(f"{t:.3f}\t{_fixed(x * 100, 3)}{end}" for t, x in pairs)]).encode()
+
+    files = ("", file(columns, samples.distance, error)), ("_velocity", file("Time (s)\tVelocity (cm/s)", velocity))
     return Written(files, _losses(samples, rounding_m=1e-5))
-
-
-def write_lvm(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
-    """Write a LabVIEW Measurement file: tabs, decimal points, one column of times; see :func:`write_motion_sensor`."""
-    _demand_times(path, samples.t, 9, "LVM is written with times to 1 ns")
-    channels = [("Distance", "m", samples.distance)]
-    if samples.velocity is not None:
-        channels.append(("Velocity", "m/s", samples.velocity))
-    note = " ".join(_with_simulated_note(title, info).split())
-    date, _, clock = (start_time or "1903-12-31T19:00:00").removesuffix("Z").partition("T")
-    head: list[tuple[str, list[str]]] = [
-        ("LabVIEW Measurement", []),
-        ("Writer_Version", ["2"]),
-        ("Reader_Version", ["2"]),
-        ("Separator", ["Tab"]),
-        ("Decimal_Separator", ["."]),
-        ("Multi_Headings", ["No"]),
-        ("X_Columns", ["One"]),
-        ("Time_Pref", ["Relative"]),
-        ("Operator", ["springmass"]),
-        ("***End_of_Header***", []),
-        ("", []),
-        *([("Notes", [note])] if note else []),
-        ("Channels", [str(len(channels))]),
-    ]
-    start = float(samples.t[0]) if len(samples) else 0.0
-    cells = (
-        ("Samples", str(len(samples))),
-        ("Date", date.replace("-", "/")),
-        ("Time", re.sub(r"[+-]\d\d:\d\d$", "", clock) or "00:00:00"),
-        ("Y_Unit_Label", ""),
-        ("X_Dimension", "Time"),
-        ("X0", f"{start:.16E}"),
-        ("Delta_X", f"{1 / info.rate_hz:.16E}"),
-    )
-    units = [unit for _, unit, _ in channels]
-    head += [(key, units if key == "Y_Unit_Label" else [cell] * len(channels)) for key, cell in cells]
-    head += [("***End_of_Header***", []), ("X_Value", [*(name for name, _, _ in channels), "Comment"])]
-    lines = ["\t".join([key, *values]) for key, values in head]
-    return Written(
-        (("", _rows(lines, "\t", samples.t, [values for _, _, values in channels])),), _losses(samples, 1e-9)
-    )
 
 
 def write_csv(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
@@ -133,22 +66,18 @@ def write_csv(path: str, samples: Block, info: SourceInfo, title: str = "", star
     if samples.velocity is not None:
         headings.append("Velocity (m/s)")
         columns.append(samples.velocity)
-    lost = [*_losses(samples, 1e-9), *(f"CSV cannot store the {what}" for what in _titles(title, start_time))]
-    return Written((("", _rows([",".join(headings)], ",", samples.t, columns)),), tuple(lost))
+    titles = [what for what, value in (("title", title), ("start time", start_time)) if value]
+    lost = [*_losses(samples, 1e-9), *(f"CSV cannot store the {what}" for what in titles)]
+    rows = zip(samples.t.tolist(), *(column.tolist() for column in columns), strict=True)
+    lines = [",".join(headings), *(",".join(_fixed(value, 9) for value in row) for row in rows), ""]
+    return Written((("", "\n".join(lines).encode()),), tuple(lost))
 
 
 WRITERS: dict[str, Callable[[str, Block, SourceInfo, str, str], Written]] = {
     ".txt": write_motion_sensor,
-    ".lvm": write_lvm,
     ".csv": write_csv,
 }
 """The writer for each file suffix."""
-
-
-def _rows(lines: list[str], mark: str, t: F8, columns: list[F8]) -> bytes:
-    for row in zip(t.tolist(), *(column.tolist() for column in columns), strict=True):
-        lines.append(mark.join(_fixed(value, 9) for value in row))
-    return "\n".join([*lines, ""]).encode()
 
 
 def _fixed(value: float, decimals: int) -> str:
@@ -159,35 +88,13 @@ def _fixed(value: float, decimals: int) -> str:
     return shown.removeprefix("-") if float(shown) == 0 else shown
 
 
-def _pairs(t: F8, values: F8) -> Iterable[tuple[float, float]]:
-    return zip(t.tolist(), values.tolist(), strict=True)
-
-
 def _demand_times(path: str, t: F8, decimals: int, why: str) -> None:
     """Check that no two samples with different times get the same printed time."""
     printed = np.rint(t * 10.0**decimals)
     merged = int(np.count_nonzero((np.diff(printed) == 0) & (np.diff(t) != 0)))
     if merged:
         problem = f"{why}, but {merged} samples are closer together"
-        raise FormatError(path, problem, "write .csv, .lvm or a run file instead")
-
-
-def _velocity(samples: Block, rate_hz: float) -> F8:
-    velocity = np.full(len(samples), np.nan)
-    if len(samples) > 1:
-        whole = np.rint(np.diff(samples.t) * rate_hz) == 1
-        velocity[1:] = np.where(whole, np.diff(samples.distance) * rate_hz, np.nan)
-    return velocity
-
-
-def _with_simulated_note(title: str, info: SourceInfo) -> str:
-    if info.kind != "simulated" or says_simulated(title):
-        return title
-    return f"{title} (simulated)".strip()
-
-
-def _titles(title: str, start_time: str) -> list[str]:
-    return [what for what, value in (("title", title), ("start time", start_time)) if value]
+        raise FormatError(path, problem, "write .csv or a run file instead")
 
 
 def _losses(samples: Block, rounding_m: float) -> tuple[str, ...]:

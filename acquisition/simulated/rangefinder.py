@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,98 +13,55 @@ from acquisition.errors import SensorError
 from acquisition.readings import carried
 from acquisition.source import SourceInfo
 
-__all__ = ["Shot", "VirtualRangefinder", "VirtualSensor"]
+FALSE_ECHO_M = 5e-3
+"""Mean distance of the false echoes beyond the bob, m."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VirtualSensor:
-    """The properties and errors of a simulated rangefinder.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Readings per second by the sensor's own clock, Hz.
-    tick_s : float
-        Resolution of an echo time, s; 0.25 us corresponds to a distance of 43 um.
-    noise_m : float
-        Standard deviation of the noise of a distance, m.
-    false_echo_rate_hz : float
-        Clusters of false echoes per second, if the bob has one turning point nearest to the sensor per second; each
-        cluster follows such a turning point.
-    false_echo_m : float
-        Mean distance of the false echoes beyond the bob, m.
-    far_limit_m : float
-        Distance of a fixed object behind the bob, m; it limits all readings.
-    dead_time_s : float
-        Minimum time of flight, s; an earlier echo gives a reading without a target.
-    jitter_s : float
-        Standard deviation of the time at which a reading is taken, s; the time stated is the intended time.
-    crystal_ppm : float
-        Relative rate by which the sensor's clock runs faster than true time, ppm.
-    speed_of_sound_m_per_s : float
-        Speed of sound in the simulated air.
-    temperature_c : float
-        Temperature that the sensor sends, degC.
-    """
+    """The properties and errors of a simulated rangefinder."""
 
     rate_hz: float = 100.0
+    """Readings per second by the sensor's own clock."""
     tick_s: float = 0.25e-6
+    """Resolution of an echo time; 0.25 us corresponds to a distance of 43 um."""
     noise_m: float = 80e-6
+    """Standard deviation of the noise of a distance."""
     false_echo_rate_hz: float = 0.1
-    false_echo_m: float = 5e-3
-    far_limit_m: float = math.inf
+    """Clusters of false echoes per second, if the bob has one turning point nearest to the sensor per second; each
+    cluster follows such a turning point."""
     dead_time_s: float = 0.85e-3
-    jitter_s: float = 0.0
+    """Minimum time of flight; an earlier echo gives a reading without a target."""
     crystal_ppm: float = 0.0
+    """Relative rate by which the sensor's clock runs faster than true time."""
     speed_of_sound_m_per_s: float = 344.0
-    temperature_c: float = 21.3
 
     def __post_init__(self) -> None:
         for name in ("rate_hz", "tick_s", "speed_of_sound_m_per_s"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise SensorError(f"a simulated sensor's {name} must be positive and finite, got {getattr(self, name)}")
-        for name in ("noise_m", "false_echo_rate_hz", "jitter_s"):
+        for name in ("noise_m", "false_echo_rate_hz"):
             if not getattr(self, name) >= 0:
                 raise SensorError(f"a simulated sensor's {name} must not be negative, got {getattr(self, name)}")
 
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """One reading of the simulated sensor.
-
-    Parameters
-    ----------
-    true_s : float
-        Intended time of the reading since the start, without jitter, in true time, s.
-    sequence : int
-    device_us : int
-        Time by the sensor's clock, us, which wraps at 2^32.
-    echo_us : float
-        Time of flight, us, rounded to whole ticks; NaN for no target.
-    distance_m : float
-        Distance that a sensor would calculate from the echo time, m; NaN for no target.
-    temperature_c : float
-    """
+    """One reading of the simulated sensor; echo time and distance are NaN for no target."""
 
     true_s: float
+    """Time of the reading since the start, in true time."""
     sequence: int
     device_us: int
+    """Time by the sensor's clock, which wraps at 2^32."""
     echo_us: float
+    """Time of flight, rounded to whole ticks."""
     distance_m: float
-    temperature_c: float
+    """Distance that a sensor would calculate from the echo time."""
 
 
 class VirtualRangefinder:
-    """Takes readings of a moving bob.
-
-    Parameters
-    ----------
-    position : callable
-        Function that returns the distance of the bob from the sensor, m, at a time, s.
-    sensor : VirtualSensor
-    rng : numpy.random.Generator
-        Generator of all random numbers.
-    """
+    """Takes readings of a bob whose distance in m is a function of the time in s; ``rng`` gives all random numbers."""
 
     def __init__(self, position: Callable[[float], float], sensor: VirtualSensor, rng: np.random.Generator) -> None:
         self.sensor = sensor
@@ -113,29 +70,20 @@ class VirtualRangefinder:
         self._cluster_remaining = 0
         self._cluster_m = 0.0
 
-    def shots(self) -> Iterator[Shot]:
-        """Yield consecutive readings, without end."""
-        sequence = 0
-        while True:
-            yield self.shot(sequence)
-            sequence += 1
-
     def shot(self, sequence: int) -> Shot:
         """Take the reading with a given sequence number; the numbers of successive calls must not decrease."""
         sensor = self.sensor
-        intended_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
-        moment = intended_s + (self._rng.normal(0.0, sensor.jitter_s) if sensor.jitter_s else 0.0)
+        true_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
         # The sound is reflected by the bob half the time of flight later.
-        met_s = moment + self._position(moment) / sensor.speed_of_sound_m_per_s
-        distance_m = self._position(met_s) + self._false_echo(moment) + self._rng.normal(0.0, sensor.noise_m)
-        distance_m = min(distance_m, sensor.far_limit_m)
+        met_s = true_s + self._position(true_s) / sensor.speed_of_sound_m_per_s
+        distance_m = self._position(met_s) + self._false_echo(true_s) + self._rng.normal(0.0, sensor.noise_m)
         flight_s = 2.0 * distance_m / sensor.speed_of_sound_m_per_s
         device_us = round(sequence / sensor.rate_hz * 1e6) % (1 << 32)
         if flight_s < sensor.dead_time_s:
-            return Shot(intended_s, sequence, device_us, math.nan, math.nan, sensor.temperature_c)
+            return Shot(true_s, sequence, device_us, math.nan, math.nan)
         echo_us = round(flight_s / sensor.tick_s) * sensor.tick_s * 1e6
         distance = 0.5e-6 * echo_us * sensor.speed_of_sound_m_per_s
-        return Shot(intended_s, sequence, device_us, echo_us, distance, sensor.temperature_c)
+        return Shot(true_s, sequence, device_us, echo_us, distance)
 
     def block(self, seconds: float) -> Block:
         """Return the readings of the first ``seconds`` of true time, for :class:`acquisition.replay.Replay`."""
@@ -145,8 +93,7 @@ class VirtualRangefinder:
         distance = np.array([shot.distance_m for shot in shots], np.float64)
         flags = np.isnan(distance) * np.uint8(Flag.MISSING)
         host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)
-        # The time of a sample is that of the reflection, by the sensor's clock. Without an echo, the last travel time
-        # is used.
+        # The time of a sample is that of the reflection; without an echo, the last travel time is used.
         ways_s = np.array([0.5e-6 * shot.echo_us for shot in shots], np.float64)
         t = np.arange(len(shots)) / self.sensor.rate_hz + carried(ways_s, np.isfinite(ways_s), 0.0)
         return Block(0, t, distance, flags, host_ns)
@@ -166,5 +113,5 @@ class VirtualRangefinder:
         # There is about one such turning point per second, so the rate is used as the probability at each.
         if now <= before and now < after and self._rng.random() < self.sensor.false_echo_rate_hz:
             self._cluster_remaining = int(self._rng.integers(3, 18))
-            self._cluster_m = self.sensor.false_echo_m * float(self._rng.uniform(0.5, 1.5))
+            self._cluster_m = FALSE_ECHO_M * float(self._rng.uniform(0.5, 1.5))
         return 0.0

@@ -15,8 +15,6 @@ from springmass.report.figures import amplitude_figure, render
 from springmass.report.figures.canvas import (
     BLUE,
     GREEN,
-    ORANGE,
-    PURPLE,
     VERMILLION,
     legend_above,
     panels,
@@ -75,8 +73,6 @@ def stability_figure() -> Figure:
         ("forward-euler", VERMILLION),
         ("symplectic-euler", BLUE),
         ("verlet", GREEN),
-        ("yoshida4", PURPLE),
-        ("rk4", ORANGE),
     )
     with style():
         figure, (panel,) = panels([3.8])
@@ -96,7 +92,7 @@ def stability_figure() -> Figure:
         panel.set_xlabel("damping ratio gamma / omega")
         panel.set_ylabel("largest stable step / radians")
         panel.set_xlim(ratios[0], ratios[-1])
-        legend_above(panel, 5)
+        legend_above(panel, 3)
         return figure
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from cyclopts import Group
 from cyclopts.argument import Argument
 
-from pipeline.findings.registry import FINDINGS, Symptom
+from pipeline.findings.finding import RANK, Kind, kinds
 from springmass.command_line import COMMANDS, app
 from springmass.glossary import TERMS
 from springmass.options import THE_PAGE
@@ -21,7 +21,6 @@ from springmass.runs.options import HOW_READ
 PAGE = Path(__file__).with_name("command-line.md")
 FINDINGS_PAGE = Path(__file__).with_name("findings.md")
 GLOSSARY_PAGE = Path(__file__).with_name("glossary.md")
-RANK = {"error": 0, "warning": 1, "info": 2}
 SHOWN = {"error": "error", "warning": "warning", "info": "note"}
 TABLE = re.compile(r"<!-- options of (?P<what>[\w ]+) -->\n.*?<!-- end -->\n", re.DOTALL)
 LIST = re.compile(r"<!-- commands -->\n.*?<!-- end -->\n", re.DOTALL)
@@ -135,13 +134,15 @@ def updated(page: str) -> str:
 
 def findings_page() -> str:
     """Return the page of findings, grouped by symptom and the gravest first."""
+    groups: dict[str, list[tuple[str, Kind]]] = {}
+    for code, kind in kinds().items():
+        groups.setdefault(kind.symptom, []).append((code, kind))
     parts = [HEAD]
-    for symptom in Symptom:
-        kinds = {code: kind for code, kind in FINDINGS.items() if kind.symptom is symptom}
-        parts.append(f"## {symptom.value}\n\n| code | severity | meaning | what to do |\n| --- | --- | --- | --- |")
-        for code, kind in sorted(kinds.items(), key=lambda item: (min(RANK[s] for s in item[1].severities), item[0])):
-            severity = " or ".join(SHOWN[one] for one in sorted(kind.severities, key=RANK.__getitem__))
-            parts.append(f"| `{code}` | {severity} | {kind.meaning} | {kind.advice or '-'} |")
+    for symptom, group in groups.items():
+        parts.append(f"## {symptom}\n\n| code | severity | meaning | what to do |\n| --- | --- | --- | --- |")
+        for code, kind in sorted(group, key=lambda item: (min(RANK[s] for s in item[1].severity), item[0])):
+            severity = " or ".join(SHOWN[one] for one in sorted(kind.severity, key=RANK.__getitem__))
+            parts.append(f"| `{code}` | {severity} | {kind.meaning} | {kind.advice[-1] or '-'} |")
         parts[-1] += "\n"
     return "\n".join([*parts, GONE])
 
@@ -156,4 +157,4 @@ if __name__ == "__main__":
     PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     FINDINGS_PAGE.write_text(findings_page(), encoding="utf-8")
     GLOSSARY_PAGE.write_text(glossary_page(), encoding="utf-8")
-    print(f"{len(COMMANDS)} commands, {len(FINDINGS)} finding codes, {len(TERMS)} terms")
+    print(f"{len(COMMANDS)} commands, {len(kinds())} finding codes, {len(TERMS)} terms")

@@ -6,18 +6,11 @@ from pipeline.bench.air import TYPICAL_HUMIDITY, TYPICAL_PRESSURE, TYPICAL_TEMPE
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 
-__all__ = ["ADDED_MASS_SHAPE", "added_mass_kg", "scene_air", "scene_air_density"]
-
-ADDED_MASS_SHAPE = 8.0 / 3.0  # added mass of a thin disc over rho a^3
+ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc over rho a^3: H. Lamb, "Hydrodynamics", 6th ed., 1932, art. 102
 
 
 def added_mass_kg(scene: Scene) -> float:
-    """Return the mass of air carried along by a thin disc that moves broadside on, :math:`(8/3)\\rho a^3`, kg.
-
-    References
-    ----------
-    H. Lamb, "Hydrodynamics", 6th ed., Cambridge 1932, art. 102.
-    """
+    """Return the mass of air carried along by a thin disc that moves broadside on, :math:`(8/3)\\rho a^3`, kg."""
     if scene.disc_diameter_m is None:
         return 0.0
     return ADDED_MASS_SHAPE * scene_air_density(scene) * (0.5 * scene.disc_diameter_m.value) ** 3

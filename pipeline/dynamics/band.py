@@ -1,82 +1,59 @@
 """The uncertainty band around the motion of a scene: quantiles of an ensemble drawn from the scene's uncertainties.
 
-If amplitude and phase change in proportion to each input, the members follow from linear propagation. Otherwise, for
-example if friction stops each bob at a different place, every member is solved.
+Each member is the closed form of the averaged motion, :math:`A(t)\\cos\\varphi(t)`, so that none has to be solved. Only
+differences between members count, in which the error of the average is common: the band's width is off by about one
+percent (``pytest -m trials tests/trials/test_bands.py``).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.bench.scene import Scene
+from pipeline.damping.laws.drag import amplitudes
 from pipeline.dynamics.problem import Problem, effective_mass_kg
-from pipeline.dynamics.sensitivity import STRETCH, Sensitivity, sensitivity, solved
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
 
-__all__ = ["LEVELS", "Band", "draw", "spread", "uncertain"]
+C16 = NDArray[np.complex128]
 
 LEVELS = ("low_95", "low_68", "high_68", "high_95")
 SHARES = (0.025, 0.158655, 0.841345, 0.975)  # share of the members below each level
-MEMBERS = 800  # default ensemble size; the share beyond an edge of the 95 % band then scatters by half a percent
-RADIANS = 0.2  # step of Strang splitting in rad; its error is common to all members and cancels in differences
-MOST_STEPS = 50_000  # maximum number of steps of a band
-MEMBERS_MOVED = 2500  # minimum ensemble size with linear propagation, which costs less
-REACH = 4.0  # minimum ratio of a nonnegative quantity to its uncertainty for linear propagation
-TURNS_COST = 5  # ratio of the times of a step with friction, which locates turning points, and without
+MEMBERS = 2000  # default ensemble size; the share inside the 95 % band then scatters by half a percent
+RADIANS = 0.4  # from one state to the next; between them the band is off by half a percent of its width (rms)
+MOST_STEPS = 25_000  # maximum number of states of a band
+STRETCH = 1000  # number of states in memory at a time
+STRONGEST = 0.9  # maximum ratio of decay rate and angular frequency at which a motion is an oscillation
 SIGNED = ("start_displacement_m", "start_velocity_m_per_s", "spring_cubic_n_per_m3", "air_temperature_c")
 POSITIVE = ("bob_mass_kg", "spring_constant_n_per_m")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Band:
-    """Quantiles of an ensemble, relative to the motion for the scene's values.
+    """Quantiles (4, n) of an ensemble at :data:`LEVELS`, relative to the motion for the scene's values."""
 
-    Parameters
-    ----------
-    quantities : tuple of str
-        The scene's attributes that are uncertain.
-    members, seed : int
-        Number of members and random seed of the ensemble.
-    t : (n,) float64, s
-    amplitude : (n,) float64, m
-        :math:`\\sqrt{y^2 + (v/\\omega_0)^2}` for the scene's values.
-    of_displacement, of_amplitude, of_phase : (4, n) float64, m, m and rad
-        The quantiles at :data:`LEVELS` minus the result for the scene's values.
-    sensitivity : Sensitivity
-        Contribution of each quantity.
-    linear : bool
-        Whether the members follow from these sensitivities; otherwise each member was solved.
-    """
-
-    quantities: tuple[str, ...]
+    quantities: tuple[str, ...]  # the scene's attributes that are uncertain
     members: int
     seed: int
     t: F8
-    amplitude: F8
+    middle: C16  # A e^(i phi) for the scene's values
+    of_log: C16  # (k, n): change of ln A + i phi when each quantity changes by its standard uncertainty
     of_displacement: F8
     of_amplitude: F8
     of_phase: F8
-    sensitivity: Sensitivity
-    linear: bool
 
     @property
     def relative_u(self) -> float:
         """Maximum half width of the displacement's 68 % band, relative to the starting amplitude; 0 if that is 0."""
-        half = 0.5 * float(np.max(self.of_displacement[2] - self.of_displacement[1]))
-        return half / float(self.amplitude[0]) if self.amplitude[0] > 0.0 else 0.0
-
-    @property
-    def words(self) -> str:
-        """Description of the method and of the uncertain quantities."""
-        how = "by linear propagation of" if self.linear else f"{self.members} motions drawn from"
-        return f"{how} the uncertainties of {', '.join(self.quantities)}"
+        half, start = 0.5 * float(np.max(self.of_displacement[2] - self.of_displacement[1])), float(abs(self.middle[0]))
+        return half / start if start > 0.0 else 0.0
 
     def displacement_at(self, t: F8) -> F8:
         """Return quantiles (4, k) in m of the displacement minus that for the scene's values, at times t (k,) in s."""
@@ -84,7 +61,7 @@ class Band:
 
     def amplitude_at(self, t: F8) -> tuple[F8, F8]:
         """Return the amplitude for the scene's values (k,) and its quantiles (4, k) in m, at times t (k,) in s."""
-        middle = self._between(self.amplitude, t)
+        middle = self._between(np.abs(self.middle), t)
         return middle, middle + self._between(self.of_amplitude, t)
 
     def phase_at(self, t: F8) -> F8:
@@ -92,10 +69,7 @@ class Band:
         return self._between(self.of_phase, t)
 
     def _between(self, curves: F8, t: F8) -> F8:
-        """Interpolate curves by cubic splines, with constant values before the first and after the last time.
-
-        If friction holds many bobs, linear interpolation would leave 2 % of them out of the band.
-        """
+        """Interpolate curves by cubic splines, with constant values before the first and after the last time."""
         from scipy.interpolate import CubicSpline
 
         return np.asarray(CubicSpline(self.t, curves, axis=-1)(np.clip(t, self.t[0], self.t[-1])))
@@ -104,12 +78,8 @@ class Band:
 def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
     """Return the quantities of a scene that are uncertain and affect the motion of its bob.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene; its quantities are assumed to be independent.
-    measured : Joint, optional
-        Joint estimate of some of the scene's attributes, which replaces the scene's own values and uncertainties.
+    The scene's quantities are independent. A joint estimate of some of its attributes replaces the scene's own values
+    and uncertainties.
     """
     together = measured or Joint((), np.empty(0), np.empty((0, 0)), ())
     alone: dict[str, Estimate] = {}
@@ -132,179 +102,113 @@ def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
 def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS, seed: int = 0) -> list[Problem]:
     """Return an ensemble of problems: first that of the scene's values, then members drawn from its uncertainties.
 
-    Parameters
-    ----------
-    scene, measured
-        As in :func:`uncertain`. A measured spring constant represents a measured frequency: its uncertainty is that
-        from the frequency alone, and its value is scaled in proportion to the drawn masses.
-    members, seed : int
-        Number of members and random seed.
+    The quantities are normally distributed and drawn on a Latin hypercube [1]_: the range of each is divided into as
+    many intervals of equal probability as there are members, and each interval is drawn once. Quantiles then scatter
+    less than with independent draws. Negative draws of a quantity that cannot be negative are set to 0.
 
-    Raises
-    ------
-    SceneError
-        If the scene lacks a value that a motion requires.
-    DynamicsError
-        If a mass or spring constant is drawn as 0 or less, or a member gives no valid problem.
-
-    Notes
-    -----
-    The quantities are normally distributed and drawn on a Latin hypercube [1]_. The range of each quantity is divided
-    into as many intervals of equal probability as there are members, and each interval is drawn once. Quantiles then
-    scatter less than with independent draws. Negative draws of a quantity that cannot be negative are set to 0.
-
-    References
-    ----------
     .. [1] M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239, doi:10.1080/00401706.1979.10489755.
     """
+    from scipy.special import ndtri
+
     joint = uncertain(scene, measured)
     u = np.sqrt(np.diag(joint.covariance))
-    drawn = joint.values + u * _normal(joint, members, seed)
+    scale = np.outer(u, u) + (u[:, None] * u == 0.0)
+    # The root of the correlations exists for a correlation of 1 too, whose singular matrix has no Cholesky factor.
+    squares, axes = np.linalg.eigh(joint.covariance / scale)
+    # Two lines, as scipy.stats.qmc takes 0.8 s to import.
+    shares = np.tile((np.arange(members) + 0.5) / members, (u.size, 1))
+    normal = ndtri(np.random.default_rng(seed).permuted(shares, axis=1))
+    drawn = joint.values + u * (axes @ (np.sqrt(np.maximum(squares, 0.0))[:, None] * (axes.T @ normal))).T
     return [Problem.from_scene(scene), *(_member(scene, joint, measured, values) for values in drawn.tolist())]
 
 
-def _normal(joint: Joint, members: int, seed: int) -> F8:
-    """Return standard normal numbers (members, k) with the correlations of a joint estimate, on a Latin hypercube."""
-    from scipy.special import ndtri
-
-    u = np.sqrt(np.diag(joint.covariance))
-    correlation = _correlation(joint) + 1e-12 * np.eye(
-        u.size
-    )  # required for a correlation of 1, whose singular matrix has no Cholesky factor
-    shares = np.tile((np.arange(members) + 0.5) / members, (u.size, 1))
-    normal = ndtri(np.random.default_rng(seed).permuted(shares, axis=1))
-    return np.asarray((np.linalg.cholesky(correlation) @ normal).T)
-
-
-def _correlation(joint: Joint) -> F8:
-    u = np.sqrt(np.diag(joint.covariance))
-    safe = np.where(u > 0.0, u, 1.0)
-    correlation = joint.covariance / np.outer(safe, safe)
-    correlation[u == 0.0, u == 0.0] = 1.0
-    return np.asarray(correlation)
-
-
 def _member(scene: Scene, joint: Joint, measured: Joint | None, values: list[float]) -> Problem:
-    """Return one member with the drawn values of the uncertain quantities."""
-    member = replace(scene, **_limited(joint, values))
+    """Return one member with the drawn values of the uncertain quantities.
+
+    A measured spring constant represents a measured frequency: its uncertainty is that from the frequency alone, and
+    its value is scaled in proportion to the drawn masses.
+    """
+    drawn: dict[str, Any] = {}
+    for name, value, unit in zip(joint.names, values, joint.units, strict=True):
+        if name in POSITIVE and value <= 0.0:
+            raise DynamicsError(
+                f"the uncertainty of {name}, {joint[name]}, reaches down to 0, where nothing moves; give a smaller one"
+            )
+        drawn[name] = Estimate(value if name in SIGNED else max(value, 0.0), 0.0, unit)
+    member = replace(scene, **drawn)
     if measured is not None and "spring_constant_n_per_m" in measured.names:
-        constant = member.spring_constant_n_per_m
-        assert constant is not None
+        constant = drawn["spring_constant_n_per_m"]
         share = effective_mass_kg(member) / effective_mass_kg(scene)
         member = replace(member, spring_constant_n_per_m=replace(constant, value=constant.value * share))
     return Problem.from_scene(member)
 
 
 def spread(
-    scene: Scene,
-    seconds: float,
-    measured: Joint | None = None,
-    *,
-    members: int = MEMBERS,
-    seed: int = 0,
-    ensemble: bool = False,
+    scene: Scene, seconds: float, measured: Joint | None = None, *, members: int = MEMBERS, seed: int = 0
 ) -> Band:
-    """Return the band around the motion of a scene.
-
-    Parameters
-    ----------
-    scene, measured, members, seed
-        As in :func:`draw`.
-    seconds : float
-        Duration, s.
-    ensemble : bool
-        Solve every member even if linear propagation is valid.
-
-    Raises
-    ------
-    SceneError, DynamicsError
-        As in :func:`draw`, and if the run exceeds 50,000 steps of 0.2 rad (10,000 steps with friction).
-    """
+    """Return the band around the motion of a scene over some seconds, drawn as by :func:`draw`."""
     joint = uncertain(scene, measured)
-    middle = Problem.from_scene(scene)
-    step_s = RADIANS / middle.equation.angular_frequency_per_s
+    ensemble = draw(scene, measured, members=members, seed=seed)
+    shifts = np.concatenate([sign * np.diag(np.sqrt(np.diag(joint.covariance))) for sign in (1.0, -1.0)])
+    ensemble += [_member(scene, joint, measured, values) for values in (joint.values + shifts).tolist()]
+    step_s = RADIANS / ensemble[0].equation.angular_frequency_per_s
     steps = max(1, math.ceil(seconds / step_s))
-    most = MOST_STEPS // TURNS_COST if middle.equation.friction_m_per_s2 else MOST_STEPS
-    if steps > most:
-        raise DynamicsError(
-            f"a band of {seconds:g} s takes {steps} steps, more than {most}; ask for at most {most * step_s:.3g} s"
-        )
-    found = sensitivity(joint.names, middle, _shifted(scene, joint, measured), step_s, steps)
-    linear = found.holds and not ensemble and not _reaches_zero(joint)
-    if linear:
-        members = max(members, MEMBERS_MOVED)
-        parts = list(_moved(found, _correlation(joint), _normal(joint, members, seed)))
-    else:
-        parts = list(_solved(draw(scene, measured, members=members, seed=seed), step_s, steps))
-    of_displacement, of_amplitude, of_phase = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
-    amplitude = np.abs(found.middle)
-    return Band(joint.names, members, seed, found.t, amplitude, of_displacement, of_amplitude, of_phase, found, linear)
+    if steps > MOST_STEPS:
+        raise DynamicsError(f"a band of {seconds:g} s is too long; ask for at most {MOST_STEPS * step_s:.3g} s")
+    t = step_s * np.arange(steps + 1.0)
+    parts = [_quantiles(*stretch, members) for stretch in _motions(ensemble, t)]
+    middle, of_log, *levels = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
+    return Band(joint.names, members, seed, t, middle, of_log, *levels)
 
 
-def _shifted(scene: Scene, joint: Joint, measured: Joint | None) -> list[Problem]:
-    """Return two problems per quantity: with the quantity alone increased, then decreased, by its uncertainty."""
-    found = []
-    for row, u in enumerate(np.sqrt(np.diag(joint.covariance)).tolist()):
-        for sign in (1.0, -1.0):
-            values = joint.values.copy()
-            values[row] += sign * u
-            found.append(_member(scene, joint, measured, values.tolist()))
-    return found
+def _quantiles(y: F8, amplitude: F8, phase: F8, members: int) -> tuple[Any, ...]:
+    """Return the middle, the changes with each quantity, and the quantiles of displacement, amplitude and phase.
 
-
-def _reaches_zero(joint: Joint) -> bool:
-    """Return whether a quantity that cannot be negative is near enough to 0 for some draws to be set to 0."""
-    u = np.sqrt(np.diag(joint.covariance))
-    return any(
-        name not in SIGNED and value < REACH * each
-        for name, value, each in zip(joint.names, joint.values, u, strict=True)
-    )
-
-
-def _moved(found: Sensitivity, correlation: F8, normal: F8) -> Iterator[tuple[F8, F8, F8]]:
-    """Yield the quantiles from linear propagation for successive blocks of steps.
-
-    The quantiles of the displacement are those of members computed with the sensitivities. Phase and logarithm of the
-    amplitude are sums of normal inputs, so that their quantiles follow in closed form.
+    The motions (k, n) are that of the scene's values, the members, and those with each quantity shifted up, then down.
     """
-    from scipy.special import ndtri
-
-    edges = ndtri(SHARES)[:, None]
-    for start in range(0, found.t.size, STRETCH):
-        columns = slice(start, start + STRETCH)
-        middle, of_log = found.middle[columns], found.of_log[:, columns]
-        grown, turned = (np.sqrt(np.sum(part * (correlation @ part), axis=0)) for part in (of_log.real, of_log.imag))
-        amplitude = np.abs(middle)
-        members = amplitude * np.exp(normal @ of_log.real) * np.cos(np.angle(middle) + normal @ of_log.imag)
-        yield _quantiles(members, middle.real), amplitude * np.expm1(edges * grown), edges * turned
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log = np.log(amplitude[members + 1 :] / amplitude[0]) + 1j * (phase[members + 1 :] - phase[0])
+    ahead, behind = np.split(np.where(np.isfinite(log), log, 0.0), 2)
+    found = [
+        np.quantile(each[1 : members + 1], SHARES, axis=0, method="hazen") - each[0] for each in (y, amplitude, phase)
+    ]
+    return amplitude[0] * np.exp(1j * phase[0]), 0.5 * (ahead - behind), *found
 
 
-def _solved(ensemble: list[Problem], step_s: float, steps: int) -> Iterator[tuple[F8, F8, F8]]:
-    """Yield the quantiles of solved members for successive blocks of steps."""
-    last: F8 = np.zeros((len(ensemble) - 1, 1))
-    for states in solved(ensemble, step_s, steps):
-        turned = np.angle(states[1:] * np.conj(states[0]))
-        phase = np.unwrap(np.concatenate([last, turned], axis=1), axis=1)[:, 1:]
-        last = phase[:, -1:]
-        yield (
-            _quantiles(states[1:].real, states[0].real),
-            _quantiles(np.abs(states[1:]), np.abs(states[0])),
-            _quantiles(phase, np.zeros(states.shape[1])),
-        )
+def _motions(problems: Sequence[Problem], t: F8) -> Iterator[tuple[F8, F8, F8]]:
+    """Yield displacements, amplitudes and phases (k, n) of the averaged motions of k problems, stretch by stretch.
 
-
-def _quantiles(members: F8, middle: F8) -> F8:
-    """Return the quantiles (4, n) of members minus the middle, by Hazen's method, which matches the hypercube."""
-    return np.asarray(np.quantile(members, SHARES, axis=0, method="hazen") - middle)
-
-
-def _limited(joint: Joint, values: list[float]) -> dict[str, Any]:
-    """Return the drawn values by attribute of the scene, with negative values set to 0 where they are impossible."""
-    found = {}
-    for name, value, unit in zip(joint.names, values, joint.units, strict=True):
-        if name in POSITIVE and value <= 0.0:
-            raise DynamicsError(
-                f"the uncertainty of {name}, {joint[name]}, reaches down to 0, where nothing moves; give a smaller one"
-            )
-        found[name] = Estimate(value if name in SIGNED else max(value, 0.0), 0.0, unit)
-    return found
+    The amplitude is that of :math:`y = A\\cos\\varphi` with :math:`A\\sin\\varphi = -(v + \\lambda y)/\\omega_d`,
+    :math:`\\lambda = \\gamma + \\beta A + \\mu/A` and :math:`\\omega_d^2 = \\omega^2 - \\lambda^2` at the start. It
+    falls by :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)`. The phase turns by :math:`\\sqrt{\\omega^2-\\gamma^2}`
+    :math:`+ 3cA^2/8\\omega`. Friction holds the bob from the first turning point within :math:`\\pi\\mu/2\\omega`.
+    """
+    omega = np.array([each.equation.angular_frequency_per_s for each in problems])
+    gamma, beta, mu = np.array([each.equation.laws() for each in problems]).T
+    y, v = np.array([(each.displacement_m, each.velocity_m_per_s) for each in problems]).T
+    start = np.maximum(np.hypot(y, v / omega), np.finfo(np.float64).tiny)
+    rate = gamma + beta * start + np.where(mu < start * omega, mu / start, 0.0)
+    if np.max(rate / omega) > STRONGEST:
+        raise DynamicsError("a band is that of an oscillation, and this drag is too strong for one")
+    side = -(v + rate * y) / np.sqrt(omega**2 - rate**2)
+    laws, phase = np.stack([np.hypot(y, side), mu, gamma, beta], axis=1), np.arctan2(side, y)[:, None]
+    phase -= 2.0 * np.pi * np.round((phase - phase[0]) / (2.0 * np.pi))
+    speed, stuck = np.sqrt(omega**2 - gamma**2)[:, None], (0.5 * math.pi * mu / omega)[:, None]
+    bend = (0.375 / omega * [each.equation.cubic_per_m2_s2 for each in problems])[:, None]
+    stop, rest = np.full_like(phase, np.inf), np.zeros_like(phase)
+    passed = np.diff(t, prepend=0.0)
+    for row in range(0, t.size, STRETCH):
+        rows = slice(row, row + STRETCH)
+        amplitude = amplitudes(t[rows], laws)
+        phase = phase[:, -1:] + np.cumsum((speed + bend * amplitude**2) * passed[rows], axis=1)
+        near = amplitude <= stuck
+        first = np.argmax(near, axis=1)[:, None]
+        stops = near.any(axis=1, keepdims=True) & (mu[:, None] > 0.0) & np.isinf(stop)
+        at = np.take_along_axis(phase, first, axis=1)
+        turn = np.pi * np.ceil(at / np.pi)
+        stop = np.where(stops, turn, stop)
+        # Within half a turn the amplitude would fall by twice the distance within which friction holds.
+        rest = np.where(stops, stuck * np.cos(turn) * (1.0 - 2.0 * (turn - at) / np.pi), rest)
+        held = phase >= stop
+        amplitude, phase = np.where(held, np.abs(rest), amplitude), np.minimum(phase, stop)
+        yield np.where(held, rest, amplitude * np.cos(phase)), amplitude, phase

@@ -3,68 +3,48 @@
 1. Solve with a step h and with h / 2. The maximum difference of the two runs is the stated error of the finer one.
 2. Halve the step until the stated error is within the tolerance.
 3. If two halvings do not reduce the difference, only rounding remains, and the tolerance is refused.
-4. Methods of scipy choose their own steps; for them the tolerance is divided by ten instead of halving the step.
-
-:func:`auto` evaluates the exact flow of a linear scene. It solves every other scene by Strang splitting. If that cannot
-reach the tolerance and there is no friction, it uses DOP853.
+4. DOP853 chooses its own steps; there the tolerance is divided by ten instead of halving the step.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.dynamics.exact import EXACT
+from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
 from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.rounding import least_tolerance, rounding_error
 from pipeline.dynamics.solve_ivp import DOP853, LEAST_RTOL, SolveIvp
 from pipeline.dynamics.strang import STRANG
 from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
 
-__all__ = ["Solution", "auto", "demand_tolerance", "halved", "solved_once"]
-
 LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
 MOST_STEPS = 2**25  # maximum number of steps of one run, about ten seconds; the finest run takes half of the total time
+LEAST_TOLERANCE = 1e-13
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
     """A solved motion with its stated error.
 
-    Parameters
-    ----------
-    integrator : Integrator
-    parts : int
-        Number of steps from one kept state to the next.
-    problem : Problem
-        The problem that was solved; from :func:`auto` it has only the terms that the tolerance requires.
-    trajectory : Trajectory
-    error, velocity_error : float or None
-        Stated error of the displacement relative to the starting amplitude, and of the velocity relative to that
-        amplitude times the angular frequency. They include the effect of omitted terms; None if halving cannot
-        estimate them.
-    no_estimate : str
-        Why there is no estimate; empty if there is one.
-    running_s : float
-        Running time of the returned run, s.
-    terms : tuple of Term
-        The decision on each term; empty for a method selected by name, which solves all terms.
+    The errors of displacement and velocity are relative to the starting amplitude and its product with the angular
+    frequency, and include the effect of omitted terms; they are None if halving cannot estimate them.
     """
 
     integrator: Integrator
-    parts: int
-    problem: Problem
+    parts: int  # steps from one kept state to the next
+    problem: Problem  # from auto with the terms that the tolerance requires only
     trajectory: Trajectory
     error: float | None
     velocity_error: float | None
     no_estimate: str = ""
-    running_s: float = 0.0
-    terms: tuple[Term, ...] = ()
+    running_s: float = 0.0  # of the returned run
+    terms: tuple[Term, ...] = ()  # the decision on each; empty for a method by name, which solves all terms
 
     @property
     def step_s(self) -> float:
@@ -76,6 +56,9 @@ def auto(
     problem: Problem, spacing_s: float, count: int, tolerance: float, timer: Callable[[], float] = lambda: 0.0
 ) -> Solution:
     """Solve a motion to a tolerance, with only the terms that the tolerance requires.
+
+    The exact flow solves a linear scene, Strang splitting every other one. If that cannot reach the tolerance and there
+    is no friction, it is DOP853.
 
     Parameters
     ----------
@@ -93,38 +76,21 @@ def auto(
     ------
     DynamicsError
         If the tolerance is below the limit of double precision, or no method reaches it.
-
-    Examples
-    --------
-    >>> from pipeline.dynamics.equation import Equation
-    >>> mixed = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
-    >>> solution = auto(mixed, 0.01, 1200, 1e-6)
-    >>> solution.integrator.name, solution.error <= 1e-6
-    ('strang', True)
     """
     demand_tolerance(problem, spacing_s, count, tolerance)
     less, terms = required(problem, spacing_s * count, tolerance)
     left_out = sum(term.size for term in terms if not term.included)
-    room = tolerance - left_out
 
-    def by(integrator: Integrator) -> Solution:
-        found = halved(less, integrator, spacing_s, count, room, timer)
-        assert found.error is not None
-        assert found.velocity_error is not None
-        return replace(found, error=found.error + left_out, velocity_error=found.velocity_error + left_out, terms=terms)
-
-    if less.equation.is_linear:
-        return by(EXACT)
+    chosen = EXACT if less.equation.is_linear else STRANG
     try:
-        return by(STRANG)
+        found = halved(less, chosen, spacing_s, count, tolerance - left_out, timer)
     except DynamicsError:
-        if less.equation.friction_m_per_s2:
+        if less.equation.friction_m_per_s2 or less.equation.is_linear:
             raise
-    try:
-        return by(DOP853)
-    except DynamicsError as error:
-        refused = f"neither strang nor dop853 keeps a tolerance of {tolerance:.3g} here"
-        raise DynamicsError(f"{refused}; take a larger tolerance or a shorter run") from error
+        found = halved(less, DOP853, spacing_s, count, tolerance - left_out, timer)
+    assert found.error is not None
+    assert found.velocity_error is not None
+    return replace(found, error=found.error + left_out, velocity_error=found.velocity_error + left_out, terms=terms)
 
 
 def halved(
@@ -137,59 +103,37 @@ def halved(
 ) -> Solution:
     """Solve a motion by one method and halve its step until the stated error is within a tolerance.
 
-    Parameters
-    ----------
-    problem, spacing_s, count, tolerance, timer
-        As in :func:`auto`.
-    integrator : Integrator
-
-    Raises
-    ------
-    DynamicsError
-        If the method cannot solve this problem or has no error estimate, if the difference no longer decreases, or if
-        too many steps are needed.
-
-    Notes
-    -----
-    With an error of :math:`c h^p` the difference is :math:`2^p - 1` times the error of the finer run. The rounding
-    error of the phase is common to both runs and is therefore added.
+    With an error of :math:`c h^p` the difference of two runs is :math:`2^p - 1` times the error of the finer run. The
+    rounding error of the phase is common to both runs and is therefore added.
     """
     demand_times(spacing_s, spacing_s * count)
-    if integrator.refusal(problem):
-        raise DynamicsError(f"{integrator.name} cannot solve this: {integrator.refusal(problem)}")
-    why = integrator.no_estimate(problem)
-    refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here: "
+    refused = f"{integrator.name} cannot keep a tolerance of {tolerance:.3g} here"
+    why = integrator.refusal(problem) or integrator.no_estimate(problem)
     if why:
-        raise DynamicsError(refused + why)
+        raise DynamicsError(f"{refused}: {why}")
     rounding = rounding_error(problem, spacing_s * count)
     if integrator is EXACT:
-        started = timer()
-        run = EXACT.run(problem, spacing_s, count)
+        started, run = timer(), EXACT.run(problem, spacing_s, count)
         return Solution(EXACT, 1, problem, run, rounding, rounding, running_s=timer() - started)
-    coarse, moving = None, count
-    errors = [math.inf]
+    coarse, errors = None, [math.inf]
     for setting, parts in _settings(integrator, problem, spacing_s, count, tolerance):
-        if parts * moving > MOST_STEPS:
-            break
-        started = timer()
-        fine = _run(setting, problem, spacing_s, count, parts)
+        started, fine = timer(), None
+        with contextlib.suppress(DynamicsError):  # too long a step may overflow
+            fine = setting.run(problem, spacing_s / parts, count * parts, every=parts)
         running_s = timer() - started
-        if fine is not None:
-            moving = 1 + int(np.count_nonzero(fine.v))  # number of states before friction holds the bob
         if coarse is not None and fine is not None:
             error, velocity_error = (each + rounding for each in _difference(fine, coarse))
             if error <= tolerance:
                 return Solution(setting, parts, problem, fine, error, velocity_error, running_s=running_s)
             errors.append(error)
             if error >= errors[-3:][0]:
-                raise DynamicsError(
-                    f"{refused}rounding leaves {min(errors):.2g}; take a larger tolerance or a shorter run"
-                )
-            if _needed(setting, parts * moving, error / tolerance) > MOST_STEPS:
+                refused += f": rounding leaves {min(errors):.2g}"
+                break
+            if integrator.order and parts * count * (error / tolerance) ** (1.0 / integrator.order) > MOST_STEPS:
+                refused += ": it needs too many steps"
                 break
         coarse = fine
-    why = "it needs too many steps" if integrator.order else f"at its least tolerance {min(errors):.2g} is left"
-    raise DynamicsError(f"{refused}{why}; take a larger tolerance or a shorter run")
+    raise DynamicsError(f"{refused}; take a larger tolerance or a shorter run")
 
 
 def solved_once(
@@ -197,18 +141,6 @@ def solved_once(
 ) -> Solution:
     """Solve a motion with the spacing as the step, and estimate the error from a second run with half this step.
 
-    Parameters
-    ----------
-    problem, integrator, spacing_s, count, timer
-        As in :func:`halved`; the integrator must be a method of fixed step.
-
-    Raises
-    ------
-    DynamicsError
-        If the method cannot solve this problem, or the solution overflows.
-
-    Notes
-    -----
     With an error of :math:`c h^p` the error of the run with the longer step h is :math:`2^p / (2^p - 1)` times the
     difference.
     """
@@ -218,30 +150,27 @@ def solved_once(
     why = integrator.no_estimate(problem)
     if why:
         return Solution(integrator, 1, problem, run, None, None, why, running_s)
-    finer = _run(integrator, problem, spacing_s, count, 2)
-    if finer is None:
-        return Solution(integrator, 1, problem, run, math.inf, math.inf, running_s=running_s)
+    apart = (math.inf, math.inf)
+    with contextlib.suppress(DynamicsError):  # too long a step may overflow
+        apart = _difference(run, integrator.run(problem, 0.5 * spacing_s, 2 * count, every=2))
     share, rounding = 2.0**integrator.order / (2.0**integrator.order - 1.0), rounding_error(problem, spacing_s * count)
-    error, velocity_error = (share * each + rounding for each in _difference(run, finer))
+    error, velocity_error = (share * each + rounding for each in apart)
     return Solution(integrator, 1, problem, run, error, velocity_error, running_s=running_s)
 
 
-def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: float) -> None:
-    """Refuse a tolerance that no integrator can reach.
+def rounding_error(problem: Problem, seconds: float) -> float:
+    """Return the error of the displacement by rounding of the phase :math:`\\omega t`, relative to the amplitude."""
+    return float(np.finfo(np.float64).eps) * (4.0 + problem.equation.angular_frequency_per_s * seconds)
 
-    Raises
-    ------
-    DynamicsError
-        If the tolerance is not finite or is below the limit of double precision, or if a time is out of range.
-    """
+
+def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: float) -> None:
+    """Refuse a tolerance that double precision cannot reach: below twice the rounding of the phase, or 1e-13."""
     seconds = spacing_s * count
     demand_times(spacing_s, seconds)
-    least = least_tolerance(problem, seconds)
-    if not (math.isfinite(tolerance) and tolerance >= least):
-        raise DynamicsError(
-            f"the tolerance must be finite and at least {least:.1e}, what double precision can reach in {seconds:g} s, "
-            f"got {tolerance:g}"
-        )
+    least = max(LEAST_TOLERANCE, 2.0 * rounding_error(problem, seconds))
+    if not least <= tolerance < math.inf:
+        reach = f"at least {least:.1e}, what double precision can reach in {seconds:g} s"
+        raise DynamicsError(f"the tolerance must be finite and {reach}, got {tolerance:g}")
 
 
 def _settings(
@@ -252,38 +181,21 @@ def _settings(
     if isinstance(integrator, SolveIvp):
         # The errors of all steps accumulate, and a step is about one radian.
         rtol = max(min(tolerance / (1.0 + omega * spacing_s * count), 1e-3), 10.0 * LEAST_RTOL)
-        while rtol >= LEAST_RTOL:
-            yield replace(integrator, rtol=rtol), 1
-            rtol *= 0.1
+        yield from (
+            (replace(integrator, rtol=rtol / tens), 1) for tens in 10.0 ** np.arange(14) if rtol / tens >= LEAST_RTOL
+        )
         return
     # Drag stronger than the spring has its own, shorter time scale, which the step must resolve.
     fast = omega * (1.0 + problem.equation.drag_per_m * problem.amplitude_m())
-    limit = integrator.stable_step(problem) or math.inf
-    parts = math.floor(min(max(spacing_s * fast / LONGEST_STEP, spacing_s / limit), MOST_STEPS)) + 1
-    while True:
+    longest = min(LONGEST_STEP / fast, integrator.stable_step(problem) or math.inf)
+    parts = math.floor(min(spacing_s / longest, MOST_STEPS)) + 1
+    while parts * count <= MOST_STEPS:
         yield integrator, parts
         parts *= 2
 
 
-def _run(integrator: Integrator, problem: Problem, spacing_s: float, count: int, parts: int) -> Trajectory | None:
-    """Return a run; None if a method of fixed step fails, as it may overflow with too long a step."""
-    try:
-        return integrator.run(problem, spacing_s / parts, count * parts, every=parts)
-    except DynamicsError:
-        if not integrator.order:
-            raise
-        return None
-
-
 def _difference(one: Trajectory, other: Trajectory) -> tuple[float, float]:
     """Return the maximum differences of displacement and velocity, relative to amplitude and speed at the start."""
-    size = one.problem.amplitude_m()
-    if size == 0.0:
-        return 0.0, 0.0
+    size = one.problem.amplitude_m() or 1.0
     speed = size * one.problem.equation.angular_frequency_per_s
     return float(np.max(np.abs(one.y - other.y))) / size, float(np.max(np.abs(one.v - other.v))) / speed
-
-
-def _needed(integrator: Integrator, steps: int, times: float) -> float:
-    """Return the number of steps that the order of the method requires for an error smaller by a factor ``times``."""
-    return float(steps * times ** (1.0 / integrator.order)) if integrator.order else 0.0

@@ -5,29 +5,17 @@ from __future__ import annotations
 import itertools
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.equation import Equation, Real
+from pipeline.dynamics.equation import LARGEST
 from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
-__all__ = ["Integrator", "Step", "StepMaker", "Trajectory", "demand_times", "kept", "with_start"]
-
-SHORTEST_S, LONGEST_S = 1e-100, 1e100
-STRETCH = 1_000_000  # approximate number of states buffered before every n-th one is kept
-
-Step = Callable[[Real, Real], tuple[Real, Real]]
-"""One step: takes displacement and velocity before the step and returns those after it."""
-
-StepMaker = Callable[[Equation, Real], Step]
-"""Takes an equation and a step in s and returns the function of one step.
-
-With an array of steps (n,) the function makes one step of each length.
-"""
+RANAWAY = 1e100  # m or m/s, below which an energy is still a number
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +41,7 @@ class Integrator(ABC):
         return ""
 
     def stable_step(self, problem: Problem) -> float:  # noqa: ARG002 - for some it depends on the problem
-        """Return the largest step in s at which no free motion grows; inf if every step is stable, 0 if none is."""
+        """Return the step in s beyond which free motion is known to grow; inf if none is known, 0 if every step is."""
         return math.inf
 
     def no_estimate(self, problem: Problem) -> str:  # noqa: ARG002 - for some it depends on the problem
@@ -62,26 +50,13 @@ class Integrator(ABC):
 
     @abstractmethod
     def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
-        """Return displacements and velocities (n,) at the start and after every ``every`` steps, in problem units."""
+        """Return displacements and velocities (n,) at the start and after every ``every`` steps, m and m/s."""
 
     def run(self, problem: Problem, step_s: float, steps: int, *, every: int = 1) -> Trajectory:
-        """Solve a problem in units near its amplitude, with checks of the arguments and of the result.
+        """Solve a problem by some steps of a length in s, of which every n-th is kept.
 
-        Parameters
-        ----------
-        problem : Problem
-        step_s : float
-            Step, s.
-        steps : int
-            Number of steps.
-        every : int
-            Number of steps from one kept state to the next; it must divide ``steps``.
-
-        Raises
-        ------
-        DynamicsError
-            If the step or the number of steps is invalid, the method cannot solve this problem, or the solution
-            overflows.
+        A :class:`DynamicsError` says what is wrong with the step or the number of steps, why the method cannot solve
+        this problem, or that the solution overflows.
         """
         demand_times(step_s, step_s * steps)
         if steps < 1 or every < 1 or steps % every:
@@ -91,29 +66,16 @@ class Integrator(ABC):
         why = self.refusal(problem)
         if why:
             raise DynamicsError(f"{self.name} cannot solve this: {why}")
-        scaled, unit = problem.scaled()
+        ran_away, remedy = f"{self.name} ran beyond the range of numbers", "take a shorter step, or auto"
         with np.errstate(all="ignore"):
             try:
-                y, v = self.march(scaled, step_s, steps, every)
+                y, v = self.march(problem, step_s, steps, every)
             except (OverflowError, ZeroDivisionError) as error:
-                raise DynamicsError(
-                    f"{self.name} ran beyond the range of numbers ({error}); {self._remedy(problem)}"
-                ) from error
-            y *= unit
-            v *= unit
-        fine = np.isfinite(y) & np.isfinite(v)
+                raise DynamicsError(f"{ran_away} ({error}); {remedy}") from error
+        fine = (np.abs(y) < RANAWAY) & (np.abs(v) < RANAWAY)
         if not fine.all():
-            first = step_s * every * int(np.argmin(fine))
-            raise DynamicsError(
-                f"{self.name} ran beyond the range of numbers by t = {first:g} s; {self._remedy(problem)}"
-            )
+            raise DynamicsError(f"{ran_away} by t = {step_s * every * int(np.argmin(fine)):g} s; {remedy}")
         return Trajectory(problem, step_s * every, y, v)
-
-    def _remedy(self, problem: Problem) -> str:
-        limit = self.stable_step(problem)
-        if 0 < limit < np.inf:
-            return f"take a step of at most {limit:.3g} s, or {'auto' if self.name == 'strang' else 'strang'}"
-        return "take a shorter run, or strang or auto"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,72 +109,37 @@ class Trajectory:
         The cubic Hermite interpolation through displacements and velocities errs by at most (omega spacing)^4 / 384 of
         the amplitude. For equal spacings it takes 0.4 of the time of scipy.interpolate.CubicHermiteSpline, which a fit
         would have to import first.
-
-        Raises
-        ------
-        DynamicsError
-            For a time that is not a number, or a displacement that overflows.
         """
-        with np.errstate(all="ignore"):
-            place = np.clip(np.asarray(t) / self.spacing_s, 0.0, len(self.y) - 1.0)
-            if np.any(np.isnan(place)):
-                raise DynamicsError("the times asked for must be numbers, got NaN")
-            row = np.minimum(place.astype(np.intp), len(self.y) - 2)
-            x = place - row
-            y, v = self.y, self.v * self.spacing_s
-            rise = x * x * (3.0 - 2.0 * x)
-            bends = x * (1.0 - x) * ((1.0 - x) * v[row] - x * v[row + 1])
-            found = np.asarray((1.0 - rise) * y[row] + rise * y[row + 1] + bends)
-        if not np.all(np.isfinite(found)):
-            raise DynamicsError("between its states the displacement leaves the range of numbers; take a finer spacing")
-        return found
+        place = np.clip(np.asarray(t) / self.spacing_s, 0.0, len(self.y) - 1.0)
+        row = np.minimum(place.astype(np.intp), len(self.y) - 2)
+        x = place - row
+        y, v = self.y, self.v * self.spacing_s
+        rise = x * x * (3.0 - 2.0 * x)
+        bends = x * (1.0 - x) * ((1.0 - x) * v[row] - x * v[row + 1])
+        return np.asarray((1.0 - rise) * y[row] + rise * y[row + 1] + bends)
 
     def relative_energy(self) -> F8:
-        """Return the mechanical energy (n,) relative to that at the start; 1 if the start has no energy.
-
-        The state is scaled before it is squared, so that the result is correct for every representable amplitude.
-        """
-        scaled, unit = self.problem.scaled()
-        with np.errstate(over="ignore", invalid="ignore"):
-            now = _energy(scaled, self.y / unit, self.v / unit)
-            start = _energy(scaled, np.asarray(scaled.displacement_m), np.asarray(scaled.velocity_m_per_s))
-            relative = now / start if start > 0.0 else np.ones_like(now)
-        if not np.all(np.isfinite(relative)):
-            raise DynamicsError("the energy grew beyond the range of numbers; take fewer steps or another method")
-        return relative
+        """Return the mechanical energy (n,) relative to that at the start; 1 if the start has none, inf on overflow."""
+        size, eq = self.problem.amplitude_m(), self.problem.equation
+        if size == 0.0:
+            return np.ones(len(self.y))
+        # In units of the amplitude, so that no small one is lost in its square.
+        y, v = self.y / size, self.v / (size * eq.angular_frequency_per_s)
+        cubic = 0.5 * eq.cubic_per_m2_s2 * (size / eq.angular_frequency_per_s) ** 2
+        with np.errstate(over="ignore"):
+            energy = v**2 + y**2 * (1.0 + cubic * y**2)
+        return np.asarray(energy / energy[0])
 
 
-def _energy(problem: Problem, y: F8, v: F8) -> F8:
-    eq = problem.equation
-    energy = 0.5 * (v**2 + (eq.angular_frequency_per_s * y) ** 2)
-    return np.asarray(energy + 0.25 * eq.cubic_per_m2_s2 * y**4 if eq.cubic_per_m2_s2 else energy)
-
-
-def kept(states: Iterator[float], steps: int, every: int) -> F8:
-    """Return the states (n, 2) after every ``every`` steps, from displacements and velocities in alternation."""
-    stretch = every * max(1, STRETCH // every)
-    parts = []
-    for start in range(0, steps, stretch):
-        found = np.fromiter(itertools.islice(states, 2 * min(stretch, steps - start)), np.float64).reshape(-1, 2)
-        parts.append(found[every - 1 :: every].copy())
-        if len(found) < stretch:
-            break
-    return np.concatenate(parts)
-
-
-def with_start(problem: Problem, y: F8, v: F8) -> tuple[F8, F8]:
-    """Return displacements and velocities (n + 1,) with the start state prepended to the given ones (n,)."""
-    return np.concatenate([[problem.displacement_m], y]), np.concatenate([[problem.velocity_m_per_s], v])
+def kept(problem: Problem, states: Iterator[float], count: int) -> tuple[F8, F8]:
+    """Return the start and ``count`` later states from an iterator of displacements and velocities in alternation."""
+    start = (problem.displacement_m, problem.velocity_m_per_s)
+    found = np.fromiter(itertools.chain(start, itertools.islice(states, 2 * count)), np.float64, 2 * count + 2)
+    return found[0::2].copy(), found[1::2].copy()
 
 
 def demand_times(step_s: float, seconds: float) -> None:
-    """Refuse a step or a duration that is not positive or is outside the allowed range.
-
-    Raises
-    ------
-    DynamicsError
-        For a step or a duration outside 1e-100 to 1e100 s.
-    """
+    """Refuse a step or a duration that is not positive or beyond every bench."""
     for name, value in (("step", step_s), ("duration", seconds)):
-        if not SHORTEST_S <= value <= LONGEST_S:
-            raise DynamicsError(f"the {name} must be between {SHORTEST_S:g} and {LONGEST_S:g} s, got {value!r}")
+        if not 1.0 / LARGEST <= value <= LARGEST:
+            raise DynamicsError(f"the {name} must be between {1.0 / LARGEST:g} and {LARGEST:g} s, got {value!r}")

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
-from pipeline.dynamics.equation import Equation, double
+from pipeline.dynamics.equation import Equation, demand_number
 from pipeline.errors import DynamicsError, SceneError
 from pipeline.numerics.estimate import Estimate
-
-__all__ = ["Problem", "effective_mass_kg"]
-
-_MOST_FRICTION = 1e300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,13 +28,8 @@ class Problem:
     Raises
     ------
     DynamicsError
-        If a start value is not a finite number of double precision, if the amplitude overflows, or if the start lets a
-        softening spring stretch beyond the point up to which it pulls back.
-
-    Examples
-    --------
-    >>> Problem(Equation(angular_frequency_per_s=8.0), 0.03, 0.32).amplitude_m()
-    0.05
+        If a start value is no number or too large, or if the start lets a softening spring stretch beyond the point up
+        to which it pulls back.
     """
 
     equation: Equation
@@ -47,68 +38,30 @@ class Problem:
 
     def __post_init__(self) -> None:
         for name in ("displacement_m", "velocity_m_per_s"):
-            object.__setattr__(self, name, double(getattr(self, name), name))
-        self._demand_amplitude()
-        self._demand_bound()
+            object.__setattr__(self, name, demand_number(getattr(self, name), name))
+        eq = self.equation
+        if eq.cubic_per_m2_s2 >= 0.0:
+            return
+        reach = eq.angular_frequency_per_s / math.sqrt(-eq.cubic_per_m2_s2)
+        y, v = abs(self.displacement_m) / reach, abs(self.velocity_m_per_s) / eq.angular_frequency_per_s / reach
+        # Within reach, and without the energy to leave it.
+        if not (y < 1.0 and v * v + y * y * (1.0 - 0.5 * y * y) < 0.5):
+            raise DynamicsError(
+                f"a softening spring holds its bob within {reach:g} m of rest, the start at {self.displacement_m:g} m "
+                "is too far or too fast; start nearer, or take a smaller cubic term"
+            )
 
     def amplitude_m(self) -> float:
         """Return the amplitude of the undamped linear oscillation with this initial state, m."""
         return math.hypot(self.displacement_m, self.velocity_m_per_s / self.equation.angular_frequency_per_s)
 
-    def scaled(self) -> tuple[Problem, float]:
-        """Return the problem in units of a length near its amplitude, and this length in m.
-
-        The length is a power of two, so that scaling causes no rounding. Squares then neither overflow nor underflow.
-        """
-        eq = self.equation
-        size = max(abs(self.displacement_m), abs(self.velocity_m_per_s / eq.angular_frequency_per_s))
-        unit = math.ldexp(1.0, min(max(math.frexp(size)[1], -1021), 1022))
-        if unit == 1.0 and eq.friction_m_per_s2 <= _MOST_FRICTION:
-            return self, unit
-        parts = {
-            "drag_per_m": eq.drag_per_m * unit,
-            # Friction as large as the bound holds the bob in any case, so that a larger value makes no difference.
-            "friction_m_per_s2": min(eq.friction_m_per_s2 / unit, _MOST_FRICTION),
-            "cubic_per_m2_s2": eq.cubic_per_m2_s2 * unit * unit,
-        }
-        for name, part in parts.items():
-            if not math.isfinite(part):
-                raise DynamicsError(
-                    f"{name} {getattr(eq, name):g} at an amplitude of {size:g} m leaves the range of "
-                    "numbers; take a smaller amplitude or coefficient"
-                )
-        return Problem(replace(eq, **parts), self.displacement_m / unit, self.velocity_m_per_s / unit), unit
-
     @classmethod
     def from_scene(cls, scene: Scene, *, where: str = "scene") -> Problem:
-        """Return the problem that a scene describes.
+        """Return the problem that a scene describes; ``where`` names the scene in errors.
 
-        Parameters
-        ----------
-        scene : Scene
-            Must give bob mass, spring constant and starting displacement; other missing values count as zero.
-        where : str
-            Name of the source of the scene for error messages.
-
-        Raises
-        ------
-        SceneError
-            If a required value is missing; the message names it.
-        DynamicsError
-            If the values of the scene give no valid problem.
-
-        Notes
-        -----
         :math:`\\omega_0^2 = k/(m + m_s/3 + m_a)` with the mass :math:`m_s` of the spring and the mass :math:`m_a` of
-        the air that the disc carries along. The coefficients of ``[damping]`` are those of the amplitude laws; see
-        :meth:`Equation.from_laws`.
-
-        Examples
-        --------
-        >>> scene = Scene.from_mapping({"bob": {"mass_kg": 0.2}, "spring": {"constant_n_per_m": 20.0},
-        ...                             "start": {"displacement_m": 0.05}})
-        >>> Problem.from_scene(scene).equation.angular_frequency_per_s
-        10.0
+        the air that the disc carries along. The coefficients of ``[damping]`` are those of the amplitude laws. Missing
+        values count as zero, except bob mass, spring constant and starting displacement.
         """
         needed = {
             "[bob] mass_kg": scene.bob_mass_kg,
@@ -131,37 +84,9 @@ class Problem:
         except DynamicsError as error:
             raise DynamicsError(f"{where}: {error}") from error
 
-    def _demand_amplitude(self) -> None:
-        """Refuse an amplitude that overflows, as a finite velocity can cause if the frequency is extremely low."""
-        if not math.isfinite(self.amplitude_m()):
-            raise DynamicsError(
-                f"velocity_m_per_s over angular_frequency_per_s must be a length that a number holds, got "
-                f"{self.velocity_m_per_s:g} over {self.equation.angular_frequency_per_s:g}"
-            )
-
-    def _demand_bound(self) -> None:
-        """Refuse a start outside the range omega / sqrt(-c) of a softening spring, or with energy to leave it."""
-        eq = self.equation
-        if eq.cubic_per_m2_s2 >= 0.0:
-            return
-        reach = eq.angular_frequency_per_s / math.sqrt(-eq.cubic_per_m2_s2)
-        y = abs(self.displacement_m) / reach
-        v = abs(self.velocity_m_per_s) / eq.angular_frequency_per_s / reach
-        if not (y < 1.0 and v * v + y * y * (1.0 - 0.5 * y * y) < 0.5):
-            raise DynamicsError(
-                f"a softening spring holds its bob within {reach:g} m of rest, the start at {self.displacement_m:g} m "
-                "is too far or too fast; start nearer, or take a smaller cubic term"
-            )
-
 
 def effective_mass_kg(scene: Scene) -> float:
-    """Return the oscillating mass in kg: the bob, the spring's share, and the air that the disc carries along.
-
-    Raises
-    ------
-    SceneError
-        If the scene gives no bob mass.
-    """
+    """Return the oscillating mass in kg: the bob, the spring's share, and the air that the disc carries along."""
     if scene.bob_mass_kg is None:
         raise SceneError("scene: a mass that oscillates needs [bob] mass_kg; add it to the scene")
     return oscillating_mass_kg(_value(scene.spring_mass_kg), scene.bob_mass_kg.value + added_mass_kg(scene))

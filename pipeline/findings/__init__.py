@@ -1,1 +1,1 @@
-"""Findings: the statements about a run, in words."""
+"""Findings: stages yield codes and numbers, ``findings.toml`` has the words."""

@@ -4,114 +4,65 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
-from pipeline.findings.finding import Finding
-
-__all__ = ["damping_findings"]
+from pipeline.findings.finding import Found
+from pipeline.numerics.quantity import number
 
 # Difference of BIC that is "very strong" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773. If two laws
 # have the same prior probability, a wrong law beats the true law by this much in fewer than exp(-5) of recordings.
 VERY_STRONG = 10.0
 
 
-def damping_findings(damping: Damping) -> Iterator[Finding]:
-    """Yield findings on laws that fit, laws that are rejected and laws that cannot be distinguished.
-
-    Parameters
-    ----------
-    damping : Damping
-    """
+def damping_findings(damping: Damping) -> Iterator[Found]:
+    """Yield which laws fit, which do not, and which cannot be distinguished."""
     rejected = [name for name, fit in damping.fits.items() if fit.rejected]
     if damping.fits and len(rejected) == len(damping.fits):
         nearest = min(damping.fits.values(), key=lambda fit: fit.reduced_chi2) if damping.by_statement else damping.best
-        yield Finding(
-            "no_law_fits",
-            "warning",
-            f"No damping law fits: the best has a reduced chi-square of {_number(nearest.reduced_chi2)}, not about 1.",
-            f"The nearest is {words_of(nearest.law)}, which misses the amplitudes by more than their scatter. "
-            "The uncertainties of the coefficients were increased by their residuals.",
-            {"reduced_chi2": nearest.reduced_chi2},
-        )
-    elif damping.stated and (contradicted := _stated_law(damping)) is not None:
-        yield contradicted
+        yield Found("no_law_fits", {"reduced_chi2": nearest.reduced_chi2, "nearest": words_of(nearest.law)})
+    elif damping.stated:
+        yield from _stated_law(damping)
     if rejected or damping.unfitted:
-        yield _rejections(damping, len(rejected))
+        unfitted = len(damping.unfitted)
+        numbers = {"rejected": len(rejected) + unfitted, "tried": len(damping.fits) + unfitted}
+        yield Found("law_rejected", {**numbers, **_reasons(damping)})
     if len(damping.admissible) > 1:
-        names = [words_of(damping.fits[name].law) for name in damping.admissible]
-        undamped = any(len(damping.fits[name].law.parameters) == 1 for name in damping.admissible)
-        yield Finding(
-            "laws_not_separable",
-            "info",
-            f"{len(names)} damping laws fit this run equally well; a longer run may distinguish them.",
-            f"In order of evidence: {', '.join(names)}."
-            + (" The run does not show for certain that there is any damping." if undamped else ""),
-            {"laws": len(names)},
-        )
+        laws = [damping.fits[name].law for name in damping.admissible]
+        undamped = next((words_of(law) for law in laws if len(law.parameters) == 1), None)
+        names = ", ".join(words_of(law) for law in laws)
+        yield Found("laws_not_separable", {"laws": len(laws), "names": names, "undamped": undamped})
 
 
-def _stated_law(damping: Damping) -> Finding | None:
-    """Return the finding on a stated law that was not fitted, that chi-square rejects, or that another law beats."""
+def _stated_law(damping: Damping) -> Iterator[Found]:
+    """Yield that a stated law was not fitted, that chi-square rejects it, or that another law beats it."""
     if not damping.by_statement:
         why = damping.unfitted.get(damping.stated, "its fit failed")
-        return Finding(
-            "stated_law_rejected",
-            "warning",
-            f"The stated damping law {damping.stated} was not used, because it could not be fitted.",
-            f"{damping.stated}: not fitted, because {why}. The law was chosen by the recording.",
-        )
-    stated = damping.best
-    other = min((fit for fit in damping.fits.values() if not fit.rejected), key=lambda fit: fit.bic, default=stated)
-    excess = stated.bic - other.bic
-    if not stated.rejected and excess <= VERY_STRONG:
-        return None
-    return Finding(
-        "stated_law_rejected",
-        "warning",
-        f"The recording contradicts the law that you stated, {stated.name}: {other.name} fits better.",
-        f"{words_of(stated.law)} has a reduced chi-square of {_number(stated.reduced_chi2)}, {words_of(other.law)} has "
-        f"{_number(other.reduced_chi2)}; the BIC of the stated law is higher by {_number(excess)}.",
-        {"reduced_chi2": stated.reduced_chi2, "bic_excess": excess},
-    )
+        yield Found("stated_law_rejected", {"law": damping.stated, "why": why})
+        return
+    best = damping.best
+    other = min((fit for fit in damping.fits.values() if not fit.rejected), key=lambda fit: fit.bic, default=best)
+    excess = best.bic - other.bic
+    if best.rejected or excess > VERY_STRONG:
+        numbers = {"reduced_chi2": best.reduced_chi2, "other_chi2": other.reduced_chi2, "bic_excess": excess}
+        yield Found("stated_law_rejected", {**numbers, "law": best.name, "other": other.name})
 
 
-def _rejections(damping: Damping, rejected: int) -> Finding:
-    """Return one finding on all laws that are rejected or have no fit, with the reason for each."""
+def _reasons(damping: Damping) -> dict[str, str]:
+    """Return the laws that are rejected, or have no fit, by the reason."""
+    best = damping.best
     by_reason: dict[str, list[str]] = {}
     for fit in damping.fits.values():
-        # With as many parameters as windows there is no degree of freedom, and so no reduced chi-square.
-        chi2 = f" ({_number(fit.reduced_chi2)})" if fit.dof > 0 else ""
-        by_reason.setdefault(fit.rejection, []).append(f"{words_of(fit.law)}{chi2}")
-    best = damping.best
-    reasons = []
+        by_reason.setdefault(fit.rejection, []).append(f"{words_of(fit.law)}{_chi2(fit)}")
+    reasons = {reason: ", ".join(laws) for reason, laws in by_reason.items() if reason in ("misfit", "negative")}
     if "misfit" in by_reason:
-        selected = f"; {words_of(best.law)} has {best.reduced_chi2:.2g}" if best.dof > 0 else ""
-        reasons.append(f"Rejected by their reduced chi-square{selected}: {', '.join(by_reason['misfit'])}.")
-    if "negative" in by_reason:
-        reasons.append(
-            "Rejected because a coefficient is negative by more than two standard uncertainties (reduced chi-square "
-            f"in brackets): {', '.join(by_reason['negative'])}."
-        )
-    reasons += [
-        f"{words_of(fit.law)}: no convergence after {fit.tried}."
-        for fit in damping.fits.values()
-        if fit.rejection == "not converged"
-    ]
-    reasons += [f"{name}: not fitted, because {why}." for name, why in damping.unfitted.items()]
-    count = rejected + len(damping.unfitted)
-    tried = len(damping.fits) + len(damping.unfitted)
-    return Finding(
-        "law_rejected",
-        "info",
-        f"{tried - count} of the {tried} damping laws tried {'fits' if tried - count == 1 else 'fit'} this recording; "
-        f"{count} {'does' if count == 1 else 'do'} not.",
-        " ".join(reasons),
-        {"rejected": count, "tried": tried},
-    )
+        reasons["selected"] = f"{words_of(best.law)}{_chi2(best)}"
+    failed = [fit for fit in damping.fits.values() if fit.rejection == "not converged"]
+    unfitted = [f"{words_of(fit.law)}, no convergence after {fit.tried}" for fit in failed]
+    unfitted += [f"{name}, because {why}" for name, why in damping.unfitted.items()]
+    return reasons | ({"unfitted": "; ".join(unfitted)} if unfitted else {})
 
 
-def _number(value: float) -> str:
-    """Return a number with three digits and without an exponent."""
-    if value > 1e6:
-        return "over a million"
-    return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
+def _chi2(fit: LawFit) -> str:
+    # With as many parameters as windows there is no degree of freedom, and so no reduced chi-square.
+    return f" ({number(fit.reduced_chi2)})" if fit.dof > 0 else ""

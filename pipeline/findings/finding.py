@@ -1,38 +1,61 @@
-"""A finding about a run: one sentence, what to do, and the numbers behind it."""
+"""Findings: the stages yield codes with numbers, and ``findings.toml`` has the words of each code."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import string
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
-from pipeline.findings.registry import FINDINGS, Severity, check_finding
+from pipeline.numerics.quantity import amount, noun, number, plural
 
-__all__ = ["Finding", "Severity", "by_severity"]
+Severity = Literal["info", "warning", "error"]
+RANK = {"error": 0, "warning": 1, "info": 2}
+
+# The code for a note in a run file of another version of springmass that this one does not know.
+UNKNOWN_CODE = "unknown_code"
+
+# Unit and usual form of a number whose name ends so; one that ends in _m has the unit of the recording.
+UNITS = {"_s": ("s", ".3g"), "_hz": ("Hz", ".4g"), "_metres": ("m", ".3g"), "_rad": ("rad", ".2g")}
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a stage found: a code, and its numbers or names as the sentences in ``findings.toml`` call them.
+
+    A number is in SI units, its name ends in the unit, and None means that there is none. Without a severity it is the
+    first one of the code.
+    """
+
+    code: str
+    numbers: Mapping[str, float | str | None] = field(default_factory=dict)
+    severity: Severity | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """The block of one code in ``findings.toml``, which explains each field."""
+
+    symptom: str
+    severity: tuple[Severity, ...]
+    meaning: str
+    cause: str
+    example: Mapping[str, float | str]
+    says: tuple[str, ...] = ()
+    details: tuple[str, ...] = ()
+    advice: tuple[str, ...] = ("",)
+    figure: str = ""
+    harm: str = "uncertainty"
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One finding about a run.
+    """One finding about a run, in words.
 
-    Parameters
-    ----------
-    code : str
-        One of :data:`pipeline.findings.registry.FINDINGS`.
-    severity : {"info", "warning", "error"}
-        An error means that a number of the result must not be used.
-    message : str
-        One sentence that a first-year student understands, with the number that matters.
-    details : str
-        Statistics, alternatives and method, for readers who want more.
-    values : mapping of str to float
-        The numbers in SI units; their names include the units.
-    advice : str
-        What to do; by default the advice in the registry. A note (severity "info") has none by default.
-
-    Raises
-    ------
-    ValueError
-        If the code is not registered with this severity.
+    ``message`` is one sentence with the number that matters, ``details`` are for readers who want more, ``values`` are
+    the numbers in SI units, and ``advice`` says what to do; a note has none.
     """
 
     code: str
@@ -42,13 +65,79 @@ class Finding:
     values: Mapping[str, float] = field(default_factory=dict)
     advice: str = ""
 
-    def __post_init__(self) -> None:
-        check_finding(self.code, self.severity)
-        if not self.advice and self.severity != "info":
-            object.__setattr__(self, "advice", FINDINGS[self.code].advice)
+
+@cache
+def kinds() -> Mapping[str, Kind]:
+    """Return the blocks of ``findings.toml`` by code, in its order."""
+    import tomllib
+
+    blocks = tomllib.loads(Path(__file__).with_name("findings.toml").read_text(encoding="utf-8"))
+    return {
+        code: Kind(**{name: _field(name, value) for name, value in block.items()}) for code, block in blocks.items()
+    }
 
 
-def by_severity(*groups: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return all findings sorted by severity, the most severe first; findings of equal severity keep their order."""
-    rank = {"error": 0, "warning": 1, "info": 2}
-    return tuple(sorted((one for group in groups for one in group), key=lambda finding: rank[finding.severity]))
+def _field(name: str, value: Any) -> Any:
+    if name in ("severity", "says", "details", "advice"):
+        return (value,) if isinstance(value, str) else tuple(value)
+    return value
+
+
+def word(found: Found, unit: str = "m") -> Finding:
+    """Put into words what a stage found in a recording whose values have this unit."""
+    kind = kinds()[found.code]
+    severity = found.severity or kind.severity[0]
+    if severity not in kind.severity:
+        raise ValueError(f"finding {found.code!r} has no severity {severity!r} in findings.toml")
+    numbers = {name: each for name, each in found.numbers.items() if each is not None}
+    shown = {name: _Shown(name, each, unit) for name, each in numbers.items()}
+    return Finding(
+        found.code,
+        severity,
+        _filled(("{sentence}", *kind.says), shown, unit)[0],
+        " ".join(each[:1].upper() + each[1:] for each in _filled(kind.details, shown, unit)),
+        {name: each for name, each in numbers.items() if not isinstance(each, str)},
+        "" if severity == "info" else _filled(kind.advice, shown, unit)[0],
+    )
+
+
+def worded(unit: str, *groups: Iterable[Found]) -> tuple[Finding, ...]:
+    """Put all that was found into words, the most severe first."""
+    return by_severity(word(found, unit) for group in groups for found in group)
+
+
+def by_severity(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return findings with the most severe first; those of equal severity keep their order."""
+    return tuple(sorted(findings, key=lambda finding: RANK[finding.severity]))
+
+
+def _filled(sentences: Sequence[str], shown: Mapping[str, _Shown], unit: str) -> list[str]:
+    """Return the sentences whose numbers are all there, with the numbers in their places."""
+    known = {"value": noun(unit), "values": plural(unit), **shown}
+    return [each.format_map(known) for each in sentences if _names(each) <= known.keys()]
+
+
+def _names(sentence: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(sentence) if name}
+
+
+class _Shown(NamedTuple):
+    """A number that a sentence shows with its unit."""
+
+    name: str
+    value: float | str
+    unit: str
+
+    def __format__(self, form: str) -> str:
+        if isinstance(self.value, str):
+            return self.value
+        if form.endswith("%"):
+            return f"{number(100.0 * self.value, f'{form[:-1]}.2g')} %"
+        if self.name.endswith("_m"):
+            return amount(self.value, self.unit, form or ".2g")
+        for end, (symbol, usual) in UNITS.items():
+            if self.name.endswith(end):
+                return f"{number(self.value, form or usual)} {symbol}"
+        if not form and self.value > 1e6:
+            return "over a million"
+        return number(self.value, form)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from pipeline.damping.law_fit import LawFit
+from pipeline.damping.laws import units_of
 from pipeline.damping.select import Damping
 from pipeline.motion.equation_fit import EquationFit
-from pipeline.motion.phase import PhaseFit, fit_phase
+from pipeline.motion.phase import BACKBONE, PhaseFit, fit_phase
 from pipeline.motion.waveform import Rest, Waveform, fit_rest, reconstruct
 from pipeline.motion.waveform_fit import FullFit, fit_record
-from pipeline.numerics.quantity import in_unit
 from pipeline.samples.condition import Conditioned
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
@@ -47,19 +46,18 @@ class Fitted:
         """
         if unit == "m":
             return self
-        fits = {name: _law_in_unit(fit, unit) for name, fit in self.damping.fits.items()}
+        fits = {
+            name: replace(fit, joint=replace(fit.joint, units=units_of(fit.law, unit)))
+            for name, fit in self.damping.fits.items()
+        }
         damping, backbone = replace(self.damping, fits=fits), self.phase.backbone
-        bent = None if backbone is None else replace(backbone, unit=in_unit(backbone.unit, unit))
+        bent = None if backbone is None else replace(backbone, unit=BACKBONE.of(unit))
         return replace(
             self,
             damping=damping,
             phase=replace(self.phase, damping=damping, backbone=bent),
             rest=replace(self.rest, mean=replace(self.rest.mean, unit=unit)),
         )
-
-
-def _law_in_unit(fit: LawFit, unit: str) -> LawFit:
-    return replace(fit, joint=replace(fit.joint, units=tuple(in_unit(each, unit) for each in fit.joint.units)))
 
 
 def fit_by_windows(demodulated: Demodulated, disturbances: Disturbances, damping: Damping) -> Fitted:

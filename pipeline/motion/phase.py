@@ -10,10 +10,12 @@ import numpy as np
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.quantity import Unit
 from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 
+BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency depends on the squared amplitude
 TABLE = 2049  # number of points in the tables of the lag and of the integral of the amplitude
 MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
 NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
@@ -238,7 +240,7 @@ def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
 
 def _backbone(bent: Line, spread: Scatter, free: int) -> Estimate:
     widened = spread.correlation * max(1.0, bent.chi2 / free)
-    return Estimate(float(bent.values[2]), math.sqrt(bent.covariance[2, 2] * widened), "rad/(s m^2)")
+    return Estimate(float(bent.values[2]), math.sqrt(bent.covariance[2, 2] * widened), BACKBONE.of("m"))
 
 
 def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFit:

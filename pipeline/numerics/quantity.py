@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,37 +38,85 @@ SHOWN = {
 }
 """Names and display units by the units of :data:`pipeline.track.UNITS`."""
 
-_SIMPLER = {
-    "m/s": {"m/s": "m/s^2", "m/s^2": "m/s^3", "1/(m s)": "1/m"},
-    "rad/s": {"m/s": "rad/s^2", "m/s^2": "rad/s^3", "1/(m s)": "1/rad"},
-    "m/s^2": {"m/s": "m/s^3", "m/s^2": "m/s^4", "1/(m s)": "s/m"},
-    "1": {"m/s": "1/s", "m/s^2": "1/s^2", "1/(m s)": "1/s", "m^(1-n)/s": "1/s"},
-}
-"""Simplified units where powers of s or all of m cancel, by the record's unit and the unit written for metres."""
 
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """The exponents of metre, second and radian in a unit.
 
-def amount(value: float, unit: str, form: str = ".2g") -> str:
-    """Write a value of a record with its unit.
-
-    Parameters
-    ----------
-    value : float
-        Value, in ``unit``.
-    unit : str
-        Unit of the record.
-    form : str
-        Format of the number in mm. In other units, where typical sizes are unknown, four significant digits replace
-        a fixed number of decimals.
+    ``less`` names a parameter whose value is subtracted from the exponent of the metre: "n" for c in :math:`c A^n`.
 
     Examples
     --------
-    >>> amount(0.00234, "m"), amount(0.0234, "rad"), amount(1.2345678, "V", ".1f")
-    ('2.3 mm', '0.023 rad', '1.235 V')
+    >>> print(Unit(1, -1), Unit(-0.5, -1), Unit(1, -1, less="n"), Unit(-1), sep=", ")
+    m/s, 1/(m^1/2 s), m^(1-n)/s, 1/m
+    """
+
+    metre: float = 0.0
+    second: float = 0.0
+    less: str = ""
+    radian: float = 0.0
+
+    def __str__(self) -> str:
+        return self.of("m")
+
+    def of(self, unit: str) -> str:
+        """Write the unit for a recording whose values have this unit in place of the metre.
+
+        Examples
+        --------
+        >>> Unit(-1, -1).of("V"), Unit(1, -1).of("rad"), Unit(-1, -1).of("m/s^2"), Unit(0, -1).of("N"), Unit(1).of("1")
+        ('1/(V s)', 'rad/s', 's/m', '1/s', '1')
+        >>> Unit(1, -1, less="n").of("rad/s"), Unit(-2, -1, radian=1).of("1")
+        ('(rad/s)^(1-n)/s', 'rad/s')
+        """
+        symbol, _, divisor = unit.partition("/")
+        powers, above, below = {"rad": self.radian}, list[str](), list[str]()
+        seconds = self.second
+        if unit != "1" and self.less:
+            above.append(f"{f'({unit})' if divisor else unit}^({self.metre:g}-{self.less})")
+        elif unit != "1":
+            powers[symbol] = powers.get(symbol, 0.0) + self.metre
+            seconds -= self.metre * {"": 0.0, "s": 1.0, "s^2": 2.0}[divisor]
+        for name, exponent in (powers | {"s": seconds}).items():
+            size = Fraction(abs(exponent)).limit_denominator(1000)
+            if exponent:
+                (above if exponent > 0.0 else below).append(name if size == 1 else f"{name}^{size}")
+        if not below:
+            return " ".join(above) or ("1" if self.metre else "")
+        divided_by = below[0] if len(below) == 1 else f"({' '.join(below)})"
+        return f"{' '.join(above) or '1'}/{divided_by}"
+
+
+def number(value: float, form: str = "") -> str:
+    """Write a number, by default an integer or three significant digits, without an exponent if it has a usual size.
+
+    Examples
+    --------
+    >>> number(12172), number(5.98123), number(23164.2), number(140, ".2g"), number(3e-5, ".1g"), number(1e-9)
+    ('12,172', '5.98', '23,200', '140', '0.00003', '1e-09')
+    """
+    if not form and value % 1 == 0.0 and abs(value) < 1e6:
+        return f"{value:,.0f}" if abs(value) >= 1e4 else f"{value:.0f}"
+    text = f"{value:{form or '.3g'}}"
+    return f"{Decimal(text):{'+' * ('+' in form)},f}" if "e" in text and 1e-6 <= abs(value) < 1e9 else text
+
+
+def amount(value: float, unit: str, form: str = ".2g") -> str:
+    """Write a value of a recording with its unit; a length in mm, or in m from one metre on.
+
+    In other units than m, where typical sizes are unknown, four digits replace a fixed number of decimals.
+
+    Examples
+    --------
+    >>> amount(0.00234, "m"), amount(23.945, "m", ".4g"), amount(0.0234, "rad"), amount(1.2345678, "V", ".1f")
+    ('2.3 mm', '23.95 m', '0.023 rad', '1.235 V')
     """
     shown = SHOWN[unit]
+    if unit == "m" and abs(value) >= 1.0:
+        return f"{number(value, form if form.endswith('g') else '.4g')} m"
     if unit != "m" and form.endswith("f"):
         form = ".4g"
-    return f"{value * shown.factor:{form}} {shown.unit}".rstrip()
+    return f"{number(value * shown.factor, form)} {shown.unit}".rstrip()
 
 
 def noun(unit: str) -> str:
@@ -85,22 +134,3 @@ def plural(unit: str) -> str:
     """
     own = SHOWN[unit].noun
     return f"{own[:-1]}ies" if own.endswith("y") else f"{own}s"
-
-
-def in_unit(form: str, unit: str) -> str:
-    """Convert a unit that was written for records in metres to a record in another unit.
-
-    Examples
-    --------
-    >>> in_unit("1/(m s)", "V"), in_unit("m/s", "rad"), in_unit("1/(m s)", "m/s^2"), in_unit("1/s", "N")
-    ('1/(V s)', 'rad/s', 's/m', '1/s')
-    >>> in_unit("m^(1-n)/s", "rad/s"), in_unit("rad/(s m^2)", "1")
-    ('(rad/s)^(1-n)/s', 'rad/s')
-    """
-    if form == "m":
-        return unit
-    if form in _SIMPLER.get(unit, {}):
-        return _SIMPLER[unit][form]
-    if unit == "1":
-        return re.sub(r"\(s m\b[^)]*\)", "s", form)
-    return re.sub(r"\bm\b", f"({unit})" if "/" in unit else unit, form)

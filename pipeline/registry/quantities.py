@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pipeline.numerics.quantity import in_unit
+from pipeline.numerics.quantity import Unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,10 +20,8 @@ class Quantity:
         Name in words.
     symbol, page_symbol, tex_symbol : str
         Symbol in ASCII, in Unicode (with an index after a space), and in TeX without the ``$``.
-    unit : str
-        SI unit; if ``of_record``, the unit for a recorded length, in which :meth:`unit_in` replaces the metre.
-    of_record : bool
-        Whether the unit depends on the recorded quantity.
+    unit : str or Unit
+        SI unit; a Unit if it depends on what was recorded.
     in_table : bool
         Whether Table 1 shows the estimate.
     by_law : bool
@@ -35,8 +33,7 @@ class Quantity:
     symbol: str
     page_symbol: str
     tex_symbol: str
-    unit: str
-    of_record: bool = False
+    unit: str | Unit
     in_table: bool = True
     by_law: bool = False
 
@@ -48,7 +45,7 @@ class Quantity:
         >>> QUANTITIES["beta"].unit_in("m"), QUANTITIES["beta"].unit_in("V"), QUANTITIES["period"].unit_in("V")
         ('1/(m s)', '1/(V s)', 's')
         """
-        return in_unit(self.unit, record_unit) if self.of_record else self.unit
+        return self.unit.of(record_unit) if isinstance(self.unit, Unit) else self.unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,33 +58,30 @@ class Input:
         Name in words.
     symbol : str
         Symbol in ASCII; "" for a group of parameters, or for a possible error without a symbol.
-    unit : str
+    unit : str or Unit
         As :attr:`Quantity.unit`; "" for a ratio or a group.
-    of_record : bool
-        Whether the unit depends on the recorded quantity.
     """
 
     label: str
     symbol: str = ""
-    unit: str = ""
-    of_record: bool = False
+    unit: str | Unit = ""
 
 
 _QUANTITIES = (
     Quantity("period", "period", "T", "T", "T", "s"),
     Quantity("first_mode_period", "period of the first mode", "T_1", "T 1", "T_1", "s"),
     Quantity("second_mode_period", "period of the second mode", "T_2", "T 2", "T_2", "s"),
-    Quantity("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1", "m", of_record=True),
-    Quantity("second_mode_amplitude", "amplitude of the second mode", "A_2", "A 2", "A_2", "m", of_record=True),
+    Quantity("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1", Unit(1)),
+    Quantity("second_mode_amplitude", "amplitude of the second mode", "A_2", "A 2", "A_2", Unit(1)),
     Quantity("frequency", "frequency", "f", "f", "f", "Hz"),
     Quantity("angular_frequency", "angular frequency", "omega", "ω", r"\omega", "rad/s"),
     Quantity("spring_constant", "spring constant", "k", "k", "k", "N/m"),
-    Quantity("amplitude", "amplitude at the start", "A0", "A₀", "A_0", "m", of_record=True),
+    Quantity("amplitude", "amplitude at the start", "A0", "A₀", "A_0", Unit(1)),
     Quantity("displacement_amplitude", "amplitude of the displacement", "x0", "x₀", "x_0", "m"),
     Quantity("angle_amplitude", "amplitude of the angle", "theta0", "θ₀", r"\theta_0", "rad"),
     Quantity("phase", "phase at the start", "phi0", "φ₀", r"\varphi_0", "rad", in_table=False),
-    Quantity("offset", "rest position", "y0", "y₀", "y_0", "m", of_record=True),
-    Quantity("noise", "noise of one sample", "sigma", "σ", r"\sigma", "m", of_record=True),
+    Quantity("offset", "rest position", "y0", "y₀", "y_0", Unit(1)),
+    Quantity("noise", "noise of one sample", "sigma", "σ", r"\sigma", Unit(1)),
     Quantity("damping_rate", "damping rate at the start", "lambda", "λ", r"\lambda", "1/s", by_law=True),
     Quantity("relaxation_rate", "relaxation rate", "r", "r", "r", "1/s"),
     Quantity("relaxation_rate_slow", "slow relaxation rate", "r_1", "r 1", "r_1", "1/s"),
@@ -100,9 +94,9 @@ _QUANTITIES = (
     Quantity("keulegan_carpenter_number", "Keulegan-Carpenter number", "KC", "KC", r"\mathit{KC}", ""),
     Quantity("drag_coefficient", "quadratic drag coefficient", "C_d", "C d", r"C_\mathrm{d}", ""),
     Quantity("gamma", "linear damping", "gamma", "γ", r"\gamma", "1/s", by_law=True),
-    Quantity("beta", "quadratic damping", "beta", "β", r"\beta", "1/(m s)", of_record=True, by_law=True),
-    Quantity("mu", "dry friction", "mu", "μ", r"\mu", "m/s", of_record=True, by_law=True),
-    Quantity("c", "drag by a power of the amplitude", "c", "c", "c", "m^(1-n)/s", of_record=True, by_law=True),
+    Quantity("beta", "quadratic damping", "beta", "β", r"\beta", Unit(-1, -1), by_law=True),
+    Quantity("mu", "dry friction", "mu", "μ", r"\mu", Unit(1, -1), by_law=True),
+    Quantity("c", "drag by a power of the amplitude", "c", "c", "c", Unit(1, -1, less="n"), by_law=True),
     Quantity("n", "that power", "n", "n", "n", "", by_law=True),
 )
 QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _QUANTITIES}
@@ -112,8 +106,8 @@ INPUTS: Mapping[str, Input] = {
     # Inputs estimated from the recording.
     "angular_frequency": Input("scatter of the phases", "omega", "rad/s"),
     "phase": Input("scatter of the phases", "phi0", "rad"),
-    "rest_position": Input("scatter of the rest position", "y0", "m", of_record=True),
-    "noise": Input("scatter of the samples", "sigma", "m", of_record=True),
+    "rest_position": Input("scatter of the rest position", "y0", Unit(1)),
+    "noise": Input("scatter of the samples", "sigma", Unit(1)),
     "damping_law": Input("scatter of the amplitudes"),
     "choice_of_law": Input("choice among admissible laws"),
     # Inputs from the scene, or properties of the instrument.
@@ -130,7 +124,7 @@ INPUTS: Mapping[str, Input] = {
     "speed_of_sound_formula": Input("formula of the speed of sound"),
     "recorded_speed_of_sound": Input("speed of sound of the record"),
     "calibrated_scale": Input("calibration of the scale"),
-    "sensor_zero": Input("calibration of the zero", "z", "m", of_record=True),
+    "sensor_zero": Input("calibration of the zero", "z", Unit(1)),
     "sensor_mean_samples": Input("running mean of the sensor"),
     "sensor_lag": Input("lag of the sensor", "tau", "s"),
     # Contradictions between the recording and its model.

@@ -1,58 +1,44 @@
 """Effects: the possible effects at this bench, their predicted and measured sizes, and whether the model includes them.
 
-The model includes an effect only if its predicted or measured size exceeds a tenth of the uncertainty that it would
-affect. The table shows all effects, included or not, with the reason.
+An analysis includes an effect only if its predicted or measured size exceeds a tenth of the uncertainty that it would
+affect. In a simulation the size is the largest change of the displacement over the run without the effect, over the
+starting amplitude. The table shows all effects, included or not, with the reason.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
 from pipeline.bench.air import air_viscosity, speed_of_sound
-from pipeline.bench.derived_drag import STEADY_DISC_DRAG
+from pipeline.bench.derived_drag import STEADY_DISC_DRAG, DerivedDrag, needs_drag
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
+from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
+from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.terms import Term, required
 from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
-from pipeline.numerics.quantity import amount, in_unit
+from pipeline.numerics.quantity import Unit, amount
 from pipeline.registry.effects import check_effect
 from pipeline.windows.disturbances import Disturbances
-
-__all__ = ["Effect", "tabulate"]
 
 SHARE = 0.1  # size from which the model includes an effect, over the uncertainty that the effect would change
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
 STEEL_KG_PER_M3 = 7850.0
+GRAVITY = 9.81  # m/s^2
+SOFTER_PER_K = 2.6e-4  # relative decrease of the modulus of spring steel with temperature, 1/K
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One row of the effects table.
-
-    Parameters
-    ----------
-    name : str
-        One of :data:`pipeline.registry.effects.EFFECTS`.
-    predicted : float or None
-        Size that the scene predicts, in ``unit``; None if the scene does not determine it.
-    measured : float or None
-        Size measured in the record, in ``unit``; None if the record does not show it.
-    unit : str
-    included : bool
-        Whether the model includes the effect.
-    why : str
-        The reason, one sentence.
-
-    Raises
-    ------
-    ValueError
-        If the name is not registered.
-    """
+    """One row of the effects table; a size is None where the scene does not determine it or the record not show it."""
 
     name: str
     predicted: float | None
@@ -75,59 +61,113 @@ def tabulate(
     instrument: Instrument,
     disturbances: Disturbances | None = None,
 ) -> tuple[Effect, ...]:
-    """Return the effects table.
-
-    Parameters
-    ----------
-    scene, damping, phase, rest
-        The bench, and outputs of the stages with the same names.
-    noise_m : float
-        Standard deviation of one sample, m.
-    instrument : Instrument
-        Clock and scale of the sensor.
-    disturbances : Disturbances, optional
-        Modes other than the main oscillation; None if they were not sought.
-    """
+    """Return the effects table of an analysis, from the stages' results; disturbances are None if not sought."""
     omega, unit = phase.angular_frequency, rest.mean.unit
     u_k = 2.0 * math.hypot(omega.u / omega.value, instrument.clock_rate.u)
     if scene.bob_mass_kg is not None:
         u_k = math.hypot(u_k, scene.bob_mass_kg.u / scene.bob_mass_kg.value)
+
+    def counted(name: str, share: float, what: str) -> Effect:
+        included = share > SHARE * u_k
+        relation = "more" if included else "less"
+        why = f"{what}: {share:.2g} of the bob's mass, {relation} than a tenth of u(k)/k = {u_k:.2g}"
+        return Effect(name, share, None, "1", included, why)
+
     return (
-        *_masses(scene, u_k),
+        *_masses(scene, counted),
         *_drags(scene, damping, omega.value, unit),
         _backbone(phase, damping),
         _rest_drift(rest, noise_m),
         *_modes(disturbances, unit),
-        *((_buoyancy(scene, omega.value), _speed_of_sound(scene, instrument)) if unit == "m" else ()),
+        *((_buoyancy(scene, omega.value, 1.0, "m"), _speed_of_sound(scene, instrument)) if unit == "m" else ()),
         _clock_rate(instrument),
     )
 
 
-def _masses(scene: Scene, u_k: float) -> Iterator[Effect]:
+def simulated_effects(
+    scene: Scene,
+    problem: Problem,
+    terms: Sequence[Term],
+    seconds: float,
+    drag: DerivedDrag | None,
+    without: Sequence[str],
+) -> tuple[Effect, ...]:
+    """Return the effects table of a simulation, whose terms are empty for a named method, which solves all of them.
+
+    Leaving out a share s of the mass shifts the
+    phase by :math:`s\\omega T/2` over a run of duration T, which changes the displacement by up to twice the sine of
+    half of it. If the suspended length l is within 1.5 amplitudes of :math:`4g/\\omega^2`, any small sideways motion
+    grows at the rate :math:`3\\omega A/8l` (P. Lynch, Int. J. Non-Linear Mech. 37 (2002) 345).
+    """
+    omega, start = problem.equation.angular_frequency_per_s, problem.amplitude_m()
+
+    def turned(share: float) -> float:
+        return 2.0 * math.sin(min(0.25 * share * omega * seconds, 0.5 * math.pi))
+
+    def moved(name: str, share: float, what: str) -> Effect:
+        included = {"spring_mass": "spring-mass", "added_mass": "disc"}[name] not in without
+        why = f"{what}: {share:.2g} of the bob's mass" + ("" if included else "; left out by --without")
+        return Effect(name, turned(share), None, "1", included, why)
+
+    u_kelvin, length = scene_air(scene)[0].u, 4.0 * GRAVITY / omega**2
+    softer = f"the air's u of {u_kelvin:g} K makes a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
+    swings = (
+        f"the scene gives no length; suspended {length:.3g} m +- {1.5 * start:.2g} m below its point the bob would "
+        f"swing sideways at half the frequency (2:1), growing by {0.375 * omega * start / length:.2g} 1/s"
+    )
+    return (
+        *_masses(scene, moved),
+        _disc(scene, problem, seconds, drag),
+        *_terms(problem, terms, seconds),
+        Effect("temperature", turned(SOFTER_PER_K * u_kelvin), None, "1", False, softer),
+        Effect("sideways_mode", None, None, "1", False, swings),
+        _buoyancy(scene, omega, start, "1"),
+    )
+
+
+def _masses(scene: Scene, judge: Callable[[str, float, str], Effect]) -> Iterator[Effect]:
+    """Yield the effects of the masses that swing along, judged by name, share of the bob's mass, and what it is."""
     if scene.bob_mass_kg is None:
         for name in ("spring_mass", "added_mass"):
             yield Effect(name, None, None, "1", False, "the scene gives no bob mass, so no spring constant is derived")
         return
     mass = scene.bob_mass_kg.value
     if scene.spring_mass_kg is None:
-        why = f"the scene gives no spring mass: k counts none, and u(k) a spring of 0 to {HEAVIEST_SHARE:g} of the bob"
+        why = (
+            f"the scene gives no spring mass: none is counted, and an analysis allows for {HEAVIEST_SHARE:g} of the bob"
+        )
         yield Effect("spring_mass", None, None, "1", False, why)
     else:
         share = oscillating_mass_kg(scene.spring_mass_kg.value, mass) / mass - 1.0
-        yield _mass_effect("spring_mass", share, u_k, "of the spring's mass m_s/x^2 - m swings along, x tan x = m_s/m")
+        yield judge("spring_mass", share, "of the spring's mass m_s/x^2 - m swings along, x tan x = m_s/m")
     if scene.disc_diameter_m is None:
         why = "the scene names no disc; the bob alone carries a negligible mass of air"
         yield Effect("added_mass", None, None, "1", False, why)
     else:
-        share = added_mass_kg(scene) / mass
-        yield _mass_effect("added_mass", share, u_k, "the disc carries (8/3) rho a^3 of air along")
+        yield judge("added_mass", added_mass_kg(scene) / mass, "the disc carries (8/3) rho a^3 of air along")
 
 
-def _mass_effect(name: str, share: float, u_k: float, what: str) -> Effect:
-    included = share > SHARE * u_k
-    relation = "more" if included else "less"
-    why = f"{what}: {share:.2g} of the bob's mass, {relation} than a tenth of u(k)/k = {u_k:.2g}"
-    return Effect(name, share, None, "1", included, why)
+def _disc(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | None) -> Effect:
+    """Return the effect of the disc's drag: the largest change of the amplitude without it."""
+    if scene.disc_diameter_m is None:
+        hint = "" if any(problem.equation.laws()) else "; nothing damps the motion: add [disc] or [damping]"
+        return Effect("disc_drag", None, None, "1", False, f"the scene names no disc{hint}")
+    if drag is None:
+        left_out = needs_drag(scene)
+        why = "left out by --without" if left_out else "[damping] is stated, the disc's drag with it"
+        return Effect("disc_drag", None, None, "1", not left_out, why)
+    start = problem.amplitude_m() or 1.0
+    law = np.array([[start, 0.0, *drag.joint.values]])  # it is derived where nothing else damps
+    size = 1.0 - float(amplitudes(np.array([0.0, seconds]), law)[0, 1]) / start
+    return Effect("disc_drag", size, None, "1", True, f"no [damping] is stated: derived, {drag.words}")
+
+
+def _terms(problem: Problem, terms: Sequence[Term], seconds: float) -> Iterator[Effect]:
+    for term in terms or required(problem, seconds, 1.0)[1]:
+        why, included = term.why, term.included
+        if not terms and term.size > 0.0:
+            why, included = "a method by name solves all terms", True
+        yield Effect(term.name, term.size, None, "1", included, why)
 
 
 def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[Effect]:
@@ -144,24 +184,23 @@ def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[
         share = {"m": 1.0, "m/s": omega**-1, "m/s^2": omega**-2}.get(unit)
         predicted_beta = None if share is None else 4.0 * b * omega / (3.0 * math.pi * mass) * share
     yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
-    yield Effect("quadratic_drag", predicted_beta, beta, in_unit("1/(m s)", unit), beta is not None, chosen)
+    yield Effect("quadratic_drag", predicted_beta, beta, Unit(-1, -1).of(unit), beta is not None, chosen)
     tried = any(fit.drag_term("mu") is not None for fit in damping.fits.values())
     why = chosen if tried else "no law with friction is among those tried"
-    yield Effect("friction", None, mu, in_unit("m/s", unit), mu is not None, why)
+    yield Effect("friction", None, mu, Unit(1, -1).of(unit), mu is not None, why)
 
 
 def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
-    name, unit = "amplitude_dependent_frequency", "1"
+    name = "amplitude_dependent_frequency"
     if phase.backbone is None:
-        why = "a constant frequency describes the phase: an ideal spring needs no more"
-        return Effect(name, None, None, unit, False, why)
+        return Effect(name, None, None, "1", False, "a constant frequency describes the phase: an ideal spring's")
     start = damping.best.joint["A0"].value
     shift = phase.backbone.value * start**2 / phase.angular_frequency.value
     why = (
         f"the phase bends: the frequency shifts by {shift:.2g} of itself from rest to the first amplitude, "
         "with the square of the amplitude, far beyond its uncertainty"
     )
-    return Effect(name, None, shift, unit, True, why)
+    return Effect(name, None, shift, "1", True, why)
 
 
 def _rest_drift(rest: Rest, noise_m: float) -> Effect:
@@ -188,39 +227,33 @@ def _modes(disturbances: Disturbances | None, unit: str) -> Iterator[Effect]:
             size = math.sqrt(sum(mode.amplitude.value**2 for mode in members))
             verdict = "more" if disturbances.modelled else "less"
             why = (
-                f"{_count(len(members), what)}, together of this amplitude; the strongest line found would leave up to "
+                f"{len(members)} times a {what}, together of this amplitude; the strongest line would leave up to "
                 f"{amount(disturbances.leak_m, unit)} in the main amplitude, {verdict} than a tenth of its uncertainty"
             )
             yield Effect(name, None, size, unit, disturbances.modelled, why)
 
 
-def _count(number: int, what: str) -> str:
-    return f"one {what}" if number == 1 else f"{number} times a {what}"
-
-
-def _buoyancy(scene: Scene, omega: float) -> Effect:
-    shift = scene_air_density(scene) / STEEL_KG_PER_M3 * 9.81 / omega**2
+def _buoyancy(scene: Scene, omega: float, length_m: float, unit: str) -> Effect:
+    shift = scene_air_density(scene) / STEEL_KG_PER_M3 * GRAVITY / omega**2
     why = "a constant force: it moves the rest position (a steel bob's by this much) and nothing else"
-    return Effect("buoyancy", shift, None, "m", False, why)
+    return Effect("buoyancy", shift / length_m if length_m > 0.0 else None, None, unit, False, why)
 
 
 def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
-    record = instrument.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD
-    why = "it scales every distance alike: amplitude and beta, not the spring constant"
+    record, shift = instrument.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD, None
     if instrument.u_scale > 0:
-        why += "; the distances were calibrated, so the calibration's uncertainty stands in its place"
-        return Effect("speed_of_sound", None, None, "1", False, why)
-    if scene.air_temperature_c is None:
+        why = "the distances were calibrated, so the calibration's uncertainty stands in its place"
+    elif scene.air_temperature_c is None:
         bench = scene.tells_of_bench or instrument.speed_of_sound_m_per_s is not None
         counts = "a room's 20 +- 3 degC count, 0.5 % in the scale" if bench else "its 0.18 %/K stand in no uncertainty"
-        why = f"the scene gives no air temperature, so {counts}: {why}"
-        return Effect("speed_of_sound", None, None, "1", False, why)
-    actual = speed_of_sound(*(each.value for each in scene_air(scene)))
-    whose = "of the record" if instrument.speed_of_sound_m_per_s else "that old recordings take for granted"
-    why += f"; relative to the {record:g} m/s {whose}; the air's uncertainty stands in theirs"
-    if instrument.speed_of_sound_m_per_s:
-        why += ", and so does the difference, which is not corrected"
-    return Effect("speed_of_sound", actual / record - 1.0, None, "1", True, why)
+        why = f"the scene gives no air temperature, so {counts}"
+    else:
+        shift = speed_of_sound(*(each.value for each in scene_air(scene))) / record - 1.0
+        why = (
+            f"relative to the {record:g} m/s of the record, uncorrected; the air's uncertainty stands in the distances'"
+        )
+    why += "; it scales every distance alike: amplitude and beta, not the spring constant"
+    return Effect("speed_of_sound", shift, None, "1", shift is not None, why)
 
 
 def _clock_rate(instrument: Instrument) -> Effect:

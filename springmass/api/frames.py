@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.quantity import in_unit
+from pipeline.numerics.quantity import Unit
 from pipeline.results.budget import Budget
 from pipeline.results.compare import Comparison
 from pipeline.track import Quality
@@ -81,7 +81,7 @@ def run_dataset(analysis: Analysis) -> xr.Dataset:
     import xarray as xr
 
     track, motion = analysis.track, analysis.motion
-    per = {form: in_unit(form, track.unit) for form in ("m", "m/s", "m/s^2")}
+    of_value, of_first, of_second = (Unit(1, -order).of(track.unit) for order in range(3))
     flags = {
         "flag_masks": np.array([flag.value for flag in Quality], np.uint8),
         "flag_meanings": " ".join(str(flag.name).lower() for flag in Quality),
@@ -93,22 +93,22 @@ def run_dataset(analysis: Analysis) -> xr.Dataset:
     coordinates: dict[str, Any] = {"time": ("time", track.t, {"units": "s"})}
     if isinstance(motion, Oscillation):
         fit = {"fit": motion.waveform.position, "residual": motion.waveform.residual, "rest": motion.rest.at(track.t)}
-        variables |= {name: ("time", values, {"units": per["m"]}) for name, values in fit.items()}
+        variables |= {name: ("time", values, {"units": of_value}) for name, values in fit.items()}
         smoothed = smoothed_or_why(analysis)
         if not isinstance(smoothed, str):
-            for name, unit in (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2")):
+            for name, unit in (("position", of_value), ("velocity", of_first), ("acceleration", of_second)):
                 for each in (name, f"u_{name}"):
-                    variables[each] = ("time", getattr(smoothed, each), {"units": per[unit]})
+                    variables[each] = ("time", getattr(smoothed, each), {"units": unit})
         damping, windows = motion.damping, motion.demodulated
         coordinates["window"] = ("window", windows.t, {"units": "s", "long_name": "centre of a window"})
         coordinates["law"] = ("law", list(damping.fits))
         curves = [fit.amplitude(windows.t - damping.t0) for fit in damping.fits.values()]
         variables |= {
-            "amplitude_of_window": ("window", windows.amplitude, {"units": per["m"]}),
-            "u_amplitude_of_window": ("window", damping.scatter.u, {"units": per["m"]}),
+            "amplitude_of_window": ("window", windows.amplitude, {"units": of_value}),
+            "u_amplitude_of_window": ("window", damping.scatter.u, {"units": of_value}),
             "kept": ("window", damping.scatter.kept, {"long_name": "whether the laws are fitted to it"}),
             "phase_of_window": ("window", windows.phase, {"units": "rad"}),
-            "law_amplitude": (("law", "window"), np.array(curves), {"units": per["m"]}),
+            "law_amplitude": (("law", "window"), np.array(curves), {"units": of_value}),
         }
     coefficients = motion.derived.coefficients if isinstance(motion, Oscillation) else {}
     for name, x in {**analysis.estimates, **coefficients}.items():

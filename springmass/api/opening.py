@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from springmass.api.analysis import Analysis
 from springmass.api.sources import analyse
 from storage.run_file.reading import Run as Stored
-from storage.run_file.reading import open_run as open_stored
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,8 +21,6 @@ class Run(Stored):
 
     Everything else is as in :class:`storage.run_file.reading.Run`.
     """
-
-    __slots__ = ()
 
     def sel(self, *, time: slice) -> Part:
         """Return the samples between two times, as xarray's ``sel`` does.
@@ -68,7 +64,7 @@ class Part:
         return analyse(self.run, scene, from_s=self.from_s, to_s=self.to_s, **how)
 
     def dataset(self) -> xr.Dataset:
-        """Return these samples as a dataset that reads them on first use."""
+        """Return these samples as a checked dataset in memory."""
         return self.run.dataset().sel(time=slice(self.from_s, self.to_s))
 
 
@@ -83,8 +79,7 @@ def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
 
     Raises
     ------
-    storage.errors.NotARun, storage.errors.RunDamaged
-        Under the same conditions as in :func:`storage.run_file.reading.open_run`.
+    storage.errors.NotARun, storage.errors.RunDamaged, storage.errors.RunOpen
+        Under the same conditions as in :class:`storage.run_file.reading.Run`.
     """
-    found = open_stored(Path(path), unverified=unverified)
-    return Run(found.path, found.handle, found.header, found.sha256, found.unverified)
+    return Run(path, unverified=unverified)

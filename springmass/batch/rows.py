@@ -86,7 +86,6 @@ FAILED = ("failed", "ended", "no_oscillation")
 LARGEST = 1e100
 """Maximum magnitude of numbers in a row, whose square is still finite. Larger estimates are left out."""
 TAG = re.compile(r"[a-z][a-z0-9_]*")
-_DEEPEST = 5  # nesting depth: row, job, scene, table of one part of the bench, and a value with its u
 
 Digest = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 NoDigest = Annotated[str, Meta(pattern="^([0-9a-f]{64})?$")]
@@ -209,7 +208,7 @@ def checked_row(text: bytes, key: str) -> dict[str, Any]:
         For the first value that is invalid in a row.
     """
     row: dict[str, Any] = parsed(text, key)
-    decoded(row, _Row, key, _DEEPEST)
+    decoded(row, _Row, key)
     return row
 
 

@@ -127,7 +127,7 @@ class Store:
         """Read the listing; if it cannot be read, the course counts as incomplete."""
         with contextlib.suppress(OSError, ValueRefused):
             text = read_regular(self._parts / _LISTING)
-            self._listing = decoded(parsed(text, _LISTING), _Listing, _LISTING, 3)
+            self._listing = decoded(parsed(text, _LISTING), _Listing, _LISTING)
 
     def read(self) -> None:
         """Read the listing and every part, and record which parts are damaged."""

@@ -6,13 +6,10 @@ import json
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 
-from pipeline.findings.examples import EXAMPLES
-from pipeline.findings.registry import FINDINGS, FindingKind
+from pipeline.findings.finding import Found, Kind, kinds, word
 from springmass.errors import OK, USAGE, ProgramError
 from springmass.options import JsonOption
 from springmass.terminal.printing import wrapped
-
-__all__ = ["run"]
 
 COLUMNS = 80
 INDENT = " " * 9
@@ -20,49 +17,50 @@ INDENT = " " * 9
 
 def run(codes: Sequence[str], options: JsonOption) -> int:
     """Print each finding asked for; without a code, every code with its meaning by symptom."""
+    known = kinds()
     for code in codes:
-        if code not in FINDINGS:
-            near = get_close_matches(code, FINDINGS, n=1)
+        if code not in known:
+            near = get_close_matches(code, known, n=1)
             hint = f"did you mean {near[0]}?" if near else "springmass explain lists all codes"
             raise ProgramError(f"there is no finding {code!r}; {hint}", USAGE)
     if options.json:
-        print(json.dumps([_fields(code, FINDINGS[code]) for code in codes or FINDINGS]))
+        print(json.dumps([_fields(code, known[code]) for code in codes or known]))
     elif codes:
-        print("\n\n".join(_explained(code, FINDINGS[code]) for code in codes))
+        print("\n\n".join(_explained(code, known[code]) for code in codes))
     else:
-        print(_listed(FINDINGS))
+        print(_listed(known))
     return OK
 
 
-def _fields(code: str, kind: FindingKind) -> dict[str, object]:
+def _fields(code: str, kind: Kind) -> dict[str, object]:
     return {
         "code": code,
-        "severities": list(kind.severities),
-        "symptom": kind.symptom.value,
+        "severities": list(kind.severity),
+        "symptom": kind.symptom,
         "meaning": kind.meaning,
         "cause": kind.cause,
-        "advice": kind.advice,
-        "example": EXAMPLES[code],
+        "advice": kind.advice[-1],
+        "example": word(Found(code, kind.example)).message,
         "figure": kind.figure,
     }
 
 
-def _explained(code: str, kind: FindingKind) -> str:
-    severity = " or ".join("note" if each == "info" else each for each in kind.severities)
+def _explained(code: str, kind: Kind) -> str:
+    severity = " or ".join("note" if each == "info" else each for each in kind.severity)
     rows = [
         ("Meaning", kind.meaning),
         ("Cause", kind.cause),
-        ("Advice", kind.advice or "Nothing needs doing."),
-        ("Example", EXAMPLES[code]),
+        ("Advice", kind.advice[-1] or "Nothing needs doing."),
+        ("Example", word(Found(code, kind.example)).message),
     ]
     if kind.figure:
         rows.append(("Figure", f"The {kind.figure} figure of the report shows it."))
-    lines = [f"{code} ({severity}; {kind.symptom.value.lower()})"]
+    lines = [f"{code} ({severity}; {kind.symptom.lower()})"]
     return "\n".join([*lines, *(wrapped(f"{name + ':':<9}{text}", INDENT, COLUMNS) for name, text in rows)])
 
 
-def _listed(findings: Mapping[str, FindingKind]) -> str:
+def _listed(known: Mapping[str, Kind]) -> str:
     groups: dict[str, list[str]] = {}
-    for code, kind in findings.items():
-        groups.setdefault(kind.symptom.value, []).append(wrapped(f"  {code}: {kind.meaning}", " " * 6, COLUMNS))
+    for code, kind in known.items():
+        groups.setdefault(kind.symptom, []).append(wrapped(f"  {code}: {kind.meaning}", " " * 6, COLUMNS))
     return "\n\n".join("\n".join([symptom, *lines]) for symptom, lines in groups.items())

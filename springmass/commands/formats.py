@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import NeedsAnswer, visible
+from acquisition.recordings.base import Survey
 from acquisition.recordings.explained import explain
-from acquisition.recordings.identify import formats, inspect
-from acquisition.recordings.inspection import Inspection, Survey
+from acquisition.recordings.identify import Inspection, formats, inspect
 from springmass.errors import OK, USAGE, ProgramError, suggest
 from springmass.options import FormatsOptions
 from springmass.runs.json_results import picked, plain

@@ -24,7 +24,7 @@ BAUDS = (115200, 9600)
 
 def run(options: PortsOptions) -> int:
     """List ports and the sensors on them: listen to each port for a second at each of the usual speeds."""
-    rows = [_row(port.device, port.description, not options.no_probe) for port in list_ports()]
+    rows = [_row(port.device, port.description or "", not options.no_probe) for port in list_ports()]
     rows += [_row(address, "named on the command line", True) for address in options.port]
     if options.json:
         print(json.dumps(rows))

@@ -33,7 +33,7 @@ from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.operator import Closed, Operator
 from springmass.session.options import RunLimits, RunListeners
 from springmass.session.output import default_name, demand_new
-from springmass.session.session import BYTES_PER_READ, Ended, GivenUp, Sensor, Session, Trigger
+from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, Trigger
 from springmass.session.simulated_bench import REST_M, Release, bench_position
 from springmass.session.stops import EndReason, Stops
 from springmass.session.trigger import Disarmed
@@ -43,7 +43,8 @@ from springmass.terminal.recording import END_WORDS, ProgressLine
 from springmass.terminal.style import style_of
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
-from storage.recovery.recover import RecoverReport, recover
+from storage.recovery.recover import recover
+from storage.recovery.report import RecoverReport
 from storage.run_file.reading import open_run
 
 __all__ = ["run"]
@@ -102,7 +103,10 @@ def run(options: RecordOptions, page_options: PageOptions) -> int:
             if not os.path.lexists(log):
                 raise
             # The log is intact up to the last data written to the disk; none of it is removed.
-            lost = "" if session.given_up is None else f"; {_given_up(session.given_up)}"
+            lost = ""
+            if session.given_up is not None:
+                reads, size = session.given_up
+                lost = f"; the disk did not take {reads} reads ({size} bytes)"
             console.line(
                 f"springmass: stopped immediately by {END_WORDS[stops.by or EndReason.CTRL_C]}{lost}; "
                 f"{_what_to_do(log)}"
@@ -115,8 +119,6 @@ def run(options: RecordOptions, page_options: PageOptions) -> int:
 def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple[int, Path | None]:
     """Build the run file, report the outcome of the recording, and return exit code and file of the first run."""
     log, status = ended.log.path, ended.status
-    if status.astray:
-        console.line(f"springmass: {log}: {status.astray}; the run file is built from what was recorded")
     for line in session.failures.describe():
         console.line(line)
     if status.error:
@@ -124,16 +126,14 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple
         console.line(f"springmass: {status.dropped_records} records that came later were not kept")
     whole = not status.error and not status.dropped_records
     try:
-        if status.astray:
-            out.parent.mkdir(parents=True, exist_ok=True)  # the folder may have been moved with the log
+        out.parent.mkdir(parents=True, exist_ok=True)  # the folder may have been moved with the log
         report = recover(ended.log, out, remove_log=whole, provenance=made_now())
     except Exception as error:
-        left = f"{status.astray}, so it is under another name or lost" if status.astray else _what_to_do(log)
-        console.line(f"springmass: the run file was not built ({one_line(error)}); {left}")
+        console.line(f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}")
         return SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE, None
     for line in report.describe():
         console.line(line)
-    if not (report.log_removed or status.astray):
+    if not report.log_removed and log.exists():
         console.line(f"{log}: the log stays")
     if console.terminal:
         console.line(f"next: springmass analyse {shlex.quote(str(report.main.path))}")
@@ -141,7 +141,8 @@ def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple
 
 
 def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: Console) -> int:
-    if useless := [run.path for run in report.runs if not _usable(run.path, run.sensor.channel, session)]:
+    first = [run for run in report.runs if run.part == 1]
+    if useless := [run.path for run in first if not _usable(run.sensor.channel, report, session)]:
         named = ", ".join(map(str, useless))
         console.line(f"springmass: {named}: no usable distance was recorded; check aim, distance and wiring")
         return SENSOR
@@ -150,7 +151,7 @@ def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: C
             "springmass: the disk is full or broken and ended the recording; the run holds everything before that"
         )
         return SENSOR
-    if any(run.gone for run in report.runs):
+    if ended.absent:
         return SENSOR
     if ended.by in (EndReason.SECONDS, EndReason.PAGE):
         return OK
@@ -158,19 +159,16 @@ def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: C
     return INTERRUPTED
 
 
-def _usable(path: Path, channel: int, session: Session) -> bool:
-    """Whether a run contains a distance: one that was displayed, or any in the file."""
+def _usable(channel: int, report: RecoverReport, session: Session) -> bool:
+    """Whether a sensor's parts contain a distance: one that was displayed, or any in the files."""
     shown = session.shown
     if shown is not None and channel in shown.useful and shown.useful[channel].usable:
         return True
-    with open_run(path) as run:
-        return bool(np.isfinite(run.samples().distance).any())
-
-
-def _given_up(given_up: GivenUp) -> str:
-    status = given_up.status
-    count = f"the disk did not take {status.dropped_records} reads ({status.dropped_bytes} bytes)"
-    return count if given_up.counted else f"{count} and not this count either"
+    for part in report.parts_of(channel):
+        with open_run(part.path) as run:
+            if np.isfinite(run.samples().distance).any():
+                return True
+    return False
 
 
 def _what_to_do(log: Path) -> str:
@@ -348,7 +346,7 @@ def _sensors(options: RecordOptions, scene: Scene | None, bench: Release) -> Ite
         yield sensors, "live"
     finally:
         for sensor in sensors:
-            sensor.transport.close()
+            sensor.port.close()
 
 
 @contextlib.contextmanager
@@ -376,14 +374,8 @@ def _simulated(
     rng = np.random.default_rng(options.seed)
     # The simulated sensor must keep sending while the session listens, waits and closes.
     seconds = (options.seconds or UNLIMITED_S) + (options.still or 0.0) + 60.0
-    with VirtualPort(
-        family,
-        VirtualRangefinder(position, model, rng),
-        SystemClock(),
-        seconds=seconds,
-        rng=rng.spawn(1)[0],
-        options=family_options,
-    ) as virtual:
+    finder = VirtualRangefinder(position, model, rng)
+    with VirtualPort(family, finder, SystemClock(), seconds=seconds, options=family_options) as virtual:
         port = SerialPort(virtual.path, family.baud)
         virtual.start()
         bench.begin()

@@ -10,12 +10,13 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band, spread
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
-from pipeline.results.effects import Effect
-from pipeline.results.simulated_effects import simulated_effects
+from pipeline.results.effects import Effect, simulated_effects
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.options import SimulateOptions
 from springmass.runs.analysing import load_and_analyse
@@ -120,7 +121,7 @@ def _band(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
         band = spread(ready.solved, seconds, ready.measured)
     except DynamicsError as error:
         return None, f"none: {error}"
-    return band, band.words
+    return band, f"{band.members} motions drawn from the uncertainties of {', '.join(band.quantities)}"
 
 
 def _tolerance(options: SimulateOptions, band: Band | None) -> tuple[float | None, str]:
@@ -134,7 +135,7 @@ def _tolerance(options: SimulateOptions, band: Band | None) -> tuple[float | Non
     found = float(options.tolerance)
     words = f"tolerance        {found:g} of the amplitude"
     if band is not None and 0.0 < found < 0.1 * FAR_BELOW * band.relative_u:
-        turns = band.sensitivity.phase_at_end()
+        turns = dict(zip(band.quantities, np.abs(band.of_log[:, -1].imag).tolist(), strict=True))
         name = max(turns, key=lambda each: turns[each])
         words += (
             f", far below the band: u({name}) alone is {turns[name]:.1g} rad after {band.t[-1]:.3g} s; "

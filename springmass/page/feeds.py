@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import secrets
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from acquisition.block import Block
 from acquisition.live.calibration import Calibration
-from springmass.page.view import View
+from acquisition.live.decoding import SensorChain
+from springmass.page.view import Series, View
 from springmass.runs.loading import Loaded
-from storage.errors import StorageError
+from storage.errors import NotALog, StorageError
 from storage.schema import plain
-from storage.wire_log.following import LogFollower
-from storage.wire_log.log_header import event_content
-from storage.wire_log.records import Kind, Record
-from storage.wire_log.wire_samples import LogDecoder, chains_of
+from storage.wire_log.parts import Part
+from storage.wire_log.records import Kind, Record, event_content
+from storage.wire_log.scanning import read_log
+from storage.wire_log.wire_samples import LogDecoder, chain_of
 
 __all__ = ["LogFeed", "view_of"]
 
+AT_ONCE = 10_000
+"""Maximum number of records per call: 100 s of a sensor at 100 Hz. A long log is therefore shown piece by piece."""
 MOST_NOTES = 1000
 NOT_LISTED = frozenset({"calibration", "ended"})
 """Kinds of events that the page does not list, because a person at the bench need not read them."""
@@ -39,21 +45,27 @@ class LogFeed:
     """
 
     def __init__(self, path: Path) -> None:
-        self._log = LogFollower(path)
+        self._log = read_log(path)
         header = self._log.header
-        self._decoder = LogDecoder(header.sensors, chains_of(header.sensors), self._note)
-        chains = self._decoder.chains
+        if header is None:
+            raise NotALog(path, "expected a wire log with a header, got none", "name the log of a recording")
+        self._scan = self._log.scan()
+        self._sensors = {sensor.channel: sensor for sensor in header.sensors}
+        self._series: dict[Part, Series] = {}
+        self._shown: list[Part] = [Part(channel, 1) for channel in self._sensors]
         self.view = View(
             "LIVE",
             path.with_suffix(".h5").name,
             header.title,
-            chains[0].timebase.rate_hz,
+            0.0,
             [f"{sensor.channel}: {sensor.family}" for sensor in header.sensors],
             simulated=header.kind == "simulated",
             calibration=_calibration(header.sensors[0].calibration),
-            info=chains[0].info(header.sensors[0].port, header.kind),
             provenance={"sensor": plain(header.sensors[0]), "events": []},
         )
+        self._decoder = LogDecoder(self._sensors, self._begin, self._note)
+        self.view.rate_hz = self._decoder.chains[self._shown[0]].timebase.rate_hz
+        self._take(())
         self.scene = header.scene
         self._timed: list[Record] = []
 
@@ -62,31 +74,42 @@ class LogFeed:
         if self.view.error or self.view.ended:
             return
         try:
-            self._take(self._decoder.blocks(self._log.records(), growing=True))
-            if self._log.ended:
-                self._take(self._decoder.blocks((), growing=False))
-                self.view.provenance["decoding"] = self._decoder.chains[0].report()
+            self._take(islice(self._scan.records(self._log.grow()), AT_ONCE))
         except (StorageError, OSError) as error:
             self.view.error = str(error)
         self._place_marks()
-        self.view.ended = self._log.ended
+        self.view.ended = self._scan.damage.ended
 
-    def _take(self, blocks: Iterator[tuple[int, Block]]) -> None:
-        chain, port = self._decoder.chains[0], self._decoder.sensors[0].port
-        for number, block in blocks:
-            self.view.series[number].push(block)
-            # The kind of clock is unknown until the first reading.
-            self.view.info = chain.info(port, "simulated" if self.view.simulated else "live")
+    def _take(self, records: Iterable[Record]) -> None:
+        for part, block in self._decoder.blocks(records):
+            self._series[part].push(block)
+        chain = self._decoder.chains[self._shown[0]]
+        if self._scan.damage.ended:
+            self.view.provenance["decoding"] = chain.report()
+        # The kind of clock is unknown until the first reading.
+        port = self._sensors[self._shown[0].sensor].port
+        self.view.info = chain.info(port, "simulated" if self.view.simulated else "live")
+
+    def _begin(self, part: Part) -> SensorChain:
+        """Begin a part: the view then shows the sensor's samples from the first one of this part on."""
+        number = list(self._sensors).index(part.sensor)
+        self._shown[number] = part
+        if part.number == 1:
+            self._series[part] = self.view.series[number]
+        else:
+            self._series[part] = Series()
+            series = [self._series[shown] for shown in self._shown]
+            self.view = replace(self.view, series=series, session=secrets.token_hex(8))
+        return chain_of(self._sensors[part.sensor])
 
     def close(self) -> None:
         """Close the log."""
         self._log.close()
 
-    def _note(self, record: Record) -> None:
+    def _note(self, record: Record, content: dict[str, Any]) -> None:
         if record.kind is Kind.MARK:
             self._timed.append(record)
         elif record.kind is Kind.EVENT and len(self.view.notes) < MOST_NOTES:
-            content = event_content(record.payload)
             if content["kind"] == "trigger":
                 self._timed.append(record)
             if content["kind"] == "still":

@@ -96,6 +96,8 @@ class PageState:
             self._take(self._recorder_states.get())
         if self._feed is not None:
             self._feed.poll()
+            if self.view is not self._feed.view and self.after is None:
+                self._lay(self._feed.view, self._feed.scene)
             if self.controls is None and self.view is not None and self.view.ended and self.watcher is not None:
                 self.watcher.complete(Path(self._log))
 

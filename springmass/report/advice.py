@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.findings.registry import FINDINGS
+from pipeline.findings.finding import kinds
 from springmass.report.words import typeset
 
 __all__ = ["LAW_CODES", "STANDING", "Harm", "Notice", "by_harm", "harm_of", "lab_report_line", "notices_of"]
@@ -37,55 +37,6 @@ class Harm(enum.IntEnum):
     """No action is needed."""
 
 
-_SCALE = frozenset(
-    {
-        "implausible_motion",
-        "implausible_distance",
-        "implausible_sag",
-        "undersampled",
-        "unit_assumed",
-        "rate_assumed",
-        "time_assumed",
-        "scene_implausible",
-        "pair_mismatch",
-        "stale_header",
-        "clock_refused",
-        "sensor_unconfirmed",
-        "sensor_replaced",
-        "other_device",
-    }
-)
-_PART = frozenset(
-    {
-        "overdamped",
-        "short_record",
-        "touched",
-        "restarted",
-        "phase_jump",
-        "handled",
-        "not_converged",
-        "no_law_fits",
-        "clipped",
-        "sensor_lost",
-        "readings_dropped",
-        "zero_filled_tail",
-        "laws_differ",
-    }
-)
-_IMPROVABLE = frozenset(
-    {
-        "false_echoes",
-        "missing_samples",
-        "lost_target",
-        "duplicate_time",
-        "non_monotonic_time",
-        "spring_mass_missing",
-        "uncertainty_missing",
-        "truncated_row",
-        "malformed_rows",
-    }
-)
-
 _CONSEQUENCES = {
     Harm.UNUSABLE: "Values that depend on this are not reported.",
     Harm.SCALE: "All values depend on this; I checked it by ...",
@@ -112,11 +63,7 @@ def harm_of(code: str, severity: str) -> Harm:
     """
     if severity != "warning":
         return Harm.UNUSABLE if severity == "error" else Harm.NOTE
-    if code in _SCALE:
-        return Harm.SCALE
-    if code in _PART:
-        return Harm.PART
-    return Harm.IMPROVABLE if code in _IMPROVABLE else Harm.UNCERTAINTY
+    return Harm[kinds()[code].harm.upper()]
 
 
 def by_harm(findings: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -190,7 +137,7 @@ def notices_of(findings: Iterable[Mapping[str, Any]], figures: Sequence[str]) ->
             if code not in groups["law"]:
                 groups["law"].append(code)
             continue
-        figure = FINDINGS[code].figure
+        figure = kinds()[code].figure
         notice = Notice(
             code,
             severity,

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
-from pipeline.numerics.quantity import in_unit, noun
+from pipeline.numerics.quantity import Unit, noun
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import UNUSABLE
 
@@ -39,8 +39,8 @@ def columns_of(unit: str) -> tuple[str, ...]:
     if unit == "m":
         return COLUMNS
     word = noun(unit).replace(" ", "_")
-    names = {f"smooth_{word}": "m", "derivative": "m/s", "second_derivative": "m/s^2"}
-    smooth = [f"{name}{_spelt(in_unit(form, unit))}" for name, form in names.items()]
+    names = (f"smooth_{word}", "derivative", "second_derivative")
+    smooth = [f"{name}{_spelt(Unit(1, -order).of(unit))}" for order, name in enumerate(names)]
     own = f"{word}{_spelt(unit)}"
     return ("time_s", own, "used", *(x for each in smooth for x in (each, f"u_{each}")))
 

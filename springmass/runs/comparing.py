@@ -10,7 +10,7 @@ from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.damping.joint import JointDamping, JointFit, join
 from pipeline.errors import AnalysisError
-from pipeline.findings.finding import Finding
+from pipeline.findings.finding import Finding, Found, word
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.derive import limited
@@ -168,11 +168,11 @@ def _of_one_bob(motions: list[tuple[str, Oscillation]], scenes: list[Scene]) -> 
 def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Finding]:
     findings = []
     if comparison.exchanged:
-        findings.append(Finding("runs_exchanged", "error", comparison.message))
+        findings.append(Found("runs_exchanged", {"sentence": comparison.message}))
     elif not comparison.agree:
-        findings.append(Finding("springs_differ", "error", comparison.message))
-    findings += [Finding("laws_differ", "warning", one.message) for one in joint if not one.one_law]
-    return findings
+        findings.append(Found("springs_differ", {"sentence": comparison.message}))
+    findings += [Found("laws_differ", {"sentence": one.message}) for one in joint if not one.one_law]
+    return [word(found) for found in findings]
 
 
 def _law(fit: JointFit) -> dict[str, Any]:

@@ -12,8 +12,7 @@ from typing import Any
 
 from acquisition.recordings.recording import Trap
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.findings.finding import Finding, by_severity
-from pipeline.findings.registry import FINDINGS, UNKNOWN_CODE
+from pipeline.findings.finding import UNKNOWN_CODE, Finding, Found, by_severity, kinds, word
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.budget import Contribution
 from pipeline.results.classic import Classic
@@ -123,10 +122,10 @@ def with_traps(findings: Sequence[Finding], traps: Sequence[Trap]) -> tuple[Find
 
 
 def _of_reader(trap: Trap) -> Finding:
-    if trap.code in FINDINGS:
-        return Finding(trap.code, FINDINGS[trap.code].severities[0], _sentence(trap.message))
+    if trap.code in kinds():
+        return word(Found(trap.code, {"sentence": _sentence(trap.message)}))
     # A run file may come from a version that knows more codes than this one.
-    return Finding(UNKNOWN_CODE, FINDINGS[UNKNOWN_CODE].severities[0], f"{trap.code}: {trap.message}")
+    return word(Found(UNKNOWN_CODE, {"sentence": f"{trap.code}: {trap.message}"}))
 
 
 def _sentence(clause: str) -> str:

@@ -320,17 +320,18 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
     """Recover a log into a temporary run file and load that; the log is not changed."""
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         report = recover(path, Path(folder) / "run.h5", growing=True)
-        names = {str(each.sensor.channel): each for each in report.runs}
-        if channel is None and len(report.parts_of) == len(names) - 1:
-            # The other sensors are parts of this one, from before or after another device took its place.
-            channel = str(report.main.sensor.channel)
-        wanted = [each for number, each in names.items() if channel in (None, number, each.sensor.port)]
+        ports = {str(run.sensor.channel): run.sensor.port for run in report.runs}
+        wanted = [number for number, port in ports.items() if channel in (None, number, port)]
         if len(wanted) != 1:
-            sensors = ", ".join(f"{number} at {each.sensor.port}" for number, each in names.items())
+            sensors = ", ".join(f"{number} at {port}" for number, port in ports.items())
             refused = "" if channel is None else f'channel "{channel}" is not in the log, '
-            need = MissingItem(Missing.CHANNEL, tuple(names), next(iter(names)))
+            need = MissingItem(Missing.CHANNEL, tuple(ports), next(iter(ports)))
             raise NeedsAnswer(Question(str(path), (need,), reason=f"{refused}the log holds the sensors {sensors}"))
-        loaded = _load_run(wanted[0].path)
+        parts = report.parts_of(int(wanted[0]))
+        longest = max(parts, key=lambda run: run.samples)
+        if len(parts) > 1:
+            tell(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
+        loaded = _load_run(longest.path)
         originals = loaded.originals  # read while the run file exists
     return replace(
         loaded,

@@ -11,8 +11,8 @@ import numpy as np
 
 from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer, UnknownFormat
 from acquisition.recordings.base import read_bytes
+from acquisition.recordings.families.archive import members
 from acquisition.recordings.identify import inspect, sniff
-from acquisition.recordings.parts import members
 from acquisition.recordings.questions import Missing
 from springmass.errors import ProgramError
 from springmass.runs.loading import load

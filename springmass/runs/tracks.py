@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -70,7 +69,7 @@ def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str,
         return {}
     noted = provenance.get("decoding", {}).get("clock", {})
     # The stored comparison uses the pings, whose times are in no sample; files of earlier versions may lack it.
-    comparison = noted if noted.keys() >= COMPARED else _compared_anew(samples)
+    comparison = noted if noted.keys() >= COMPARED else fit_clock(samples.t, samples.host_ns).to_mapping()
     clock = {
         "clock_limit": 1e-6 * noted.get("limit_ppm", RESONATOR_PPM),
         "held_samples": comparison["held_readings"],
@@ -80,20 +79,6 @@ def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str,
         return clock
     rate, u_rate = comparison["rate_error_ppm"] * 1e-6, comparison["u_rate_error_ppm"] * 1e-6
     return {**clock, "rate_error": rate, "u_rate_error": u_rate, "compared_s": comparison["span_s"]}
-
-
-def _compared_anew(samples: Block) -> dict[str, Any]:
-    """Compare the clocks using the timestamps of a run's samples."""
-    assert samples.host_ns is not None
-    fit = fit_clock(samples.t, samples.host_ns)
-    known = math.isfinite(fit.rate_error_ppm)
-    return {
-        "rate_error_ppm": fit.rate_error_ppm if known else None,
-        "u_rate_error_ppm": fit.u_rate_error_ppm if known else None,
-        "span_s": fit.span_s,
-        "held_readings": fit.held,
-        "longest_stall_s": fit.longest_stall_s,
-    }
 
 
 def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:

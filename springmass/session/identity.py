@@ -13,7 +13,7 @@ __all__ = ["meeting", "outdated", "settings_of"]
 
 def meeting(sensor: Sensor, identity: Identity) -> Iterator[str]:
     """Yield lines about a sensor that reported its identity."""
-    port, rate_hz = sensor.transport.name, identity.settings.get("rate_hz")
+    port, rate_hz = sensor.port.name, identity.settings.get("rate_hz")
     yield f"{port}: {identity}{settings_of(identity)}"
     if outdated(identity):
         yield (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import itertools
 import os
 import re
@@ -29,7 +30,7 @@ def default_name(what: str, now: datetime) -> Path:
 
 
 def demand_new(path: Path, sensors: int) -> None:
-    """Refuse existing or impossible names for the log and for each sensor's run file.
+    """Refuse existing or impossible names for the log and for each sensor's run files.
 
     Raises
     ------
@@ -37,7 +38,9 @@ def demand_new(path: Path, sensors: int) -> None:
         With exit code 2 if a run file or the log exists, even as a dangling link, or if a name is too long.
     """
     longest = _longest_name(path.parent)
-    for there in dict.fromkeys((path, path.with_suffix(".wire"), *run_paths(path, range(sensors)))):
+    runs = run_paths(path, range(sensors))
+    parts = [part for run in runs for part in sorted(run.parent.glob(f"{glob.escape(run.stem)}.part*.h5"))]
+    for there in dict.fromkeys((path, path.with_suffix(".wire"), *runs, *parts)):
         if (size := len(os.fsencode(there.name))) > longest:
             raise ProgramError(
                 f"{there}: expected a name of at most {longest} bytes, got {size}; choose a shorter one", USAGE

@@ -1,8 +1,8 @@
 """Pass reads from the port to the recorder unchanged, and then through the decoders.
 
-Both happen on the reading thread, in this order, so that a defect of a decoder cannot lose bytes. Exceptions of a
-decoder are counted and go no further. A second thread for decoding would be woken by every read, which costs more than
-decoding a reading.
+Both happen on the reading threads, in this order, so that a defect of a decoder cannot lose bytes. Exceptions of a
+decoder are counted and go no further. A separate thread for decoding would be woken by every read, which costs more
+than decoding a reading.
 """
 
 from __future__ import annotations
@@ -10,144 +10,167 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import partial
-from typing import Any, cast
+from dataclasses import dataclass, field
+from typing import Any
 
 from acquisition.block import Block
-from acquisition.decoders.family import Polled
+from acquisition.decoders.family import Decoder
 from acquisition.live.decoding import SensorChain
-from acquisition.live.line import Line
-from acquisition.readings import Read, Reading
+from acquisition.readings import NO_READINGS, Read, Reading
 from springmass.session.failures import Failures
-from springmass.session.sensors import Back, Proof, Sensor
+from springmass.session.sensors import Sensor
 from storage.recorder import Recorder
 from storage.wire_log.records import HIGHEST_CHANNEL
-
-__all__ = ["Tee"]
 
 HEARD_BYTES = 4096
 """Number of first bytes kept per sensor, enough to identify its kind."""
 HELD_SAMPLES = 1 << 15
 """Maximum samples per sensor waiting for the display: five minutes at 100 Hz if a display hangs, in 8 MB."""
+UNDECIDED_BYTES = 4096
+"""Number of bytes from a network port without a reading after which its sensor counts as another part."""
+SILENCE_S, SILENT_PERIODS = 1.5, 5.0
+"""A sensor counts as absent if it was silent at the end for longer than this time, s, and this many periods."""
+
+
+@dataclass(slots=True)
+class Return:
+    """A port that came back and has not sent enough to decide where its bytes go, with those bytes."""
+
+    host_ns: int
+    facts: Mapping[str, Any]
+    decoder: Decoder
+    reads: list[Read] = field(default_factory=list)
 
 
 class Tee:
     """Passes every read to the recorder, if there is one, and to its sensor's chain.
 
-    Parameters
-    ----------
-    chains : list of SensorChain
-        Chains by channel. During a recording, another sensor that comes back on a port gets an additional chain.
-    failures : Failures, optional
-        Counts the exceptions of decoders.
-
-    Attributes
-    ----------
-    gone : dict of int to str
-        Reasons for lost ports, by channel; a port that came back is removed.
-    readings : list of int
-        Number of readings by channel.
-    unshown : int
-        Number of samples not fetched in time. They are recorded and in the run file, but not shown.
+    A channel is a part of what one port sends: the ports have the first channels, and a sensor that comes back during
+    a recording begins another one. ``gone`` has the reasons for lost ports, ``readings`` the number of readings by
+    channel, and ``unshown`` the number of samples that were not fetched in time; they are recorded but not shown.
     """
 
-    def __init__(self, chains: list[SensorChain], failures: Failures | None = None) -> None:
+    def __init__(
+        self, chains: list[SensorChain], failures: Failures | None = None, sensors: Sequence[Sensor] = ()
+    ) -> None:
+        self._sensors = sensors
         self._chains = chains
         self._failures = failures or Failures()
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
-        self._preview = False
+        self._parts = False  # whether a port that comes back begins another channel
         self._kept: deque[Read] | None = None
         self._heard = [bytearray() for _ in chains]
-        self._sensors: Sequence[Sensor] = ()
-        # Channel for each port's bytes: its own, or an additional one if another sensor came back on the port.
-        self._channels = list(range(len(chains)))
-        self._last: list[Reading | None] = [None for _ in chains]
+        self._channels = list(range(len(chains)))  # current channel of each port
+        self._begun: set[int] = set()  # ports that sent something in the current run
+        self._returns: dict[int, Return] = {}
+        self._last: list[Reading | None] = [None for _ in chains]  # of each port
         self.gone: dict[int, str] = {}
         self.readings = [0 for _ in chains]
         self.unshown = 0
 
-    def line(self, channel: int, sensors: Sequence[Sensor]) -> Line:
-        """Return how the reader talks to a sensor; a polled sensor is polled as its chain's decoder requires.
-
-        The proof required of a sensor that comes back is made from the state of the sensors at that time.
-        """
-        self._sensors = sensors
-        family = sensors[channel].family
-        decoder = None if family.poll is None else partial(self._polled, channel)
-        transport = sensors[channel].transport
-        return Line(transport, channel, family.poll, decoder, partial(self._proof, channel), family.identify)
-
-    def _polled(self, channel: int) -> Polled:
-        return cast(Polled, self._chains[self._channels[channel]].decoder)
-
-    def _proof(self, channel: int) -> Proof | None:
-        """Return the proof required on a port that came back, based on the last sensor on that port."""
-        sensor, now = self._sensors[channel], self._channels[channel]
-        identity = self._chains[now].status.identity or (sensor.identity if now == channel else None)
-        return replace(sensor, identity=identity).proof(self._last[now])
-
     def reads(self, reads: Sequence[Read]) -> None:
-        """Take the reads of one wake-up; called on the reading thread."""
+        """Take reads of one port; called on its reading thread."""
         with self._lock:
-            if len(self._chains) > len(self._channels):
-                reads = [(self._channels[port], host_ns, data) for port, host_ns, data in reads]
-            if self._recorder is not None:
-                self._recorder.reads(reads)
-            if self._kept is not None:
-                self._kept += reads
-            for channel, host_ns, data in reads:
-                if len(heard := self._heard[channel]) < HEARD_BYTES:
-                    heard += data[: HEARD_BYTES - len(heard)]
-                self._decode(channel, host_ns, data)
+            for read in reads:
+                port = read[0]
+                if port not in self._returns:
+                    self._take(port, [read])
+                elif self._decided(port, self._returns[port], read):
+                    self._take(port, self._returns.pop(port).reads)
 
-    def _decode(self, channel: int, host_ns: int, data: bytes) -> None:
+    def _take(self, port: int, reads: Sequence[Read]) -> None:
+        if self._kept is not None:
+            self._kept += reads
+        channel = self._channels[port]
+        self._begun.add(port)
+        reads = [(channel, host_ns, data) for _, host_ns, data in reads]
+        if self._recorder is not None:
+            self._recorder.reads(reads)
+        for read in reads:
+            self._decode(port, read)
+
+    def _decode(self, port: int, read: Read) -> None:
+        channel, host_ns, data = read
+        if len(heard := self._heard[port]) < HEARD_BYTES:
+            heard += data[: HEARD_BYTES - len(heard)]
         chain = self._chains[channel]
         try:
             chain.take(host_ns, data)
             self.readings[channel] += len(chain.last)
             if chain.last:
-                self._last[channel] = chain.last[-1]
+                self._last[port] = chain.last[-1]
             if len(chain) > HELD_SAMPLES:
                 self.unshown += len(chain.block())
         except Exception as error:  # the bytes are recorded, and a display error must not end the run
             self._failures.note("decoder", error)
 
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
+    def event(self, port: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Take an event; called on the reading thread."""
         with self._lock:
             if kind == "lost":
-                self.gone[channel] = str(facts.get("why", ""))
+                self._settle(port)
+                self.gone[port] = str(facts.get("why", ""))
             elif kind == "reopened":
-                self.gone.pop(channel, None)
+                self.gone.pop(port, None)
                 if self._kept is not None:
                     # The coming run must not contain earlier reads, for they may be from another sensor.
-                    self._kept = deque(read for read in self._kept if read[0] != self._channels[channel])
-                if self._sensors and "sensor" not in facts:
-                    facts = {**facts, "sensor": self._sensors[channel].judged(None, None)}
-                more = self._recorder is not None and not self._preview and len(self._chains) <= HIGHEST_CHANNEL
-                if facts.get("sensor") == Back.ANOTHER and self._recorder is not None and more:
-                    self._go_on(self._recorder, channel, host_ns, facts)
+                    self._kept = deque(read for read in self._kept if read[0] != port)
+                if self._parts:
+                    if port in self._begun:  # else what it sends is the first part
+                        sensor = self._sensors[port]
+                        self._returns[port] = Return(host_ns, facts, sensor.family.decoder(**sensor.options))
                     return
-            channel = self._channels[channel]
-            if self._recorder is not None:
-                self._recorder.event(channel, host_ns, kind, facts)
-            try:
-                chain = self._chains[channel]
-                (chain.returned if kind == "reopened" else chain.lost)()
-            except Exception as error:
-                self._failures.note("decoder", error)
+            self._interrupt(port, host_ns, kind, facts)
 
-    def _go_on(self, recorder: Recorder, port: int, host_ns: int, facts: Mapping[str, Any]) -> None:
-        """Record a port's further data as another sensor, in the next free channel."""
+    def _interrupt(self, port: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
+        channel = self._channels[port]
+        if self._recorder is not None:
+            self._recorder.event(channel, host_ns, kind, facts)
+        try:
+            self._chains[channel].lost()
+        except Exception as error:
+            self._failures.note("decoder", error)
+
+    def _decided(self, port: int, back: Return, read: Read) -> bool:
+        """Keep a read of a port that came back; return whether the channel of its bytes is known now.
+
+        On a network port, the part goes on if the counter of the device runs on, which its first reading shows.
+        """
+        back.reads.append(read)
+        sensor, last = self._sensors[port], self._last[port]
+        if not sensor.port.is_network or last is None:
+            self._begin_part(port, back)
+            return True
+        try:
+            readings = back.decoder.feed(*read[1:])
+        except Exception as error:
+            self._failures.note("decoder", error)
+            readings = NO_READINGS
+        if readings and sensor.runs_on(last, readings[0]):
+            self._interrupt(port, back.host_ns, "reopened", {**back.facts, "sensor": "continued"})
+            return True
+        if readings or sum(len(data) for _, _, data in back.reads) >= UNDECIDED_BYTES:
+            self._begin_part(port, back)
+            return True
+        return False
+
+    def _settle(self, port: int) -> None:
+        """Record in the channel before what a port sent that came back and went, or the recording ended, undecided."""
+        back = self._returns.pop(port, None)
+        if back is not None and back.reads:
+            self._take(port, back.reads)
+
+    def _begin_part(self, port: int, back: Return) -> None:
+        """Record a port's further data in the next free channel; without one, in the same channel after an event."""
         before, channel = self._channels[port], len(self._chains)
-        recorder.event(before, host_ns, "replaced", {**facts, "channel": channel})
-        recorder.event(channel, host_ns, "continues", {**facts, "of": before})
+        if self._recorder is None or channel > HIGHEST_CHANNEL:
+            self._interrupt(port, back.host_ns, "reopened", back.facts)
+            return
+        self._recorder.event(before, back.host_ns, "replaced", {**back.facts, "channel": channel})
+        self._recorder.event(channel, back.host_ns, "continues", {**back.facts, "of": before})
         self._channels[port] = channel
         self._chains.append(self._sensors[port].chain())
-        self._heard.append(bytearray())
-        self._last.append(None)
         self.readings.append(0)
 
     @property
@@ -155,15 +178,25 @@ class Tee:
         """Channel of the sensor now on the first port."""
         return self._channels[0]
 
+    def absent(self, now_ns: int) -> list[int]:
+        """Return the ports that are lost or whose sensor is silent."""
+        with self._lock:
+            return [port for port, sensor in enumerate(self._sensors) if self._is_absent(port, sensor, now_ns)]
+
+    def _is_absent(self, port: int, sensor: Sensor, now_ns: int) -> bool:
+        last, longest_s = self._last[port], SILENT_PERIODS / (sensor.rate_hz or sensor.family.rate_hz)
+        silent = last is None or (now_ns - last.host_ns) * 1e-9 > max(SILENCE_S, longest_s)
+        return port in self.gone or silent
+
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples received since the last call, by channel, for sensors that have any."""
         with self._lock:
             return [(channel, chain.block()) for channel, chain in enumerate(self._chains) if len(chain)]
 
-    def heard(self, channel: int) -> bytes:
+    def heard(self, port: int) -> bytes:
         """Return the first bytes sent by a sensor."""
         with self._lock:
-            return bytes(self._heard[channel])
+            return bytes(self._heard[port])
 
     def keep(self) -> None:
         """Keep all reads from now on, because a run may include data from before its trigger."""
@@ -184,19 +217,21 @@ class Tee:
     def start(self, recorder: Recorder, chains: list[SensorChain], since_ns: int, *, preview: bool = False) -> None:
         """Record all further reads and the kept reads since a given time, each exactly once.
 
-        Polling and decoding start anew with the given chains, like the recorded bytes. In a preview, another sensor
-        that comes back on a port gets no additional channel.
+        Decoding starts anew with the given chains, like the recorded bytes. In a preview, a sensor that comes back gets
+        no additional channel.
         """
         with self._lock:
             kept = [read for read in self._kept or () if read[1] >= since_ns]
             self._kept = None
-            self._recorder, self._chains, self._preview = recorder, chains, preview
-            self._channels = list(range(len(chains)))
+            self._recorder, self._chains, self._parts = recorder, chains, not preview
+            self._channels, self._begun = list(range(len(chains))), {port for port, _, _ in kept}
             recorder.reads(kept)
-            for channel, host_ns, data in kept:
-                self._decode(channel, host_ns, data)
+            for read in kept:
+                self._decode(read[0], read)
 
     def stop(self) -> None:
         """Stop recording."""
         with self._lock:
-            self._recorder = None
+            for port in list(self._returns):
+                self._settle(port)
+            self._recorder, self._parts = None, False

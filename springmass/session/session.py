@@ -24,7 +24,7 @@ from acquisition.clock import Clock
 from acquisition.live.calibration import Calibration, StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortReader
 from springmass import __version__
-from springmass.errors import SENSOR, USAGE, ProgramError
+from springmass.errors import SENSOR, ProgramError
 from springmass.session.display.progress import SECOND_NS, LiveState, Progress, progress_of
 from springmass.session.display.thread import Display, Samples
 from springmass.session.failures import Failures
@@ -59,26 +59,14 @@ class Ended:
     status : RecorderStatus
     log : LogContents
         Contents of the log, available even if its path no longer leads to it.
+    absent : list of int
+        Ports whose sensor was lost or silent at the end.
     """
 
     by: EndReason
     status: RecorderStatus
     log: LogContents
-
-
-@dataclass(frozen=True, slots=True)
-class GivenUp:
-    """The state of a recording that the user ended without waiting for the disk.
-
-    Parameters
-    ----------
-    counted : bool
-        Whether the log contains the counts.
-    status : RecorderStatus
-    """
-
-    counted: bool
-    status: RecorderStatus
+    absent: list[int]
 
 
 class Session:
@@ -100,8 +88,8 @@ class Session:
     ----------
     failures : Failures
         Failures during the recording that did not end it.
-    given_up : GivenUp or None
-        State of the recording if the user did not wait for the disk.
+    given_up : (int, int) or None
+        Number of reads that the disk has not taken, and their bytes, if the user did not wait for it.
     shown : LiveState or None
         State derived from the samples shown so far.
     """
@@ -123,13 +111,13 @@ class Session:
         self._scene = scene
         self._title = title
         self._chains = [sensor.chain() for sensor in self.sensors]
-        self._tee = Tee(self._chains, self.failures)
+        self._tee = Tee(self._chains, self.failures, self.sensors)
         self._reader: PortReader | None = None
         self._reader_failure: BaseException | None = None
         self.stops = stops or Stops()
         self._marks: list[tuple[int, str]] = []
         self.shown: LiveState | None = None
-        self.given_up: GivenUp | None = None
+        self.given_up: tuple[int, int] | None = None
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Start reading, and wait until every sensor has been heard.
@@ -145,10 +133,10 @@ class Session:
             With exit code 4 if a sensor has not been heard after 3 s, or after five periods of a slow sensor. If other
             bytes were received, the message describes them.
         """
-        lines = [self._tee.line(channel, self.sensors) for channel in range(len(self.sensors))]
+        lines = [sensor.line(port) for port, sensor in enumerate(self.sensors)]
         for line in lines:
             if line.greeting:
-                line.transport.write(line.greeting)
+                line.port.write(line.greeting)
         self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
         # A slow sensor can be distinguished from silence only after several of its periods.
@@ -158,7 +146,7 @@ class Session:
         while self._waits_for_word():
             mute = next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)
             if mute is not None and due_ns is not None and self._clock.now_ns() > due_ns:
-                say(f"{self.sensors[mute].transport.name}: nothing readable so far; check power, wiring and --baud")
+                say(f"{self.sensors[mute].port.name}: nothing readable so far; check power, wiring and --baud")
                 due_ns = None
             if self._clock.now_ns() > deadline:
                 if mute is None:
@@ -243,22 +231,14 @@ class Session:
         ------
         Disarmed
             If ``listeners.changed`` returned true during the wait for the trigger.
-        ProgramError
-            With exit code 2 if a trigger is combined with the option ``temperature_every``.
         storage.errors.WriteFailed
             If the log cannot be created.
-        storage.wire_log.window.NotALog
+        storage.errors.NotALog
             If the log cannot be read at the end.
         KeyboardInterrupt
             If the user did not wait until all queued data were written; the log is kept, without its end.
         """
         trigger, rest = limits.trigger, limits.rest
-        if trigger is not None and any(sensor.options.get("temperature_every") for sensor in self.sensors):
-            raise ProgramError(
-                "--trigger keeps replies from before, which cannot be distinguished from temperatures; "
-                "leave --option temperature_every out",
-                USAGE,
-            )
         moment_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, listeners)
         since_ns = moment_ns if trigger is None else moment_ns - int(trigger.keep_s * 1e9)
         # New chains make indices and times count from the run's first byte, as in recovery.
@@ -290,10 +270,10 @@ class Session:
             with contextlib.suppress(WriteFailed):  # the status states the error
                 recorder.close()
         except KeyboardInterrupt:
-            self.given_up = GivenUp(recorder.give_up(), recorder.status)
+            self.given_up = recorder.unwritten()
             raise
         status = recorder.status
-        return Ended(EndReason.DISK if status.error else by, status, recorder.contents())
+        return Ended(EndReason.DISK if status.error else by, status, recorder.contents(), self._tee.absent(end_ns))
 
     def poll(self, wait_s: float) -> list[tuple[int, Block]]:
         """Wait for the given time, then return the blocks received since the last call."""
@@ -338,7 +318,6 @@ class Session:
             if turn_ns == end_ns:
                 break
             if turn_ns == tick_ns:
-                self.meet()  # a sensor that answers late must also prove its identity if its port comes back
                 self._ring(display, self._tee.blocks, start_ns, recorder)
                 tick_ns += SECOND_NS
         self._tee.stop()  # data received while the last line is shown are not part of the run

@@ -142,7 +142,7 @@ def _troubles(progress: Progress) -> list[str]:
     if progress.unshown:
         parts.append(f"{progress.unshown} samples recorded and not shown")
     if progress.status is not None:
-        parts += [text for text in (progress.status.astray, progress.status.error) if text]
+        parts += [progress.status.error] if progress.status.error else []
     return parts
 
 

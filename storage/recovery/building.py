@@ -1,54 +1,35 @@
-"""Build one sensor's run file: write samples and bytes of the log as they arrive, and the header at the end."""
+"""Build the run file of one part: write its samples as they are decoded, and the log and the header at the end."""
 
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from acquisition.block import Block
 from acquisition.live.decoding import SensorChain
 from acquisition.recordings.recording import Trap
-from storage.recovery.losses import LossCount, end_of
-from storage.recovery.recovered import RecoveredRun
+from storage.recovery.losses import LossCount
+from storage.recovery.report import RecoveredRun
 from storage.run_file.writing import RunWriter
 from storage.schema import plain
-from storage.wire_log.notes import Notes
-from storage.wire_log.records import LogHeader, SensorEntry
+from storage.wire_log.notes import Survey
+from storage.wire_log.parts import Part
+from storage.wire_log.records import SensorEntry
 from storage.wire_log.scanning import Damage, LogContents
-
-__all__ = ["SensorRun"]
 
 FIRST_SAMPLES = 1000
 """Number of initial samples that determine the host time of t = 0; later ones would add the sensor's clock error."""
 
 
-class SensorRun:
-    """Builds one sensor's run file.
+class RunBuilder:
+    """Builds the run file of one part of a sensor's data."""
 
-    Parameters
-    ----------
-    writer : RunWriter
-    contents : LogContents
-        The log.
-    sensor : SensorEntry
-    chain : SensorChain
-        The chain that decodes the samples.
-    """
-
-    def __init__(self, writer: RunWriter, contents: LogContents, sensor: SensorEntry, chain: SensorChain) -> None:
-        self._writer, self._contents, self._sensor, self._chain = writer, contents, sensor, chain
-        self._digest = hashlib.sha256()
+    def __init__(self, writer: RunWriter, part: Part, sensor: SensorEntry, chain: SensorChain) -> None:
+        self._writer, self._part, self._sensor, self._chain = writer, part, sensor, chain
         self._first_ns: list[int] = []
         self._samples = 0
         self._losses = LossCount(chain.timebase.rate_hz)
-        writer.keep([(part.path.name, part.size) for part in contents.parts])
-
-    def take(self, part: int, data: bytes) -> None:
-        """Store the log's next bytes."""
-        self._digest.update(data)
-        self._writer.take(part, data)
 
     def append(self, block: Block) -> None:
         """Append the next samples."""
@@ -60,69 +41,43 @@ class SensorRun:
         self._losses.push(block)
         self._writer.append(block)
 
-    def finish(
-        self, header: LogHeader, notes: Notes, reads: int, last_ns: int, extra: Mapping[str, Any]
-    ) -> RecoveredRun:
-        """Write the header and finish the file.
-
-        Parameters
-        ----------
-        header : LogHeader
-        notes : Notes
-            Marks and events of the log.
-        reads : int
-            Number of reads of the sensor's port.
-        last_ns : int
-            Host time of the log's last record, ns.
-        extra : mapping
-            Further entries of the provenance.
-        """
-        decoding = self._chain.report()
-        faults, damage = decoding["faults"], self._contents.damage
-        end_ns = end_of(notes.events(), [last_ns], header.mono_ns)
-        losses = self._losses.losses(notes.events(self._sensor.channel), header.mono_ns, end_ns)
+    def finish(self, log: LogContents, survey: Survey, reads: int, extra: Mapping[str, Any]) -> RecoveredRun:
+        """Write the log and the header; ``extra`` are further entries of the provenance."""
+        header, parts = survey.header, survey.parts_of(self._part.sensor)
+        decoding, damage = self._chain.report(), log.damage
+        begin_ns = survey.spans[self._part].begin_ns
+        last = self._part == parts[-1]
+        end_ns = survey.end_ns if last else survey.spans[parts[self._part.number]].begin_ns
+        losses = self._losses.losses(survey.events_of(self._part), begin_ns, end_ns, last=last)
         # A host time may be late but never early, so the earliest estimate is the best.
-        origin = min(self._first_ns, default=header.mono_ns)
+        origin = min(self._first_ns, default=begin_ns)
+        self._writer.keep([(log.path.name, log.size, log.pieces())])
         self._writer.finish(
             self._chain.info(self._sensor.port, header.kind),
             scene=header.scene,
             title=header.title,
-            traps=(*_traps(damage), *_counter_traps(decoding), *losses.traps()),
-            malformed_rows=sum(count for name, count in faults.items() if not name.endswith("bytes")),
+            traps=(*_traps(damage), *losses.traps()),
+            malformed_rows=sum(count for name, count in decoding["faults"].items() if not name.endswith("bytes")),
             format="wire",
             provenance={
                 "start_time": header.utc(origin),
                 "clock_map": {"mono_ns": header.mono_ns, "unix_ns": header.unix_ns, "t0_mono_ns": origin},
                 "recorded_with": header.version,
                 "sensor": plain(self._sensor),
+                "part": {"number": self._part.number, "of": len(parts)},
                 "reads": reads,
-                "log": {
-                    "name": self._contents.path.name,
-                    "sha256": self._digest.hexdigest(),
-                    **dataclasses.asdict(damage),
-                },
-                **notes.provenance(origin),
+                "log": {"name": log.path.name, **dataclasses.asdict(damage)},
+                **survey.provenance(origin),
                 "decoding": decoding,
                 "losses": dataclasses.asdict(losses),
                 **extra,
             },
         )
-        return RecoveredRun(self._sensor, self._writer.path, self._samples, faults, decoding, losses)
+        return RecoveredRun(self._sensor, self._part.number, self._writer.path, self._samples, decoding, losses)
 
 
-def _counter_traps(decoding: Mapping[str, Any]) -> Iterator[Trap]:
-    if joins := decoding["joins"]:
-        yield Trap(
-            "counter_changed",
-            "The connection broke and the sensor's counter started again; the computer's clock times the gap.",
-            joins,
-        )
-
-
-def _traps(damage: Damage) -> tuple[Trap, ...]:
-    traps = []
+def _traps(damage: Damage) -> Iterator[Trap]:
     if not damage.intact:
-        traps.append(Trap("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost)))
+        yield Trap("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost))
     if not damage.ended:
-        traps.append(Trap("cut_short", "The recording was cut short; everything in its log is here."))
-    return tuple(traps)
+        yield Trap("cut_short", "The recording was cut short; everything in its log is here.")

@@ -3,34 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from msgspec import Meta, Struct, field
+from msgspec import Meta, Struct
 
 from acquisition.block import UNITS
 from acquisition.source import ClockKind, Kind
-from storage.schema import Calibrated, Count, ValueRefused, converted, decoded, json_text, parsed, plain, shown
-
-__all__ = ["LONGEST_HEADER", "MOST_UNWRITTEN", "SCHEMA", "FileEntry", "Header", "Info", "TrapEntry"]
+from storage.schema import Count, ValueRefused, decoded, json_text, parsed, plain, shown
 
 SCHEMA = 1
-LONGEST_HEADER = 1 << 26
-"""Maximum size of the header's text, bytes; a day of events needs a thousandth of this."""
-MOST_UNWRITTEN = 10_000_000
-"""Number of samples that is always accepted: a day at 100 Hz. For bytes of original files the limit is 64 times higher.
-
-A larger number of samples must not exceed the size of the file in bytes. Otherwise a small file could fill the memory
-(a decompression bomb).
-"""
-DEEPEST = 33
-"""Maximum depth of nested tables and lists, including the header itself."""
 
 _Text = Annotated[str, Meta(max_length=1 << 20)]
-_Word = Annotated[str, Meta(max_length=200)]
 _Sha256 = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
 _Samples = Annotated[int, Meta(ge=0, le=2**32)]
 _Length = Annotated[float, Meta(ge=0.0, le=1e30)]
-_Positive = Annotated[float, Meta(ge=0.0, le=1e300)]
 
 
 class Info(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -56,99 +42,36 @@ class FileEntry(Struct, frozen=True, forbid_unknown_fields=True):
 class TrapEntry(Struct, frozen=True, forbid_unknown_fields=True):
     """A remark of the reader, as described by :class:`acquisition.recordings.recording.Trap`."""
 
-    code: _Word
+    code: Annotated[str, Meta(max_length=200)]
     message: _Text
     count: Count = 1
     line: Count | None = None
 
 
-class _Columns(Struct, frozen=True, forbid_unknown_fields=True):
-    time: _Sha256
-    distance: _Sha256
-    quality: _Sha256
-    distance_errors: _Sha256 = ""
-    velocity: _Sha256 = ""
-    sequence: _Sha256 = ""
-    host_mono_ns: _Sha256 = ""
-
-
-class _SensorNote(Calibrated, frozen=True):
-    family: _Text = ""
-    options: dict[str, Any] = field(default_factory=dict)
-
-
-class _ClockNote(Struct, frozen=True):
-    rate_error_ppm: Annotated[float, Meta(ge=-1e300, le=1e300)] | None = None
-    u_rate_error_ppm: _Positive | None = None
-    limit_ppm: _Positive = 0.0
-    span_s: _Positive = 0.0
-    held_readings: Count = 0
-    longest_stall_s: _Positive = 0.0
-    moment: Literal["reflection", "reading"] = "reading"
-
-
-class _DecodingNote(Struct, frozen=True):
-    clock: _ClockNote = _ClockNote()
-
-
-class _Provenance(Struct, frozen=True):
-    """The entries of the provenance that other code reads; further ones are allowed."""
-
-    sensor: _SensorNote = _SensorNote()
-    start_time: _Word | None = None
-    decoding: _DecodingNote = _DecodingNote()
-
-
 class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything about a run that is not an array.
 
-    Parameters
-    ----------
-    info : Info
-        The source.
-    first, samples : int
-        Index of the first sample, and the number of samples.
-    columns : mapping of str to str
-        SHA-256 of every column in the file, by name.
-    originals : tuple of FileEntry
-        The original files.
-    title, channel, format : str
-        Title, measured quantity and format family, as in a recording.
-    scene, provenance : mapping or None, mapping
-        Tables that JSON can store, with string keys.
-    traps : tuple of TrapEntry
-        Remarks of the reader.
-    malformed_rows : int
-        Number of rows that were not samples.
-    quantity, unit : str
-        Quantity and unit of the samples, as in :class:`acquisition.block.Block`. Empty in older files, which contain
-        lengths in metres.
+    ``first`` is the index of the first sample. ``columns`` has the SHA-256 of every column in the file. ``quantity``
+    and ``unit`` are those of :class:`acquisition.block.Block`; they are empty in older files, which contain lengths.
     """
 
     info: Info
     first: _Samples
     samples: _Samples
-    columns: Mapping[str, str]
+    columns: Mapping[str, _Sha256]
     provenance: Mapping[str, Any]
-    originals: Annotated[tuple[FileEntry, ...], Meta(max_length=100_000)] = ()
+    originals: tuple[FileEntry, ...] = ()
     title: _Text = ""
     channel: _Text = "distance"
     format: _Text = ""
     scene: Mapping[str, Any] | None = None
-    traps: Annotated[tuple[TrapEntry, ...], Meta(max_length=1_000_000)] = ()
+    traps: tuple[TrapEntry, ...] = ()
     malformed_rows: Count = 0
     quantity: str = ""
     unit: str = ""
 
     def encode(self) -> bytes:
-        """Return the canonical JSON text.
-
-        Raises
-        ------
-        TypeError, ValueError
-            If JSON cannot store a value of the scene or the provenance (an object, NaN, an infinity), or
-            :meth:`decode` would refuse it.
-        """
+        """Return the canonical JSON text; raise TypeError or ValueError if :meth:`decode` would refuse it."""
         text = json_text({"schema": SCHEMA, **plain(self)}).encode("ascii")
         self.decode(text)
         return text
@@ -157,22 +80,16 @@ class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def decode(cls, text: bytes) -> Header:
         """Decode the text that :meth:`encode` returned.
 
-        Raises
-        ------
-        storage.schema.ValueRefused
-            If a value is not allowed for its key.
-        ValueError
-            If the text has another schema.
+        Raises ValueRefused if a value is not allowed for its key, and ValueError if the text has another schema.
         """
         content = parsed(text, "header")
         schema = content.pop("schema", None) if isinstance(content, dict) else None
         if schema != SCHEMA:
             raise ValueError(f"expected schema {SCHEMA}, got {shown(schema)}")
         content.pop("implied", None)  # formulas of columns, which some older files have
-        header = decoded(content, cls, "header", DEEPEST)
-        converted(header.columns, _Columns, "header.columns")
-        read = {name: header.provenance[name] for name in _Provenance.__struct_fields__ if name in header.provenance}
-        converted(read, _Provenance, "header.provenance")
+        header = decoded(content, cls, "header")
+        if missing := [name for name in ("time", "distance", "quality") if name not in header.columns]:
+            raise ValueRefused("header.columns", f"expected also {missing[0]}")
         if (header.quantity, header.unit) not in {("", ""), *UNITS.items()}:
             known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
             got = f"{shown(header.quantity)} in {shown(header.unit)}"

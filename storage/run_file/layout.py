@@ -1,66 +1,26 @@
 """Define the layout of a run file: names, types, units and attributes.
 
-::
-
-    /                     @Conventions @NX_class=NXroot @default=entry @kind; hard links to the signal's arrays, for
-                          tools that read only the root (older files have none)
-    /entry                NXentry @default=signal; title, start_time where known
-    /entry/signal         NXdata @signal=distance @axes=[time] @kind; on the dimension ``time``:
-        time              f8 s, elapsed; @epoch time of t = 0, @clock source of the times, @moment event they refer to
-        distance          f8 m @ancillary_variables @quantity
-        distance_errors   f4 m, standard deviation; only if the source knows it, NaN if unmeasured
-        quality           u1 @flag_masks @flag_meanings
-        velocity          f8 m/s; only if the recording states one
-                          (if the quantity is not a length, its unit replaces m in both)
-    /entry/instrument     name, kind, clock, rate_hz, quantum_m, sigma_m, stated_error_m
-    /entry/scene          @json: the scene's tables
-    /entry/provenance     @software @version @configuration @traps ...; header, see below
-    /raw                  sequence u4 (sample index); host_mono_ns i8, only if a host recorded the samples
-    /wire                 bytes u1; record_offset, record_len, record_mono_ns; one record per original file
-
-Texts have a fixed length, as in files of the netCDF library: xarray, netCDF4 and NeXus tools return them as
-text, h5py returns ``bytes``.
+docs/reference/run-file.md has the same as a table. The root has hard links to the signal's arrays, for tools that read
+only the root. Texts have a fixed length, as in files of the netCDF library: xarray, netCDF4 and NeXus tools return
+them as text, h5py returns ``bytes``.
 
 The file states all metadata twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII) of
 everything except the arrays. It includes the SHA-256 of every array's decoded little-endian values; the SHA-256 of
-the text is stored as an attribute. :class:`storage.run_file.reading.Run` reads only this text. The attributes and
-fields above are made from it for people and other tools, and :meth:`storage.run_file.reading.Run.verify` compares them
-with it.
+the text is stored as an attribute. :class:`storage.run_file.reading.Run` reads only this text and the arrays. The
+attributes and fields above are made from it for people and other tools.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import Block, Flag
 from storage.run_file.header import Header
-from storage.schema import ValueRefused, json_text, plain
-
-__all__ = [
-    "CHUNK",
-    "COLUMNS",
-    "DIMENSION_ATTRIBUTES",
-    "GROUPS",
-    "HEADER",
-    "INSTRUMENT",
-    "MAGIC",
-    "SIGNAL",
-    "WIRE",
-    "Column",
-    "arrays",
-    "attributes",
-    "column_attributes",
-    "fields",
-    "filters",
-    "records",
-    "signal_attributes",
-    "stored",
-]
+from storage.schema import json_text, plain
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 CHUNK = 65536
@@ -68,71 +28,17 @@ HEADER = "/entry/provenance/header"
 SIGNAL = "/entry/signal"
 INSTRUMENT = "/entry/instrument"
 WIRE = "/wire"
-GROUPS = frozenset({"entry", "raw", "wire"})
-"""Groups at the root; everything else there is a link to a column."""
-DIMENSION_ATTRIBUTES = frozenset({"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"})
-"""Attributes that HDF5 itself adds to arrays with a dimension."""
 NO_HOST_NS = -1
-"""Value of ``host_mono_ns`` and ``record_mono_ns`` if no host recorded the sample or record."""
-
-FILTERS: Mapping[str, Any] = {
-    "shuffle": True,
-    "compression": "gzip",
-    "compression_opts": 1,
-    "fletcher32": True,
-}
-"""Filters that every reader can undo without a plugin. The checksum turns a flipped bit into a read error."""
-
-UNPACKED: Mapping[str, Any] = {"fletcher32": True}
-"""Filters of noisy columns: compression would save a quarter of their size and triple the time to read them."""
-
-NOISY = frozenset({"distance", "velocity"})
-"""Columns whose last digits are noise; they are not compressed."""
-
-LIBVER = ("v110", "v110")
-"""The file format of HDF5 1.10 (2016), the oldest with checksums in all of the file's metadata."""
+"""Value of ``host_mono_ns`` if no host recorded the sample."""
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One array of the file with a value for each sample.
-
-    Parameters
-    ----------
-    path : str
-        Path in the file.
-    dtype : str
-        Data type of the array, little-endian.
-    attributes : mapping
-        Units and description; :func:`attributes` adds those that depend on the run.
-    fill : float or int
-        Value for the samples of blocks that lack an optional column.
-    least, greatest : float or int
-        Minimum and maximum value; NaN is also allowed. The limits are far beyond any bench, but squares and sums of
-        values between them are finite.
-    """
+class Column(NamedTuple):
+    """One array of the file with a value for each sample; ``fill`` stands in blocks that lack an optional column."""
 
     path: str
     dtype: str
     attributes: Mapping[str, Any]
     fill: float | int = 0
-    least: float | int = -1e12
-    greatest: float | int = 1e12
-
-    def demand_within(self, values: NDArray[Any], start: int) -> None:
-        """Check values, of which the first is that of sample ``start``, against the range.
-
-        Raises
-        ------
-        ValueRefused
-            For the first value outside the range.
-        """
-        # fmin and fmax skip NaN without a warning; an array that contains only NaN passes.
-        low, high = np.fmin.reduce(values, initial=self.greatest), np.fmax.reduce(values, initial=self.least)
-        if low < self.least or high > self.greatest:
-            at = int(np.flatnonzero((values < self.least) | (values > self.greatest))[0])
-            reason = f"expected a number from {self.least:g} to {self.greatest:g}, got {values[at].item()!r}"
-            raise ValueRefused(f"{self.name} of sample {start + at}", reason)
 
     @property
     def name(self) -> str:
@@ -140,69 +46,43 @@ class Column:
         return self.path.rpartition("/")[2]
 
 
-def _quality() -> dict[str, Any]:
-    return {
-        "long_name": "why a sample may not be taken at face value",
-        "standard_name": "quality_flag",
-        "flag_masks": np.array([flag.value for flag in Flag], np.uint8),
-        "flag_meanings": " ".join(str(flag.name).lower() for flag in Flag),
-    }
-
-
 _NAN = {"_FillValue": np.float64("nan")}
-COLUMNS: tuple[Column, ...] = (
+_ERRORS = {"units": "m", "long_name": "standard deviation of a distance, as the source knows it"}
+_QUALITY = {
+    "long_name": "why a sample may not be taken at face value",
+    "standard_name": "quality_flag",
+    "flag_masks": np.array([flag.value for flag in Flag], np.uint8),
+    "flag_meanings": " ".join(str(flag.name).lower() for flag in Flag),
+}
+_VELOCITY = {"units": "m/s", "long_name": "velocity as the recording states it", **_NAN}
+_HOST = {"units": "ns", "long_name": "host's monotonic clock at arrival; -1 where no host was there"}
+COLUMNS = (
     Column(f"{SIGNAL}/time", "<f8", {"units": "s", "long_name": "time since the start of the run"}),
     Column(f"{SIGNAL}/distance", "<f8", {"units": "m", "long_name": "distance from the sensor", **_NAN}),
-    Column(
-        f"{SIGNAL}/distance_errors",
-        "<f4",
-        {
-            "units": "m",
-            "long_name": "standard deviation of a distance, as the source knows it",
-            "_FillValue": np.float32("nan"),
-        },
-        least=0.0,
-        greatest=1e30,
-    ),
-    Column(f"{SIGNAL}/quality", "|u1", _quality(), least=0, greatest=255),  # includes the flags of later versions
-    Column(
-        f"{SIGNAL}/velocity",
-        "<f8",
-        {"units": "m/s", "long_name": "velocity as the recording states it", **_NAN},
-        float("nan"),
-    ),
-    Column("/raw/sequence", "<u4", {"long_name": "index of the sample within the run"}, least=0, greatest=2**32 - 1),
-    Column(
-        "/raw/host_mono_ns",
-        "<i8",
-        {"units": "ns", "long_name": "host's monotonic clock at arrival; -1 where no host was there"},
-        NO_HOST_NS,
-        least=NO_HOST_NS,
-        greatest=2**62,
-    ),
+    Column(f"{SIGNAL}/distance_errors", "<f4", {**_ERRORS, "_FillValue": np.float32("nan")}),
+    Column(f"{SIGNAL}/quality", "|u1", _QUALITY),
+    Column(f"{SIGNAL}/velocity", "<f8", _VELOCITY, float("nan")),
+    Column("/raw/host_mono_ns", "<i8", _HOST, NO_HOST_NS),
 )
+BY_NAME = {column.name: column for column in (*COLUMNS, Column("/raw/sequence", "<u4", {}))}
+"""The columns of files of all versions."""
+
+_NOISY = frozenset({"distance", "velocity"})
 
 
 def filters(path: str) -> Mapping[str, Any]:
-    """Return the HDF5 filters of an array."""
-    return UNPACKED if path.rpartition("/")[2] in NOISY else FILTERS
+    """Return the HDF5 filters of an array. The checksum turns a flipped bit into a read error.
+
+    Every reader can undo them without a plugin. The last digits of distances and velocities are noise: compression
+    would save a quarter of their size and triple the time to read them.
+    """
+    if path.rpartition("/")[2] in _NOISY:
+        return {"fletcher32": True}
+    return {"shuffle": True, "compression": "gzip", "compression_opts": 1, "fletcher32": True}
 
 
 def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None]:
-    """Return a block's values by column name; None for a missing column.
-
-    Parameters
-    ----------
-    block : Block
-        n samples.
-    sigma_m : float or None
-        Standard deviation of a distance, m.
-
-    Returns
-    -------
-    dict
-        Arrays of shape (n,), by column name.
-    """
+    """Return a block's values by column name; None for a missing column."""
     errors = None
     if sigma_m is not None:
         errors = np.where(np.isnan(block.distance), np.nan, sigma_m).astype("<f4")
@@ -212,27 +92,20 @@ def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None
         "distance_errors": errors,
         "quality": block.flags,
         "velocity": block.velocity,
-        "sequence": np.arange(block.first, block.first + len(block), dtype=np.int64).astype("<u4"),
         "host_mono_ns": block.host_ns,
-    }
-
-
-def records(sizes: NDArray[np.uint64]) -> dict[str, NDArray[Any]]:
-    """Return the arrays that locate original files of these sizes, by name: one record per file."""
-    return {
-        "record_offset": np.cumsum(sizes, dtype="<u8") - sizes,
-        "record_len": sizes,
-        "record_mono_ns": np.full(len(sizes), NO_HOST_NS, "<i8"),
     }
 
 
 def attributes(header: Header) -> dict[str, dict[str, Any]]:
     """Return the attributes for other tools, by the path of their group or array."""
     info = header.info
+    plot: dict[str, Any] = {"NX_class": "NXdata", "signal": "distance", "axes": ("time",)}
+    if "velocity" in header.columns:
+        plot["auxiliary_signals"] = ("velocity",)
     tree: dict[str, dict[str, Any]] = {
         "/": {"Conventions": "CF-1.11", "NX_class": "NXroot", "default": "entry", "kind": info.kind},
         "/entry": {"NX_class": "NXentry", "default": "signal"},
-        SIGNAL: signal_attributes(header) | _plot(header),
+        SIGNAL: signal_attributes(header) | plot,
         INSTRUMENT: {"NX_class": "NXinstrument"},
         "/entry/provenance": {"NX_class": "NXprocess", **_provenance(header)},
         "/raw": {"NX_class": "NXcollection"},
@@ -242,10 +115,10 @@ def attributes(header: Header) -> dict[str, dict[str, Any]]:
     if header.originals:
         names = tuple(entry.name for entry in header.originals)
         tree[WIRE] = {"NX_class": "NXcollection", "content": "files", "record_name": names}
-    for column in COLUMNS:
-        if column.name in header.columns:
-            tree[column.path] = column_attributes(column, header)
-    return tree | {path: _units_of(path) for path in fields(header)}
+    tree |= {BY_NAME[name].path: column_attributes(BY_NAME[name], header) for name in header.columns}
+    units = {"hz": "Hz", "m": "m"}
+    named = {path: units.get(path.rpartition("_")[2]) for path in fields(header)}
+    return tree | {path: {"units": unit} for path, unit in named.items() if unit}
 
 
 def signal_attributes(header: Header) -> dict[str, Any]:
@@ -263,11 +136,12 @@ def column_attributes(column: Column, header: Header) -> dict[str, Any]:
         moment = header.provenance.get("decoding", {}).get("clock", {}).get("moment")
         attributes |= {"moment": moment} if moment else {}
     if header.quantity not in ("", "length") and column.attributes.get("units") in ("m", "m/s"):
-        attributes["units"] = header.unit + column.attributes["units"].removeprefix("m")
-        attributes["long_name"] = column.attributes["long_name"].replace("distance from the sensor", header.quantity)
+        attributes["units"] = header.unit if column.attributes["units"] == "m" else f"{header.unit}/s"
     if column.name == "distance":
         if header.quantity:
             attributes["quantity"] = header.quantity
+        if header.quantity not in ("", "length"):
+            attributes["long_name"] = header.quantity
         beside = ("distance_errors", "quality")
         attributes["ancillary_variables"] = " ".join(name for name in beside if name in header.columns)
     return attributes
@@ -279,23 +153,6 @@ def fields(header: Header) -> dict[str, Any]:
     values |= {f"{INSTRUMENT}/{name}": value for name, value in plain(header.info).items()}
     stated = {path: value for path, value in values.items() if value not in (None, "")}
     return {path: value if isinstance(value, str) else float(value) for path, value in stated.items()}
-
-
-_UNITS = {"hz": "Hz", "m": "m"}
-"""Units of fields, by the last part of the field's name."""
-
-
-def _units_of(path: str) -> dict[str, str]:
-    units = _UNITS.get(path.rpartition("_")[2])
-    return {"units": units} if units else {}
-
-
-def _plot(header: Header) -> dict[str, Any]:
-    """Return the attributes that select the default plot of NeXus tools."""
-    attributes: dict[str, Any] = {"NX_class": "NXdata", "signal": "distance", "axes": ("time",)}
-    if "velocity" in header.columns:
-        attributes["auxiliary_signals"] = ("velocity",)
-    return attributes
 
 
 def _provenance(header: Header) -> dict[str, Any]:

@@ -1,26 +1,17 @@
 """Read run files: :func:`open_run` opens one lazily and checks what it reads.
 
-Examples
---------
->>> import tempfile
->>> import numpy as np
->>> from acquisition.block import Block
->>> from acquisition.source import SourceInfo
->>> from storage.run_file.writing import write_run
->>> block = Block(0, np.arange(3) / 100, np.array([0.30, np.nan, 0.31]), np.array([0, 1, 0], np.uint8))
->>> with tempfile.TemporaryDirectory() as folder:
-...     path = write_run(folder + "/run.h5", [block], SourceInfo("simulated", "spring.toml", 100.0))
-...     with open_run(path) as run:
-...         run.info.kind, len(run), run.samples().distance
-('simulated', 3, array([0.3 ,  nan, 0.31]))
+In HDF5 a name can lead outside the file: through a soft or external link, or to an array whose bytes are in other
+files. Run files never need this, so no such name is followed: opening a file from a stranger must not read other files
+of this computer or wait for a pipe.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -30,42 +21,48 @@ from acquisition.block import Block
 from acquisition.recordings.recording import Original, Trap
 from acquisition.regular_file import open_regular
 from acquisition.source import SourceInfo
-from storage.errors import NotARun, RunDamaged, reading
+from storage.errors import NotARun, RunClosed, RunDamaged, one_line
+from storage.hdf5 import damaged, reading_h5
 from storage.run_file import layout
-from storage.run_file import verification as verify
-from storage.run_file.dataset import checked_dataset, lazy_dataset
-from storage.run_file.handle import Contents, open_header
-from storage.run_file.header import Header
+from storage.run_file.header import FileEntry, Header
 from storage.run_file.layout import CHUNK
-from storage.schema import plain
+from storage.schema import ValueRefused, plain
 
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["CHECKED", "Run", "is_run", "open_run"]
-
-
-def is_run(head: bytes) -> bool:
-    """Return whether a file's first eight bytes are those of HDF5, so that it may be a run file.
-
-    :func:`open_run` checks whether it really is one.
-    """
-    return head.startswith(layout.MAGIC)
+_BLOCK_COLUMNS = {
+    "time": "t",
+    "distance": "distance",
+    "quality": "flags",
+    "host_mono_ns": "host_ns",
+    "velocity": "velocity",
+}
+CHECKED = tuple(_BLOCK_COLUMNS)
+"""The columns of a block, whose digests are checked when all blocks are read."""
+_PIECE = 16 * CHUNK
 
 
 def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
-    """Open a run file for reading.
+    """Open a run file for reading; use it in a ``with``, or close it. See :class:`Run`."""
+    return Run(path, unverified=unverified)
+
+
+class Run:
+    """An open run file.
+
+    The header is read when the file is opened, samples on demand. Everything is checked: every chunk has a checksum,
+    and every column that is read to its end is compared with its SHA-256. Every method raises RunDamaged for the first
+    damage that it finds, and RunClosed after the run was closed.
+
+    ``sha256`` is the digest of the header, which contains the digests of all arrays and original files. Two files with
+    the same content therefore have the same ``sha256``, even if their bytes differ.
 
     Parameters
     ----------
     path : str or PathLike
     unverified : bool
-        Whether to return data even if their digest differs; :meth:`Run.differences` lists the differences.
-
-    Returns
-    -------
-    Run
-        The open file. Use it in a ``with``, or close it.
+        Whether to return data even if their digest differs; :meth:`differences` lists the differences.
 
     Raises
     ------
@@ -73,31 +70,22 @@ def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
         If the file does not exist or is not a run file.
     RunDamaged
         If the file cannot be read, or its header is damaged or has a value that is not allowed.
-    """
-    path = Path(path)
-    remedy = "name a run file; springmass formats FILE shows what a file is"
-    try:
-        with open_regular(path) as stream:
-            head = stream.read(len(layout.MAGIC))
-    except OSError as error:
-        raise NotARun(path, f"the run file cannot be opened ({error.strerror or error})", remedy) from error
-    if not is_run(head):
-        raise NotARun(path, f"expected a run file (HDF5), got a file that begins with {head!r}", remedy)
-    return Run(path, *open_header(path, unverified=unverified), unverified)
-
-
-class Run(Contents):
-    """An open run file.
-
-    The header is read when the file is opened, samples on demand. Everything is checked: every chunk has a checksum,
-    and every column that is read to its end is compared with its SHA-256. :meth:`blocks` and :meth:`dataset` read
-    lazily, :meth:`samples` and :meth:`load_dataset` read everything.
-
-    ``sha256`` is the digest of the header, which contains the digests of all arrays and original files. Two files with
-    the same content therefore have the same ``sha256``, even if their bytes differ.
+    RunOpen
+        If another program has the file open for writing.
     """
 
-    __slots__ = ()
+    def __init__(self, path: str | os.PathLike[str], *, unverified: bool = False) -> None:
+        import h5py
+
+        self.path, self.unverified = Path(path), unverified
+        _demand_hdf5(self.path)
+        with reading_h5(self.path, "the file"):
+            self._file = h5py.File(self.path, "r")
+        try:
+            self.header, self.sha256 = self._read_header()
+        except BaseException:
+            self._file.close()
+            raise
 
     def __enter__(self) -> Self:
         return self
@@ -107,7 +95,7 @@ class Run(Contents):
 
     def close(self) -> None:
         """Close the file. Further calls do nothing."""
-        self.handle.close()
+        self._file.close()
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -156,50 +144,40 @@ class Run(Contents):
         """Software, configuration and times, as the writer stated them."""
         return self.header.provenance
 
-    def blocks(self, size: int = 1024) -> Iterable[Block]:
-        """Return the samples in blocks, which are read on demand.
+    def blocks(self, size: int = 1024) -> Iterator[Block]:
+        """Yield the samples in blocks, which are read on demand.
 
         Parameters
         ----------
         size : int
-            Samples per block; the last may be shorter.
+            Samples per block, at least 1; the last may be shorter.
 
-        Returns
-        -------
-        iterable of Block
-            The blocks. They can be iterated more than once while the run is open.
-
-        Raises
-        ------
-        ValueError
-            If ``size`` is not positive.
-        RunDamaged
-            During iteration, if a chunk cannot be read; and before the blocks of the last chunk, if the checksum of a
-            whole column differs.
+        Notes
+        -----
+        A damaged chunk is found when it is read. The checksum of a whole column is compared before the blocks of the
+        last chunk.
         """
-        if size < 1:
-            raise ValueError(f"size must be at least 1 sample, got {size}")
-        return _Blocks(self, size)
+        digests = {name: hashlib.sha256() for name in CHECKED if name in self.header.columns}
+        step = size * max(1, CHUNK // size)  # read whole blocks, about one chunk at a time
+        for start in range(0, len(self), step):
+            values = self._rows(start, start + step)
+            for name, array in values.items():
+                digests[name].update(array.data)
+            if start + step >= len(self):
+                for name, digest in digests.items():
+                    self._compare(f"the column {name!r}", digest, self.header.columns[name], strict=False)
+            read = _block(self.header, start, values)
+            for row in range(0, len(read), size):
+                yield read[row : row + size]
 
     def samples(self) -> Block:
-        """Return all samples as one block.
-
-        Raises
-        ------
-        RunDamaged
-            If they are damaged.
-        """
-        header, values = self.header, {}
-        for name in (name for name in _BLOCK_COLUMNS if name in header.columns):
-            column = self.column(name)
-            with reading(self.path, f"the column {name!r} from sample 0"):
-                values[name] = column[:]
-            self.demand_within(name, values[name], 0)
-            self.check(name, hashlib.sha256(values[name].data).hexdigest())
-        return _block(header, header.first, values)
+        """Return all samples as one block."""
+        for block in self.blocks(max(len(self), 1)):
+            return block
+        return _block(self.header, 0, self._rows(0, 0))
 
     def dataset(self) -> xarray.Dataset:
-        """Return the samples as a dataset that reads data on demand.
+        """Return the samples as a checked dataset in memory, independent of the file.
 
         Returns
         -------
@@ -207,120 +185,156 @@ class Run(Contents):
             On the dimension ``time``: time (s), distance (m), quality and, if the file has them, distance_errors (m)
             and velocity (m/s), with the file's attributes. The attributes of the dataset are kind, channel, title,
             format and the instrument's name, clock and numbers.
-
-        Raises
-        ------
-        RunClosed, RunDamaged
-            If the run is closed, or the structure of the signal was changed.
-
-        Notes
-        -----
-        Opening reads the times, because they are the index; other data are read when they are used. A part of a
-        column cannot be compared with the digest of the whole column. A flipped bit is still an error (every chunk has
-        a checksum, and reading it raises ``OSError``), but an array that was rewritten goes unnoticed.
-        :meth:`load_dataset` and :meth:`verify` detect both. After the run is closed, data that were not read are no
-        longer available (``KeyError``): use the dataset inside the run's ``with``, or call ``load()`` there. Closing
-        the dataset does not close the run.
         """
-        return lazy_dataset(self)
+        import xarray as xr
 
-    def load_dataset(self) -> xarray.Dataset:
-        """Return the samples as a checked dataset in memory, independent of the file.
-
-        Returns
-        -------
-        xarray.Dataset
-            The same content as that of :meth:`dataset`. It needs 25 to 40 bytes per sample and remains usable after
-            the run is closed.
-
-        Raises
-        ------
-        RunClosed, RunDamaged
-            If the run is closed, or the samples are damaged.
-        """
-        return checked_dataset(self, self.samples())
+        header, values = self.header, layout.arrays(self.samples(), self.header.info.sigma_m)
+        variables = {}
+        for column in layout.COLUMNS:
+            if column.path.startswith(layout.SIGNAL) and column.name in header.columns:
+                attributes = layout.column_attributes(column, header)
+                attributes.pop("_FillValue", None)  # xarray stores it in the encoding
+                variables[column.name] = ("time", values[column.name], attributes)
+        fields = layout.fields(header).items()
+        instrument = {path.rpartition("/")[2]: value for path, value in fields if path.startswith(layout.INSTRUMENT)}
+        return xr.Dataset(variables, attrs=instrument | layout.signal_attributes(header))
 
     def originals(self) -> tuple[Original, ...]:
-        """Return the original files, bit for bit; an empty tuple if there are none.
-
-        Raises
-        ------
-        RunDamaged
-            If an original file is damaged.
-        """
-        return tuple(
-            Original(entry.name, b"".join(verify.original_pieces(self, entry, start)))
-            for entry, start in verify.entries(self)
-        )
+        """Return the original files, bit for bit; an empty tuple if there are none."""
+        return tuple(Original(entry.name, b"".join(self._original(entry, at))) for entry, at in self._entries())
 
     def differences(self) -> tuple[RunDamaged, ...]:
-        """Read everything again and return an error for each array, original file, field or attribute that differs.
-
-        Returns
-        -------
-        tuple of RunDamaged
-            The errors; empty if the file is undamaged.
-        """
-        return tuple(verify.differences(self))
+        """Read everything again; return an error for the header and each column or original file that differs."""
+        return tuple(self._differences(()))
 
     def verify(self, *, but: Iterable[str] = ()) -> None:
-        """Read everything again and compare it with its digests.
+        """Read header, columns and original files again and compare them with their digests.
 
         Parameters
         ----------
         but : iterable of str
             Columns to leave out, such as those of :data:`CHECKED` after :meth:`samples` has checked them.
-
-        Raises
-        ------
-        RunDamaged
-            For the first array, original file, field or attribute that differs.
         """
-        for error in verify.differences(self, but=but):
+        for error in self._differences(but):
             raise error
 
+    def _differences(self, but: Iterable[str]) -> Iterator[RunDamaged]:
+        checks: list[Callable[[], object]] = [partial(self._header_text, strict=True)]
+        checks += [partial(self._check_column, name) for name in self.header.columns if name not in {*but}]
+        checks += [partial(deque, self._original(*entry, strict=True), maxlen=0) for entry in self._entries()]
+        for check in checks:
+            try:
+                check()
+            except RunDamaged as error:
+                yield error
 
-@dataclass(frozen=True, slots=True)
-class _Blocks:
-    """The samples of a run in blocks, read again in every iteration."""
+    def _read_header(self) -> tuple[Header, str]:
+        text, sha256 = self._header_text()
+        try:
+            return Header.decode(text), sha256
+        except ValueRefused as error:
+            remedy = "springmass does not write such files; ask where it comes from"
+            raise RunDamaged(self.path, str(error), remedy) from error
+        except ValueError as error:
+            problem = f"not a run file that this version reads ({one_line(error)})"
+            raise NotARun(self.path, problem, "read it with the version of springmass that wrote it") from error
 
-    run: Run
-    size: int
+    def _header_text(self, *, strict: bool = False) -> tuple[bytes, str]:
+        """Return the text of the header and its digest."""
+        what = "the header"
+        stored = self._array(layout.HEADER, what)
+        with reading_h5(self.path, what):
+            digest = stored.attrs.get_id("sha256")
+            if (stored.dtype.kind, stored.shape, digest.dtype.kind, digest.shape) != ("S", (), "S", ()):
+                raise ValueError("expected a text with its digest")
+            text, sha256 = bytes(stored[()]), bytes(stored.attrs["sha256"]).decode()
+        self._compare(what, hashlib.sha256(text), sha256, strict=strict)
+        return text, sha256
 
-    def __iter__(self) -> Iterator[Block]:
-        run, samples = self.run, len(self.run)
-        names = [name for name in _BLOCK_COLUMNS if name in run.header.columns]
-        columns = {name: run.column(name) for name in names}
-        digests = {name: hashlib.sha256() for name in names}
-        step = self.size * max(1, CHUNK // self.size)  # read whole blocks, about one chunk at a time
-        for start in range(0, samples, step):
-            values = {}
-            for name in names:
-                with reading(run.path, f"the column {name!r} from sample {start}"):
-                    run.file()
-                    values[name] = columns[name][start : start + step]
-                run.demand_within(name, values[name], start)
-                digests[name].update(values[name].tobytes())
-            if start + step >= samples:
-                for name, digest in digests.items():
-                    run.check(name, digest.hexdigest())
-            read = _block(run.header, run.header.first + start, values)
-            for row in range(0, len(read), self.size):
-                yield read[row : row + self.size]
+    def _compare(self, what: str, digest: Any, sha256: str, *, strict: bool) -> None:
+        if digest.hexdigest() != sha256 and (strict or not self.unverified):
+            raise damaged(self.path, what, "checksum mismatch (SHA-256)")
+
+    def _array(self, path: str, what: str) -> Any:
+        """Return an array of the file after checking that its name and its bytes do not lead to another file."""
+        import h5py
+
+        if not self._file:
+            raise RunClosed(self.path, "the run is closed", "read it inside its with block")
+        with reading_h5(self.path, what):
+            item = self._file
+            for name in path.strip("/").split("/"):
+                link = item.get(name, getlink=True) if isinstance(item, h5py.Group) else None
+                if link is None and path == layout.HEADER:
+                    problem = f"expected a run file, got HDF5 without {layout.HEADER}"
+                    raise NotARun(self.path, problem, "name a run file, or convert the recording to one")
+                if not isinstance(link, h5py.HardLink):
+                    kind = "missing" if link is None else "a link that leads elsewhere, which is not followed"
+                    raise damaged(self.path, what, f"{name!r} is {kind}")
+                item = item[name]
+            if not isinstance(item, h5py.Dataset):
+                raise ValueError(f"expected an array, got a {type(item).__name__}")
+            if item.is_virtual or item.external is not None:
+                raise damaged(self.path, what, "its bytes are in another file, which is not read")
+        return item
+
+    def _sized(self, path: str, dtype: str, length: int, what: str) -> Any:
+        array = self._array(path, what)
+        if (array.dtype.str, array.shape) != (dtype, (length,)):
+            how = f"expected type and shape {dtype, (length,)}, got {array.dtype.str, array.shape}"
+            raise damaged(self.path, what, how)
+        return array
+
+    def _rows(self, start: int, stop: int, names: Iterable[str] = CHECKED) -> dict[str, NDArray[Any]]:
+        """Return the values of some samples by column."""
+        values = {}
+        for name in (name for name in names if name in self.header.columns):
+            what, column = f"the column {name!r}", layout.BY_NAME[name]
+            array = self._sized(column.path, column.dtype, len(self), what)
+            with reading_h5(self.path, f"{what} from sample {start}"):
+                values[name] = array[start:stop]
+        return values
+
+    def _check_column(self, name: str) -> None:
+        digest = hashlib.sha256()
+        if name not in layout.BY_NAME:
+            raise damaged(self.path, f"the column {name!r}", "this version does not know it")
+        for start in range(0, len(self), _PIECE):
+            digest.update(self._rows(start, start + _PIECE, [name])[name].tobytes())
+        self._compare(f"the column {name!r}", digest, self.header.columns[name], strict=True)
+
+    def _entries(self) -> Iterator[tuple[FileEntry, int]]:
+        """Yield each original file in the header with the index of its first byte."""
+        start = 0
+        for entry in self.header.originals:
+            yield entry, start
+            start += entry.size
+
+    def _original(self, entry: FileEntry, start: int, *, strict: bool = False) -> Iterator[bytes]:
+        """Yield an original file in pieces, and compare its digest at the end."""
+        what, digest = f"the original file {entry.name!r}", hashlib.sha256()
+        data = self._sized(f"{layout.WIRE}/bytes", "|u1", sum(each.size for each in self.header.originals), what)
+        stop = start + entry.size
+        for at in range(start, stop, _PIECE):
+            with reading_h5(self.path, what):
+                piece = data[at : min(at + _PIECE, stop)].tobytes()
+            digest.update(piece)
+            yield piece
+        self._compare(what, digest, entry.sha256, strict=strict)
 
 
-_BLOCK_COLUMNS = {
-    "time": "t",
-    "distance": "distance",
-    "quality": "flags",
-    "host_mono_ns": "host_ns",
-    "velocity": "velocity",
-}
-CHECKED = tuple(_BLOCK_COLUMNS)
-"""The columns of a block, whose digests are checked when all blocks are read."""
+def _demand_hdf5(path: Path) -> None:
+    remedy = "name a run file; springmass formats FILE shows what a file is"
+    try:
+        with open_regular(path) as stream:
+            head = stream.read(len(layout.MAGIC))
+    except OSError as error:
+        raise NotARun(path, f"the run file cannot be opened ({error.strerror or error})", remedy) from error
+    if head != layout.MAGIC:
+        raise NotARun(path, f"expected a run file (HDF5), got a file that begins with {head!r}", remedy)
 
 
-def _block(header: Header, first: int, values: Mapping[str, NDArray[Any]]) -> Block:
-    fields: dict[str, Any] = {_BLOCK_COLUMNS[n]: array for n, array in values.items() if n in _BLOCK_COLUMNS}
+def _block(header: Header, start: int, values: Mapping[str, NDArray[Any]]) -> Block:
+    fields: dict[str, Any] = {_BLOCK_COLUMNS[name]: array for name, array in values.items()}
     # Older files do not state the quantity; they contain lengths.
-    return Block(first, **fields, quantity=header.quantity or "length", unit=header.unit or "m")
+    return Block(header.first + start, **fields, quantity=header.quantity or "length", unit=header.unit or "m")

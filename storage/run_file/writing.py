@@ -1,16 +1,4 @@
-"""Write run files whole: :func:`write_run`.
-
-Examples
---------
->>> import tempfile
->>> import numpy as np
->>> from acquisition.block import Block
->>> from acquisition.source import SourceInfo
->>> block = Block(0, np.arange(3) / 100, np.array([0.30, np.nan, 0.31]), np.array([0, 1, 0], np.uint8))
->>> with tempfile.TemporaryDirectory() as folder:
-...     write_run(folder + "/run.h5", [block], SourceInfo("simulated", "spring.toml", 100.0)).name
-'run.h5'
-"""
+"""Write run files whole: :func:`write_run`, and :func:`run_writer` for samples that arrive piece by piece."""
 
 from __future__ import annotations
 
@@ -22,18 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from acquisition.block import UNITS, Block
+from acquisition.block import UNITS, Block, concatenate
 from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
-from storage.atomic import whole_h5, writing_h5
+from storage.errors import WriteFailed
+from storage.hdf5 import whole_h5, writing_h5
 from storage.run_file import layout
-from storage.run_file.arrays import Columns, Originals
-from storage.run_file.header import Header, Info, TrapEntry
-from storage.run_file.layout import stored
+from storage.run_file.header import FileEntry, Header, Info, TrapEntry
+from storage.run_file.layout import CHUNK
 from storage.schema import plain
-
-__all__ = ["RunWriter", "run_writer", "write_run"]
 
 
 def write_run(
@@ -97,9 +84,7 @@ def write_run(
     with run_writer(path, sigma_m=info.sigma_m, overwrite=overwrite) as run:
         for block in blocks:
             run.append(block)
-        run.keep([(original.name, len(original.data)) for original in originals])
-        for number, original in enumerate(originals):
-            run.take(number, original.data)
+        run.keep([(original.name, len(original.data), [original.data]) for original in originals])
         run.finish(
             info,
             title=title,
@@ -119,21 +104,11 @@ def run_writer(
 ) -> Iterator[RunWriter]:
     """Yield a writer of a run file, and move the file into place when the ``with`` ends without an error.
 
-    Parameters
-    ----------
-    path, overwrite
-        As in :func:`write_run`.
-    sigma_m : float, optional
-        Standard deviation of a distance, as stated by the source, m.
-
-    Raises
-    ------
-    RunExists, WriteFailed
-        As in :func:`write_run`.
+    ``sigma_m`` is the standard deviation of a distance, as stated by the source, m. The caller appends blocks, keeps
+    original files, and finishes the file. Raises RunExists and WriteFailed like :func:`write_run`.
     """
-    path = Path(path)
-    with whole_h5(path, overwrite=overwrite, libver=layout.LIBVER) as file:
-        run = RunWriter(path, file, sigma_m)
+    with whole_h5(Path(path), overwrite=overwrite) as file:
+        run = RunWriter(Path(path), file, sigma_m)
         yield run
         if not run.finished:
             raise ValueError(f"{path}: the run file was not finished; call RunWriter.finish")
@@ -144,62 +119,123 @@ class RunWriter:
 
     def __init__(self, path: Path, file: Any, sigma_m: float | None) -> None:
         self.path, self.finished = path, False
-        self._file = file
-        self._columns = Columns(path, file, sigma_m)
-        self._originals: Originals | None = None
+        self._file, self._sigma_m = file, sigma_m
+        self._first: int | None = None
+        self._quantity = "length"
+        self._rows = self._written = 0
+        self._pending: list[Block] = []
+        self._digests: dict[str, Any] = {}
+        self._originals: tuple[FileEntry, ...] = ()
 
     def append(self, block: Block) -> None:
-        """Append the next samples.
+        """Append the next samples, and write all complete chunks."""
+        if self._first is None:
+            self._first, self._quantity = block.first, block.quantity
+        self._demand_fit(block, self._first + self._rows)
+        self._pending.append(block)
+        self._rows += len(block)
+        if self._rows - self._written >= CHUNK:
+            whole = concatenate(self._pending)
+            full = len(whole) // CHUNK * CHUNK
+            self._write(whole[:full], growing=True)
+            self._pending = [whole[full:]]
 
-        Raises
-        ------
-        WriteFailed
-            If the samples do not follow the previous ones, have another quantity, or cannot be written.
-        """
-        self._columns.append(block)
-
-    def keep(self, files: Sequence[tuple[str, int]]) -> None:
-        """Reserve space for original files of these names and sizes; :meth:`take` appends their bytes."""
+    def keep(self, files: Sequence[tuple[str, int, Iterable[bytes]]]) -> None:
+        """Store original files bit for bit, each given by its name, its size and its bytes in pieces."""
+        if not files:
+            return
         with writing_h5(self.path):
-            self._originals = Originals(self._file, files) if files else None
-
-    def take(self, number: int, data: bytes) -> None:
-        """Append the next bytes of an original file; ``number`` is its index in the call of :meth:`keep`."""
-        assert self._originals is not None
-        with writing_h5(self.path):
-            self._originals.take(number, data)
+            array = _create(self._file, f"{layout.WIRE}/bytes", "|u1", sum(size for _, size, _ in files))
+            _attach(self._file[layout.WIRE], "byte", array)
+        at = 0
+        for name, size, pieces in files:
+            start, digest = at, hashlib.sha256()
+            for piece in pieces:
+                digest.update(piece)
+                at += len(piece)
+                if piece and at <= start + size:
+                    with writing_h5(self.path):
+                        array[at - len(piece) : at] = np.frombuffer(piece, np.uint8)
+            if at != start + size:
+                problem = f"expected {size} bytes of {name}, got {at - start}: it has changed meanwhile"
+                raise WriteFailed(self.path, problem, "try again")
+            self._originals += (FileEntry(name, size, digest.hexdigest()),)
 
     def finish(self, info: SourceInfo, *, traps: Sequence[Trap] = (), **header: Any) -> None:
         """Write the remaining samples and the header.
 
-        Parameters
-        ----------
-        info : SourceInfo
-        traps : sequence of Trap
-        **header
-            Fields of :class:`storage.run_file.header.Header` that do not follow from the samples and the originals.
-
-        Raises
-        ------
-        WriteFailed
-            If an original is incomplete, or a value of the header is not allowed.
+        ``header`` has the fields of :class:`storage.run_file.header.Header` that do not follow from the samples and
+        the originals. Raises WriteFailed if one of them has a value that is not allowed.
         """
-        columns = self._columns
-        columns.finish()
+        rest = concatenate(self._pending)
+        if not self._written or len(rest):
+            self._write(rest, growing=bool(self._written))
         with writing_h5(self.path):
+            self._write_dimensions()
             text = Header(
                 info=Info(**plain(info)),
                 traps=tuple(TrapEntry(**plain(trap)) for trap in traps),
-                first=columns.first or 0,
-                samples=columns.rows,
-                columns={name: digest.hexdigest() for name, digest in columns.digests.items()},
-                originals=() if self._originals is None else self._originals.entries(),
-                quantity=columns.quantity,
-                unit=UNITS[columns.quantity],
+                first=self._first or 0,
+                samples=self._rows,
+                columns={name: digest.hexdigest() for name, digest in self._digests.items()},
+                originals=self._originals,
+                quantity=self._quantity,
+                unit=UNITS[self._quantity],
                 **header,
             )
             _write_header(self._file, text)
         self.finished = True
+
+    def _demand_fit(self, block: Block, expected: int) -> None:
+        if block.first != expected or block.first < 0:
+            problem = f"expected a block that begins with sample {max(expected, 0)}, got {block.first}"
+            raise WriteFailed(self.path, problem, "number blocks without gaps, and flag missing samples")
+        if block.quantity != self._quantity:
+            problem = f"expected samples of {self._quantity}, got {block.quantity} from sample {block.first} on"
+            raise WriteFailed(self.path, problem, "write a run file for each quantity")
+        for name, values in layout.arrays(block, None).items():
+            if values is not None and values.shape != block.t.shape:
+                problem = f"expected {len(block)} values of {name} from sample {block.first}, got shape {values.shape}"
+                raise WriteFailed(self.path, problem, "give every column the same length")
+
+    def _write(self, block: Block, *, growing: bool) -> None:
+        values = layout.arrays(block, self._sigma_m)
+        for column in layout.COLUMNS:
+            array = values[column.name]
+            if array is None and column.name not in self._digests:
+                continue
+            if array is None:
+                array = np.full(len(block), column.fill)
+            with writing_h5(self.path):
+                exact = np.ascontiguousarray(array).astype(column.dtype, casting="safe", copy=False)
+                self._write_column(column, exact, growing=growing)
+        self._written += len(block)
+
+    def _write_column(self, column: layout.Column, values: NDArray[Any], *, growing: bool) -> None:
+        if column.name not in self._digests:
+            self._digests[column.name] = hashlib.sha256()
+            _create(self._file, column.path, column.dtype, None if growing else len(values))
+            for start in range(0, self._written, CHUNK):  # fill a column that is missing in earlier blocks
+                self._extend(column, start, np.full(CHUNK, column.fill, column.dtype))
+        self._extend(column, self._written, values)
+
+    def _extend(self, column: layout.Column, start: int, values: NDArray[Any]) -> None:
+        array = self._file[column.path]
+        if array.shape[0] < start + len(values):
+            array.resize((start + len(values),))
+        array[start : start + len(values)] = values
+        self._digests[column.name].update(values.tobytes())
+
+    def _write_dimensions(self) -> None:
+        """Attach the arrays to their dimensions, and link those of the signal at the root."""
+        signal = self._file[layout.SIGNAL]
+        signal["time"].make_scale("time")
+        for name, array in signal.items():
+            if name != "time":
+                array.dims[0].attach_scale(signal["time"])
+            self._file[name] = array  # a hard link to the same array, which takes no space
+        if "host_mono_ns" in self._digests:
+            _attach(self._file["raw"], "sample", self._file["raw/host_mono_ns"])
 
 
 def _write_header(file: Any, header: Header) -> None:
@@ -207,10 +243,27 @@ def _write_header(file: Any, header: Header) -> None:
     text_array = file.create_dataset(layout.HEADER, data=np.bytes_(text))
     text_array.attrs["sha256"] = np.bytes_(hashlib.sha256(text).hexdigest())
     for path, value in layout.fields(header).items():
-        data, dtype = stored(value)
+        data, dtype = layout.stored(value)
         file.create_dataset(path, data=data, dtype=dtype)
     for path, attributes in layout.attributes(header).items():
         carrier = file.require_group(path) if path not in file else file[path]
         for name, value in attributes.items():
-            data, dtype = stored(value)
+            data, dtype = layout.stored(value)
             carrier.attrs.create(name, data, dtype=dtype)
+
+
+def _create(file: Any, path: str, dtype: str, length: int | None) -> Any:
+    """Create an array of fixed length, or a growing one; HDF5 allows zero length only for a growing array."""
+    if length:
+        return file.create_dataset(path, (length,), dtype, chunks=(min(length, CHUNK),), **layout.filters(path))
+    chunk = CHUNK if length is None else 1
+    return file.create_dataset(path, (0,), dtype, maxshape=(None,), chunks=(chunk,), **layout.filters(path))
+
+
+def _attach(group: Any, name: str, array: Any) -> None:
+    """Attach an array to a dimension without coordinates as netCDF does, with a scale of this exact title."""
+    length = array.shape[0]
+    growing: dict[str, Any] = {} if length else {"maxshape": (None,), "chunks": (1,)}
+    scale = group.create_dataset(name, (length,), ">f4", **growing)
+    scale.make_scale(f"This is a netCDF dimension but not a netCDF variable.{length:10d}")
+    array.dims[0].attach_scale(scale)

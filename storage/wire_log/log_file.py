@@ -8,14 +8,12 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import Protocol
 
 from storage.atomic import sync_folder
 
 if sys.platform != "win32":
     import fcntl
-
-__all__ = ["LogFile", "is_being_written", "open_log_file"]
 
 
 class LogFile(Protocol):
@@ -23,15 +21,12 @@ class LogFile(Protocol):
 
     def write(self, data: bytes | memoryview) -> int:
         """Append bytes; return how many of them were written, as ``os.write`` does. Raises OSError."""
-        ...
 
     def sync(self) -> None:
         """Sync all written bytes to the disk. Raises OSError."""
-        ...
 
     def close(self) -> None:
         """Close the file."""
-        ...
 
 
 class _NewFile(io.FileIO):
@@ -56,20 +51,3 @@ def open_log_file(path: Path) -> LogFile:
     with contextlib.suppress(OSError):  # a disk that cannot sync a folder
         sync_folder(path.parent)
     return file
-
-
-def is_being_written(file: BinaryIO) -> bool:
-    """Return whether the writer of a log's file, in this process or another, still holds its lock.
-
-    False on Windows and on a disk without locks, where this is unknown.
-    """
-    if sys.platform == "win32":
-        return False
-    try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        fcntl.flock(file, fcntl.LOCK_UN)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return False

@@ -1,4 +1,4 @@
-"""Define the layout of a wire log: the bytes of a record.
+"""Define the layout of a wire log: the bytes of a record, and the JSON of its header and events.
 
 A log is a sequence of records and nothing else, little-endian::
 
@@ -10,20 +10,14 @@ A log is a sequence of records and nothing else, little-endian::
         16     4  log        u32, random, the same in every record of a log
         20     1  kind       1 header, 2 data, 3 mark, 4 event, 5 end
         21     1  channel    u8, the sensor; 0 if the record belongs to no sensor
-        22     2  parts      u16, bit 0: continues in the next record; bit 1: continues the previous one
+        22     2  parts      u16, 0; logs of 0.2.0 have 1 and 2 where a payload was split
         24     4  crc32      of bytes 0 to 23 and the payload (zlib's polynomial)
         28        payload
 
 ``log`` distinguishes the records from those of another log: an old log whose disk blocks reappear after a power cut,
-or a log that a device sends as its data. Payloads over 65535 bytes are split into consecutive parts.
-
-=======  ====================================================================================================
-header   JSON, see :class:`LogHeader`. Repeated after 8, 16, 32, ... KiB, so that no lost page destroys all copies
-data     the bytes of one read of a port
-mark     UTF-8 text
-event    JSON ``{"kind": text, "facts": {...}}``: lost, reopened, timeout, overflow, trigger, calibration, ...
-end      JSON, counts; its absence means that the recording was cut short
-=======  ====================================================================================================
+or a log that a device sends as its data. A header is repeated once after 32 KiB, so that no lost page destroys both
+copies. Data are the bytes of one read of a port, a mark is UTF-8 text, header, event and end are JSON. Without the end
+record, a recording was cut short.
 """
 
 from __future__ import annotations
@@ -31,41 +25,32 @@ from __future__ import annotations
 import enum
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from datetime import UTC, datetime, timedelta
+from typing import Annotated, Any, NamedTuple
 
-from storage.schema import ValueRefused, json_text, parsed
-from storage.wire_log.log_header import LATEST_NS, LONGEST_TEXT, LogHeader, SensorEntry
+from msgspec import Meta, Struct, field
 
-__all__ = [
-    "HEAD_BYTES",
-    "HIGHEST_CHANNEL",
-    "MAGIC",
-    "MAX_PAYLOAD",
-    "Kind",
-    "LogHeader",
-    "Parts",
-    "Record",
-    "SensorEntry",
-    "ends_item",
-    "event_payload",
-    "frame",
-    "frames",
-    "unframe",
-]
+from acquisition.errors import CalibrationError
+from acquisition.live.calibration import Calibration
+from acquisition.source import Kind as SourceKind
+from storage.schema import ValueRefused, decoded, json_text, parsed, plain, shown
 
 HIGHEST_CHANNEL = 255
 """Maximum channel number: a record has one byte for it."""
-
+LATEST_NS = 1 << 62
+"""Maximum time of a clock, ns: 146 years after the start of the host, or the year 2116 in UTC."""
+LOG_VERSION = 1
 MAGIC = b"\xf5\xa9"
 MAX_PAYLOAD = 65535
-MOST_PARTS = LONGEST_TEXT // MAX_PAYLOAD
-"""Maximum number of parts of a mark, event or header; longer ones are not joined."""
 _HEAD = struct.Struct("<2sHIqIBBH")
 _CRC = struct.Struct("<I")
 _HEAD_AND_CRC = struct.Struct(_HEAD.format + "I")
 HEAD_BYTES = _HEAD_AND_CRC.size
-_WRAP = 1 << 32
+LONGEST_RECORD = HEAD_BYTES + MAX_PAYLOAD
+"""Maximum size of a record, bytes."""
+WRAP = 1 << 32
+"""Sequence numbers count modulo this."""
 
 
 class Kind(enum.IntEnum):
@@ -78,34 +63,11 @@ class Kind(enum.IntEnum):
     END = 5
 
 
-class Parts(enum.IntFlag):
-    """Flags that show how a record continues its neighbours if a payload was split."""
-
-    GOES_ON = 1
-    GOES_ON_FROM = 2
-
-
 _KINDS = {kind.value: kind for kind in Kind}
-_ALL_PARTS = int(Parts.GOES_ON | Parts.GOES_ON_FROM)
 
 
 class Record(NamedTuple):
-    """One record. Split marks, events and headers are joined again; split data are delivered part by part.
-
-    Parameters
-    ----------
-    offset : int
-        Offset of the record in the log, bytes.
-    sequence : int
-        Number of the record as written, modulo 2^32.
-    mono_ns : int
-        Time on the host's monotonic clock, ns.
-    kind : Kind
-    channel : int
-    payload : bytes
-    lost_before : int
-        Number of missing records between the previously delivered one and this one. No frame may span them.
-    """
+    """One record; ``lost_before`` records are missing before it, and no frame may span them."""
 
     offset: int
     sequence: int
@@ -119,13 +81,125 @@ class Record(NamedTuple):
         """Return the payload as text."""
         return self.payload.decode("utf-8", "replace")
 
-    def json(self) -> Mapping[str, Any]:
-        """Return the payload as a JSON object; empty if the payload is not a JSON object."""
+
+def frame(kind: Kind, payload: bytes, sequence: int, mono_ns: int, log: int, channel: int = 0) -> bytes:
+    """Return one record with a payload of at most 65535 bytes.
+
+    Examples
+    --------
+    >>> frame(Kind.DATA, b"R0500", sequence=7, mono_ns=1, log=2, channel=3).hex(" ", -4)
+    'f5a90500 07000000 01000000 00000000 02000000 02030000 034438e3 52303530 30'
+    """
+    head = _HEAD.pack(MAGIC, len(payload), sequence % WRAP, mono_ns, log, kind, channel, 0)
+    return head + _CRC.pack(zlib.crc32(payload, zlib.crc32(head))) + payload
+
+
+def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Kind, int, bytes] | None:
+    """Return the complete and valid record that begins at an index: sequence, mono_ns, log, kind, channel, payload.
+
+    Return None if there is none, or if it belongs to another log than number ``log``.
+    """
+    start = at + HEAD_BYTES
+    if start > len(data):
+        return None
+    magic, length, sequence, mono_ns, number, code, channel, _, crc = _HEAD_AND_CRC.unpack_from(data, at)
+    end = start + length
+    # Cheap checks first, because a search through damaged bytes calls this for every accidental magic.
+    if magic != MAGIC or end > len(data) or (number != log and log is not None) or code not in _KINDS:
+        return None
+    payload = data[start:end]
+    if not 0 <= mono_ns <= LATEST_NS or crc != zlib.crc32(payload, zlib.crc32(data[at : at + _HEAD.size])):
+        return None
+    return sequence, mono_ns, number, _KINDS[code], channel, payload
+
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_Nanoseconds = Annotated[int, Meta(ge=0, le=LATEST_NS)]
+_Word = Annotated[str, Meta(max_length=100)]
+_Option = Annotated[str, Meta(max_length=256)] | Annotated[int, Meta(ge=-(2**53), le=2**53)]
+
+
+class SensorEntry(Struct, frozen=True, forbid_unknown_fields=True):
+    """One sensor of a run: the channel of its records, its family and port, and how its bytes are decoded.
+
+    ``rate_hz`` is the configured number of readings per second, and ``clock_ppm`` the maximum rate error of the
+    sensor's clock; None stands for the family's value. ``calibration`` has the numbers of
+    :class:`acquisition.live.calibration.Calibration`; it is empty for the default.
+    """
+
+    channel: Annotated[int, Meta(ge=0, le=HIGHEST_CHANNEL)]
+    family: _Word
+    port: Annotated[str, Meta(max_length=4096)] = ""
+    baud: Annotated[int, Meta(ge=0, le=10**9)] = 0
+    rate_hz: Annotated[float, Meta(ge=1e-6, le=1e9)] | None = None
+    options: dict[str, _Option] = field(default_factory=dict)
+    clock_ppm: Annotated[float, Meta(ge=0.0, le=1e6)] | None = None
+    calibration: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        demand_calibration(self.calibration, "calibration")
+
+
+class LogHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The description of a run at the start of its log.
+
+    ``mono_ns`` and ``unix_ns`` are the times of the host's monotonic clock and of UTC (since 1970) at the same moment,
+    ns. ``kind`` is stored with the data, so that simulated data cannot be mistaken for measured data.
+    """
+
+    sensors: Annotated[tuple[SensorEntry, ...], Meta(min_length=1, max_length=256)]
+    mono_ns: _Nanoseconds
+    unix_ns: _Nanoseconds
+    kind: SourceKind = "live"
+    scene: Mapping[str, Any] | None = None
+    title: Annotated[str, Meta(max_length=10_000)] = ""
+    version: _Word = ""
+
+    def __post_init__(self) -> None:
+        channels = [sensor.channel for sensor in self.sensors]
+        if len(set(channels)) != len(channels):
+            raise ValueRefused("sensors", f"expected different channels, got {channels}")
+
+    def utc(self, mono_ns: int) -> str:
+        """Convert a time of the monotonic clock in ns to UTC (ISO 8601); empty after the year 9999."""
+        micros = (self.unix_ns + mono_ns - self.mono_ns) // 1000
         try:
-            content = parsed(self.payload, "record")
-        except ValueRefused:
-            return {}
-        return content if isinstance(content, dict) else {}
+            return (_EPOCH + timedelta(microseconds=micros)).isoformat(timespec="microseconds")
+        except OverflowError:
+            return ""
+
+    def encode(self) -> bytes:
+        """Return the payload of a header record; raise TypeError or ValueError if :meth:`decode` would refuse it."""
+        content = {"log": LOG_VERSION, "start_utc": self.utc(self.mono_ns), **plain(self)}
+        payload = json_text(content).encode("ascii")
+        if len(payload) > MAX_PAYLOAD:
+            raise ValueError(f"expected a header of at most {MAX_PAYLOAD} bytes, got {len(payload)}")
+        self.decode(payload)
+        return payload
+
+    @classmethod
+    def decode(cls, payload: bytes) -> LogHeader:
+        """Decode the payload that :meth:`encode` returned; raise ValueRefused for another version or value."""
+        content = parsed(payload, "header")
+        if isinstance(content, dict):
+            if (version := content.pop("log", None)) != LOG_VERSION:
+                reason = f"expected {LOG_VERSION}, the version of the layout, got {shown(version)}"
+                raise ValueRefused("header.log", reason)
+            content.pop("start_utc", None)  # for people; unix_ns states the same time
+        return decoded(content, cls, "header")
+
+
+def demand_calibration(numbers: object, key: str) -> None:
+    """Raise ValueRefused if numbers from a log are not those of a calibration."""
+    try:
+        Calibration.from_mapping(decoded(numbers, dict[str, float], key))
+    except CalibrationError as error:
+        raise ValueRefused(key, str(error)) from error
+
+
+class _Event(Struct, frozen=True, forbid_unknown_fields=True):
+    kind: _Word
+    facts: dict[str, Any] = field(default_factory=dict)
 
 
 def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:
@@ -137,71 +211,12 @@ def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:
     return text.encode("ascii")
 
 
-def frame(kind: Kind, payload: bytes, sequence: int, mono_ns: int, log: int, channel: int = 0, parts: int = 0) -> bytes:
-    """Return one record with a payload of at most 65535 bytes.
+def event_content(payload: bytes) -> dict[str, Any]:
+    """Return the kind and the facts of an event record.
 
-    Examples
-    --------
-    >>> frame(Kind.DATA, b"R0500", sequence=7, mono_ns=1, log=2, channel=3).hex(" ", -4)
-    'f5a90500 07000000 01000000 00000000 02000000 02030000 034438e3 52303530 30'
+    If they cannot be read, the kind is "unreadable", and the facts contain the reason and the record's first bytes.
     """
-    head = _HEAD.pack(MAGIC, len(payload), sequence % _WRAP, mono_ns, log, kind, channel, parts)
-    return head + _CRC.pack(zlib.crc32(payload, zlib.crc32(head))) + payload
-
-
-def frames(kind: Kind, payload: bytes, *, sequence: int, mono_ns: int, log: int, channel: int = 0) -> Iterator[bytes]:
-    """Return the records of a payload of any length, numbered from ``sequence``."""
-    starts = range(0, max(1, len(payload)), MAX_PAYLOAD)
-    for number, start in enumerate(starts):
-        parts = (Parts.GOES_ON if number < len(starts) - 1 else 0) | (Parts.GOES_ON_FROM if number else 0)
-        piece = payload[start : start + MAX_PAYLOAD]
-        yield frame(
-            kind, piece, sequence=sequence + number, mono_ns=mono_ns, log=log, channel=channel, parts=int(parts)
-        )
-
-
-def ends_item(record: bytes) -> bool:
-    """Return whether a record is the last one of an item: neither a part that continues nor a copy of the header.
-
-    Examples
-    --------
-    >>> [ends_item(record) for record in frames(Kind.DATA, bytes(70_000), sequence=0, mono_ns=0, log=1)]
-    [False, True]
-    """
-    *_, kind, _, parts = _HEAD.unpack_from(record)
-    return kind != Kind.HEADER and not parts & Parts.GOES_ON
-
-
-Unframed = tuple[int, int, int, Kind, int, int, bytes]
-
-
-def unframe(data: bytes, at: int, log: int | None) -> Unframed | None:
-    """Return the record that begins at an index; None if there is no complete and valid record.
-
-    Parameters
-    ----------
-    data : bytes
-    at : int
-        Index of the record's first byte.
-    log : int or None
-        Number of the log to which the record must belong; None for any log.
-
-    Returns
-    -------
-    tuple
-        sequence, mono_ns, log, kind, channel, parts, payload.
-    """
-    start = at + HEAD_BYTES
-    if start > len(data):
-        return None
-    magic, length, sequence, mono_ns, log_number, code, channel, parts, crc = _HEAD_AND_CRC.unpack_from(data, at)
-    # Cheap checks first, because a search through damaged bytes calls this for every accidental magic.
-    kind = _KINDS.get(code)
-    if magic != MAGIC or kind is None or parts > _ALL_PARTS or start + length > len(data):
-        return None
-    if (log is not None and log_number != log) or not 0 <= mono_ns <= LATEST_NS:
-        return None
-    payload = data[start : start + length]
-    if crc != zlib.crc32(payload, zlib.crc32(data[at : at + _HEAD.size])):
-        return None
-    return sequence, mono_ns, log_number, kind, channel, parts, payload
+    try:
+        return plain(decoded(parsed(payload, "event"), _Event, "event"))
+    except ValueRefused as error:
+        return {"kind": "unreadable", "facts": {"why": str(error), "bytes": payload[:200].decode("ascii", "replace")}}

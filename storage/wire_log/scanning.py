@@ -6,84 +6,138 @@ checksum, the number of the log and an increasing sequence number. The bytes bet
 
 from __future__ import annotations
 
-import contextlib
-import io
-import itertools
+import hashlib
 import os
-import re
-from collections import Counter
-from collections.abc import Iterator, Sequence
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 
+from acquisition.regular_file import open_regular
+from storage.errors import NotALog, one_line
 from storage.schema import ValueRefused
-from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record
-from storage.wire_log.scan import Damage, Scan
-from storage.wire_log.window import LogPart, NotALog, TakeBytes, Window
+from storage.wire_log.records import HEAD_BYTES, LONGEST_RECORD, MAGIC, WRAP, Kind, LogHeader, Record, unframe
 
-__all__ = ["Damage", "LogContents", "NotALog", "Record", "parse_log", "read_log"]
+FOREIGN = "springmass does not write such logs; ask where it comes from"
+STRETCH = 1 << 20
+"""Number of bytes that are read at a time."""
+
+
+@dataclass(slots=True)
+class Damage:
+    """The damage of the bytes that a scan has read.
+
+    ``lost`` records are missing according to the sequence numbers, ``skipped_bytes`` between records belong to no
+    record (the first at ``skipped_at``), and ``tail_bytes`` follow the last valid record. ``strays`` are valid records
+    whose sequence number runs backward, copies of earlier ones that are not delivered. ``ended`` states whether the
+    last record is the end record of a recording.
+    """
+
+    records: int = 0
+    lost: int = 0
+    skipped_bytes: int = 0
+    skipped_at: int = -1
+    strays: int = 0
+    tail_bytes: int = 0
+    ended: bool = False
+
+    @property
+    def intact(self) -> bool:
+        """Whether every byte belongs to a record, and no record before the last is missing."""
+        return not (self.lost or self.skipped_bytes or self.strays or self.tail_bytes)
+
+    def describe(self) -> str:
+        """Return one line for the user."""
+        parts = [f"{self.records} records"]
+        if self.lost:
+            parts.append(f"{self.lost} lost")
+        if self.skipped_bytes:
+            parts.append(f"{self.skipped_bytes} damaged bytes skipped, first at byte {self.skipped_at}")
+        if self.strays:
+            parts.append(f"{self.strays} out of order left out")
+        if self.tail_bytes:
+            parts.append(f"{self.tail_bytes} damaged bytes at the end")
+        return ", ".join(parts) + ("" if self.ended else "; the recording was cut short")
+
+
+class Scan:
+    """One pass over a log, from its first byte: finished, damaged or growing.
+
+    ``read`` returns at most so many bytes (its second argument) from a position of the log (its first one).
+    """
+
+    def __init__(self, read: Callable[[int, int], bytes]) -> None:
+        self.damage = Damage()
+        self._read = read
+        self._log: int | None = None
+        self._end = 0  # of the last valid record
+        self._expected = 0
+
+    def records(self, size: int) -> Iterator[Record]:
+        """Yield the valid records in the first ``size`` bytes of the log that were not yielded before.
+
+        The bytes after the last of them are read again in the next call, because the log may grow there.
+        """
+        damage, data, base, at = self.damage, b"", self._end, 0
+        while True:
+            while len(data) - at < LONGEST_RECORD and base + len(data) < size:
+                more = self._read(base + len(data), min(STRETCH, size - base - len(data)))
+                size = size if more else base + len(data)  # somebody has cut the file meanwhile
+                data, base, at = data[at:] + more, base + at, 0
+            record = unframe(data, at, self._log)
+            if record is None:
+                if at >= len(data):
+                    break
+                following = data.find(MAGIC, at + 1)
+                at = following if following >= 0 else max(at + 1, len(data) - 1)  # the last byte may begin a magic
+                continue
+            sequence, mono_ns, self._log, kind, channel, payload = record
+            offset = base + at
+            if skipped := offset - self._end:
+                damage.skipped_at = damage.skipped_at if damage.skipped_bytes else self._end
+                damage.skipped_bytes += skipped
+            at += HEAD_BYTES + len(payload)
+            self._end = base + at
+            missing = (sequence - self._expected) % WRAP
+            if missing >= WRAP // 2:
+                damage.strays += 1
+                continue
+            self._expected = sequence + 1
+            damage.records += 1
+            damage.lost += missing
+            damage.ended = kind is Kind.END
+            yield Record(offset, sequence, mono_ns, kind, channel, payload, missing)
+        damage.tail_bytes = size - self._end
 
 
 class LogContents:
-    """The records of a log. Every iteration reads the log again, with memory that does not grow with the log.
+    """An open log. Every iteration reads its first ``size`` bytes again, in little memory.
 
-    Parameters
-    ----------
-    path : Path
-        Name of the log in messages.
-    parts : sequence of LogPart
-        The files of the log, in order, each with its size at the time of opening.
+    It remains readable if the log is renamed or deleted, because the file stays open until :meth:`close` or the end of
+    this object.
     """
 
-    def __init__(self, path: Path, parts: Sequence[LogPart]) -> None:
-        self.path = path
-        self.parts = tuple(parts)
+    def __init__(self, path: Path, file: FileIO) -> None:
+        self.path, self._file = path, file
+        self.size = 0
         self._damage: Damage | None = None
-
-    @property
-    def size(self) -> int:
-        """Total size of all parts, bytes."""
-        return sum(part.size for part in self.parts)
+        self.close = weakref.finalize(self, file.close)
+        self.grow()
 
     def __iter__(self) -> Iterator[Record]:
-        return self.records()
+        scan = self.scan()
+        yield from scan.records(self.size)
+        self._damage = scan.damage
 
-    def records(self, take_bytes: TakeBytes = lambda *_: None) -> Iterator[Record]:
-        """Yield the records in order.
+    def scan(self) -> Scan:
+        """Return a new pass over the log."""
+        return Scan(self._read)
 
-        Parameters
-        ----------
-        take_bytes : callable
-            Called with the number of the part and the bytes of the log, in order, as they are read. A copy made from
-            these calls contains exactly the bytes that were decoded.
-
-        Raises
-        ------
-        NotALog
-            If a file can no longer be read.
-        """
-        with contextlib.closing(Window(self.parts, take_bytes)) as window:
-            scan = Scan(window, self.number())
-            yield from scan.records()
-        self._damage = scan.damage()
-
-    def number(self) -> int | None:
-        """Return the log number of the first record, which was on the disk before the run began.
-
-        If that record is lost, return the most frequent number of the first thousand valid records. The first of them
-        alone may come from a device's data or from an old log whose disk blocks reappeared. Return None if there is no
-        valid record.
-        """
-        with contextlib.closing(Window(self.parts)) as window:
-            if (first := window.record(None)) is not None:
-                return first[2]
-            numbers: Counter[int] = Counter()
-            while numbers.total() < 1000:
-                if (record := window.record(None)) is not None:
-                    numbers.update([record[2]])
-                    window.at += HEAD_BYTES + len(record[-1])
-                elif not window.seek(None):
-                    break
-        return numbers.most_common(1)[0][0] if numbers else None
+    def grow(self) -> int:
+        """Take over the present size of the file, and return it."""
+        self.size, self._damage = os.fstat(self._file.fileno()).st_size, None
+        return self.size
 
     @property
     def damage(self) -> Damage:
@@ -96,68 +150,73 @@ class LogContents:
 
     @property
     def header(self) -> LogHeader | None:
-        """The first header; None if every copy is lost.
+        """The first header; None if both copies are lost. Raises NotALog for a value that is not allowed."""
+        payload = next((record.payload for record in self if record.kind is Kind.HEADER), None)
+        try:
+            return None if payload is None else LogHeader.decode(payload)
+        except ValueRefused as error:
+            raise NotALog(self.path, str(error), FOREIGN) from error
 
-        Raises
-        ------
-        NotALog
-            If the header has a value that is not allowed.
+    def pieces(self) -> Iterator[bytes]:
+        """Yield all bytes of the log."""
+        at = 0
+        while piece := self._read(at, min(STRETCH, self.size - at)):
+            yield piece
+            at += len(piece)
+
+    def sha256(self) -> str:
+        """Return the SHA-256 of all bytes, as they are on the disk now."""
+        digest = hashlib.sha256()
+        for piece in self.pieces():
+            digest.update(piece)
+        return digest.hexdigest()
+
+    def being_written(self) -> bool:
+        """Return whether the writer of the log, in this process or another, still holds its lock.
+
+        False on Windows and on a disk without locks, where this is unknown.
         """
-        for record in self:
-            if record.kind is Kind.HEADER:
-                try:
-                    return LogHeader.decode(record.payload)
-                except ValueRefused as error:
-                    raise NotALog(
-                        self.path, str(error), "springmass does not write such logs; ask where it comes from"
-                    ) from error
-        return None
+        try:
+            import fcntl
+
+            fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            fcntl.flock(self._file, fcntl.LOCK_UN)
+        except (ImportError, OSError) as error:
+            return isinstance(error, BlockingIOError)
+        return False
+
+    def remove(self) -> bool:
+        """Remove the log unless it has grown or its name leads to another file; return whether it was removed."""
+        try:
+            own, there = os.fstat(self._file.fileno()), os.stat(self.path)
+            if not os.path.samestat(own, there) or there.st_size != self.size:
+                return False
+            self.close()
+            self.path.unlink()
+        except OSError:
+            return False
+        return True
+
+    def _read(self, at: int, count: int) -> bytes:
+        try:
+            self._file.seek(at)
+            return self._file.read(count) or b""
+        except OSError as error:
+            raise _unreadable(self.path, error) from error
 
 
 def read_log(path: str | os.PathLike[str]) -> LogContents:
-    """Open a log, whether finished, damaged or still being written.
+    """Open a log, whether finished, damaged or still being written; a file that is not a log has no records.
 
-    Version 0.1.0 continued a log in further files, ``run.001.wire`` and so on. They are read with the first file. A
-    file with such a name but the records of another log is ignored.
-
-    Parameters
-    ----------
-    path : str or PathLike
-        The first file of the log.
-
-    Returns
-    -------
-    LogContents
-        The records of the file; a file that is not a log has none.
-
-    Raises
-    ------
-    NotALog
-        If the file cannot be read.
+    Raises NotALog if the file cannot be read.
     """
     path = Path(path)
-    first = LogContents(path, [LogPart.at(path)])
-    further = [LogPart.at(path_of_part) for path_of_part in _further(path)]
-    if not further:
-        return first
-    numbers = [LogContents(part.path, [part]).number() for part in further]
-    log = next((number for number in (first.number(), *numbers) if number is not None), None)
-    matching = [part for part, number in zip(further, numbers, strict=True) if number in (log, None)]
-    return LogContents(path, [*first.parts, *matching])
-
-
-def _further(path: Path) -> list[Path]:
-    """Return the files next to a log whose names are those of its further parts, in order."""
-    form = re.compile(re.escape(path.stem) + r"\.([0-9]{3,9})" + re.escape(path.suffix))
     try:
-        names = os.listdir(path.absolute().parent)
-    except OSError:  # a folder whose files can be opened but not listed
-        tried = (path.with_name(f"{path.stem}.{number:03d}{path.suffix}") for number in itertools.count(1))
-        return list(itertools.takewhile(Path.exists, tried))
-    numbered = [(int(match[1]), name) for name in names if (match := form.fullmatch(name))]
-    return [path.with_name(name) for _, name in sorted(numbered)]
+        return LogContents(path, open_regular(path))
+    except OSError as error:
+        raise _unreadable(path, error) from error
 
 
-def parse_log(data: bytes, path: str | os.PathLike[str] = "log") -> LogContents:
-    """Read a log from memory; ``path`` is its name in messages."""
-    return LogContents(Path(path), [LogPart(Path(path), len(data), lambda: io.BytesIO(data))])
+def _unreadable(path: Path, error: OSError) -> NotALog:
+    problem = f"the wire log cannot be read ({error.strerror or one_line(error)})"
+    return NotALog(path, problem, "name a log that springmass record wrote")

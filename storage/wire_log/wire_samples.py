@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
-from acquisition.block import Block, concatenate
+from acquisition.block import Block
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from storage.wire_log.log_header import event_content
-from storage.wire_log.records import Kind, Record, SensorEntry
-
-__all__ = ["BREAKS", "LogDecoder", "chains_of", "decode_log"]
+from storage.wire_log.parts import Part, Parts
+from storage.wire_log.records import Kind, Record, SensorEntry, event_content
 
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
 """Events that interrupt the bytes of a channel."""
@@ -21,118 +20,91 @@ HELD_BYTES = 1 << 18
 """Number of bytes at which fewer reads are decoded, because a read may contain many readings."""
 
 
-def chains_of(sensors: Sequence[SensorEntry]) -> list[SensorChain]:
-    """Return the decoding chain of each sensor, with its calibration from the log.
-
-    Raises
-    ------
-    acquisition.errors.AcquisitionError
-        If a family does not exist or does not have an option.
-    """
-    return [
-        SensorChain(
-            get_family(sensor.family),
-            options=sensor.options,
-            rate_hz=sensor.rate_hz,
-            calibration=Calibration.from_mapping(sensor.calibration) if sensor.calibration else None,
-            clock_ppm=sensor.clock_ppm,
-        )
-        for sensor in sensors
-    ]
+def chain_of(sensor: SensorEntry) -> SensorChain:
+    """Return the decoding chain of a sensor. Raises AcquisitionError for an unknown family or option."""
+    return SensorChain(
+        get_family(sensor.family),
+        options=sensor.options,
+        rate_hz=sensor.rate_hz,
+        calibration=Calibration.from_mapping(sensor.calibration) if sensor.calibration else None,
+        clock_ppm=sensor.clock_ppm,
+    )
 
 
 class LogDecoder:
-    """Decodes the records of a log into samples, piece by piece.
+    """Decodes the records of a log into the samples of each part, piece by piece.
 
     If records are missing or a port was lost, no frame spans the gap, and the first sample after it is flagged.
-    The channels of other sensors are skipped.
-
-    Parameters
-    ----------
-    sensors : sequence of SensorEntry
-    chains : sequence of SensorChain
-        One for each sensor.
-    noted : callable
-        Called with every record that is not data.
-
-    Attributes
-    ----------
-    reads : list of int
-        Number of reads of each sensor's port so far.
-    last_ns : int
-        Host time of the log's last record in any channel, ns; set at the end.
+    ``channels`` are those of the sensors. ``chain_for`` returns the chain of a part that begins, or None if the part is
+    not decoded. ``noted`` is called with every record that is not data, and with the content of an event. ``chains``
+    has the chain of each part so far, and ``reads`` the number of its reads.
     """
 
     def __init__(
         self,
-        sensors: Sequence[SensorEntry],
-        chains: Sequence[SensorChain],
-        noted: Callable[[Record], object] = lambda _: None,
+        channels: Iterable[int],
+        chain_for: Callable[[Part], SensorChain | None],
+        noted: Callable[[Record, dict[str, Any]], object] = lambda *_: None,
     ) -> None:
-        self.sensors, self.chains, self._noted = tuple(sensors), tuple(chains), noted
-        self.reads = [0] * len(self.sensors)
-        self.last_ns = 0
-        self._held: list[list[tuple[int, bytes]]] = [[] for _ in self.sensors]
+        self._chain_for, self._noted = chain_for, noted
+        self._parts = Parts(channels)
+        self._held: dict[Part, list[tuple[int, bytes]]] = {}
+        self.chains: dict[Part, SensorChain] = {}
+        self.reads: dict[Part, int] = {}
+        for part in self._parts.now.values():
+            self._begin(part)
 
-    def blocks(self, log: Iterable[Record], *, growing: bool = False) -> Iterator[tuple[int, Block]]:
-        """Yield the index of a sensor and its samples, as they are decoded.
-
-        Parameters
-        ----------
-        log : iterable of Record
-        growing : bool
-            Whether a later call will pass more records.
-        """
-        places = {sensor.channel: (number, held) for number, (sensor, held) in enumerate(self._places())}
-        size = mono_ns = 0
+    def blocks(self, log: Iterable[Record]) -> Iterator[tuple[Part, Block]]:
+        """Yield parts and their samples, as they are decoded; a later call may pass the further records of a log."""
+        size, now = 0, self._parts.now
         for record in log:
             _, _, mono_ns, kind, channel, payload, lost_before = record
             if lost_before:
-                for number in range(len(self.chains)):
-                    self._break(number)
-            place = places.get(channel)
+                for part in list(now.values()):
+                    self._break(part)
             if kind is not Kind.DATA:
-                self._noted(record)
-                if place is not None and kind is Kind.EVENT and event_content(payload)["kind"] in BREAKS:
-                    self._break(place[0], returned=event_content(payload)["kind"] == "reopened")
-            elif place is not None:
-                place[1].append((mono_ns, payload))
-                size += len(payload)
-                if len(place[1]) >= HELD_READS or size >= HELD_BYTES:
-                    size = 0
-                    yield from self._samples()
-        self.last_ns = mono_ns
-        yield from self._samples(final=not growing)
+                self._note(record)
+                continue
+            held = self._held.get(now[channel]) if channel in now else self._begin(self._parts.unknown(channel))
+            if held is None:
+                continue
+            held.append((mono_ns, payload))
+            size += len(payload)
+            if len(held) >= HELD_READS or size >= HELD_BYTES:
+                size = 0
+                yield from self._samples()
+        yield from self._samples()
 
-    def _places(self) -> Iterator[tuple[SensorEntry, list[tuple[int, bytes]]]]:
-        return zip(self.sensors, self._held, strict=True)
+    def _note(self, record: Record) -> None:
+        content: dict[str, Any] = {}
+        if record.kind is Kind.EVENT:
+            content = event_content(record.payload)
+            if content["kind"] in BREAKS and record.channel in self._parts.now:
+                self._break(self._parts.now[record.channel])
+            self._begin(self._parts.event(record.channel, content))
+        self._noted(record, content)
 
-    def _break(self, number: int, *, returned: bool = False) -> None:
-        self._hand_over(number)
-        chain = self.chains[number]
-        (chain.returned if returned else chain.lost)()
+    def _begin(self, part: Part | None) -> list[tuple[int, bytes]] | None:
+        """Begin a part, and return the list of its held reads; None if it is not decoded."""
+        chain = None if part is None else self._chain_for(part)
+        if part is None or chain is None:
+            return None
+        self.chains[part], self._held[part], self.reads[part] = chain, [], 0
+        return self._held[part]
 
-    def _hand_over(self, number: int) -> None:
-        held = self._held[number]
-        self.chains[number].take_all(held)
-        self.reads[number] += len(held)
+    def _break(self, part: Part) -> None:
+        if part in self.chains:
+            self._hand_over(part)
+            self.chains[part].lost()
+
+    def _hand_over(self, part: Part) -> None:
+        held = self._held[part]
+        self.chains[part].take_all(held)
+        self.reads[part] += len(held)
         held.clear()
 
-    def _samples(self, *, final: bool = False) -> Iterator[tuple[int, Block]]:
-        for number, chain in enumerate(self.chains):
-            self._hand_over(number)
+    def _samples(self) -> Iterator[tuple[Part, Block]]:
+        for part, chain in self.chains.items():
+            self._hand_over(part)
             if len(chain):
-                yield number, chain.block(final=final)
-
-
-def decode_log(
-    log: Iterable[Record],
-    sensors: Sequence[SensorEntry],
-    chains_for: Callable[[Sequence[SensorEntry]], Sequence[SensorChain]] = chains_of,
-) -> list[Block]:
-    """Return all samples of each sensor as one block; see :class:`LogDecoder`."""
-    decoder = LogDecoder(sensors, chains_for(sensors))
-    blocks: list[list[Block]] = [[] for _ in sensors]
-    for number, block in decoder.blocks(log):
-        blocks[number].append(block)
-    return [concatenate(each) for each in blocks]
+                yield part, chain.block()

@@ -103,9 +103,9 @@ def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp
         assert b.scene == springmass.read_scene(data / "undamped.scene.toml").to_mapping()
 
 
-@pytest.mark.parametrize("suffix", [".txt", ".lvm", ".csv"])
+@pytest.mark.parametrize("suffix", [".txt", ".csv"])
 def test_what_is_written_in_another_form_reads_back(cli: Cli, data: Path, tmp_path: Path, suffix: str) -> None:
-    """Times, distances, rate, quantum and kind survive the way through MotionSensor.vi, LVM and CSV."""
+    """Times, distances, rate, quantum and kind survive the way through MotionSensor.vi and CSV."""
     recording, out = data / "sixty_hz_simulated_position.txt", tmp_path / f"back{suffix}"
     old = springmass.load(recording)
     assert cli("convert", recording, out).code == 0
@@ -136,8 +136,8 @@ def test_what_a_form_has_no_room_for_is_told(cli: Cli, write: Any, rows: list[by
     done = cli("convert", fast, tmp_path / "b.txt")
     assert done.code == 3
     assert not (tmp_path / "b.txt").exists()
-    assert cli("convert", fast, tmp_path / "b.lvm").code == 0
-    assert springmass.load(tmp_path / "b.lvm").info.rate_hz == 10_000.0
+    assert cli("convert", fast, tmp_path / "b.csv").code == 0
+    assert springmass.load(tmp_path / "b.csv").info.rate_hz == 10_000.0
 
 
 def test_an_empty_run_is_converted_too(cli: Cli, tmp_path: Path, recording: Path) -> None:

@@ -100,7 +100,7 @@ def test_a_run_of_a_zip_is_analysed(cli: Cli, data: Path, tmp_path: Path) -> Non
             archive.write(data / name, name)
         archive.writestr("run.csv", "Time (s),Position (m)\n" + "".join(f"{i / 10},{i % 3}\n" for i in range(40)))
     families = [line.split()[1] for line in cli("formats", path).out.splitlines()[1:]]
-    assert families == ["motion-sensor", "motion-sensor", "csv"]
+    assert families == ["motion-sensor", "motion-sensor", "table"]
     refused = cli("analyse", path, "--json")
     assert refused.code == 3
     assert "--run" in refused.complaint

@@ -42,9 +42,11 @@ def test_a_mistyped_line_is_answered_with_what_was_meant(cli: Cli, line: tuple[s
 
 
 def test_every_finding_is_explained(cli: Cli) -> None:
-    """The list names codes that ``explain`` knows; a code nearly right is answered with the right one."""
+    """The list names codes that ``explain`` knows, each with a short example; a wrong code gets the right one."""
     (listed,) = cli("explain", "--json").results
     for each in listed:
+        assert 0 < len(each["example"]) <= 110
+        assert each["advice"] or each["severities"] == ["info"]
         assert cli("explain", each["code"]).out.startswith(each["code"])
     wrong = cli("explain", "clip")
     assert (wrong.code, wrong.out) == (2, "")

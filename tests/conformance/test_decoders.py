@@ -14,10 +14,11 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from acquisition.decoders.example import FAMILY as EXAMPLE
 from acquisition.decoders.family import Decoder, Family
 from acquisition.decoders.registry import families, get_family
+from acquisition.errors import SensorError
 from acquisition.readings import Reading
+from tests.encoders import ENCODERS
 from tests.sampling import sampled
 
 N = 24
@@ -61,8 +62,8 @@ class Case:
 
     @property
     def member(self) -> Family:
-        """The family; the template's is in no registry."""
-        return EXAMPLE if self.family == "example" else get_family(self.family)
+        """The family."""
+        return get_family(self.family)
 
     def decoder(self) -> Decoder:
         """Return a fresh decoder."""
@@ -70,7 +71,7 @@ class Case:
 
     def frames(self, distance: np.ndarray[Any, np.dtype[np.float64]] = DISTANCE) -> list[bytes]:
         """Return the bytes of each reading."""
-        encoder = self.member.encoder(**self.options)
+        encoder = ENCODERS[self.family](**self.options)
         return [
             encoder.encode(
                 sequence=int(SEQUENCE[i]),
@@ -126,7 +127,6 @@ CASES = [
         lead=1,
         known={b"t=70 d=10\n": 0.254, b"t: 70, d: 10 in\n": 0.254},
     ),
-    Case("example", 0.001, "detected", known={b":0253,CA\n": 0.253}, no_target=(b":0000,C0\n",)),
 ]
 
 
@@ -171,7 +171,7 @@ def flushes(case: Case) -> bool:
 
 def test_every_family_of_the_registry_has_a_case() -> None:
     """A family without a case is not held to the rules."""
-    assert {family.name for family in families()} | {"example"} == {case.family for case in CASES}
+    assert {family.name for family in families()} == {case.family for case in CASES}
 
 
 @every_case
@@ -290,7 +290,6 @@ def test_back_in_step_within_two_frames_of_garbage(case: Case, at: int, seeds: i
         decoder.feed(1, garbage(seed))
         if flushes(case):
             decoder.flush()
-            # A flush begins the cycle of requests anew, as the poller does.
             clean, _ = run(case, b"".join(frames[:at]))
             after = decoder.feed(2, b"".join(case.frames()[: N - at]))
             sent, _ = run(case, b"".join(case.frames()[: N - at]))
@@ -378,10 +377,31 @@ def test_memory_is_bounded_on_a_stream_without_frame_ends(case: Case, filler: by
         assert decoder.pending <= MOST_PENDING
 
 
+TEMPERATURES = {
+    "us100": hexed("07a1 07a2 42 07a3"),
+    "urm37": hexed("22007b9d 22007c9e 1100d5e6 22007d9f"),
+    "sen0149": hexed("55aa110202 07a1 bc 55aa110202 07a2 bd 55aa110203 00d5 ea 55aa110202 07a3 be"),
+}
+"""Replies of 0.2.0's recordings with a temperature after every two distances."""
+
+
+@pytest.mark.parametrize("name", TEMPERATURES)
+def test_polled_temperatures_of_old_logs_are_no_distances(name: str) -> None:
+    """A decoder with the option of 0.2.0 gives the three distances in order, and a recording cannot ask for it."""
+    family = get_family(name)
+    decoder = family.decoder(temperature_every=2)
+    distances = decoder.feed(0, TEMPERATURES[name]).distance_m
+    expected = [1.23, 1.24, 1.25] if name == "urm37" else [1.953, 1.954, 1.955]
+    np.testing.assert_allclose(distances, expected, atol=1e-9)
+    assert not any(decoder.faults.values())
+    with pytest.raises(SensorError, match="temperature_every"):
+        family.demand_options({"temperature_every": 2})
+
+
 def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:
     """A surplus byte shifts every reply; two impossible distances in a row give it away."""
     distances = 0.300 + 0.001 * np.arange(20)
-    encoder = get_family("us100").encoder()
+    encoder = ENCODERS["us100"]()
     data = b"".join(
         encoder.encode(sequence=0, device_us=0, echo_us=math.nan, distance_m=d, temperature_c=20.0) for d in distances
     )

@@ -14,10 +14,11 @@ import pytest
 
 from acquisition.block import Flag, concatenate
 from acquisition.errors import FormatError
-from acquisition.recordings.base import HEAD_BYTES, Format
-from acquisition.recordings.families.template import FORMAT as EXAMPLE
+from acquisition.recordings.base import Format
 from acquisition.recordings.identify import formats, get_format
 from acquisition.recordings.recording import Recording
+from acquisition.recordings.tables.text import HEAD_BYTES
+from tests.plugin.bench_extras import HEIGHT_LOG as EXAMPLE
 from tests.sampling import sampled
 
 RATE_HZ = 100.0
@@ -366,7 +367,7 @@ def trk(t: Any, x: Any) -> bytes:
 
 
 def height_log(t: Any, x: Any) -> bytes:
-    """Write the invented log of the template."""
+    """Write the invented log of a package of one's own."""
     body = (f"{i};{row}" for i, row in enumerate(rows(t, x * 1000, "{x:.2f}")))
     return "\n".join(["Height log, 100 Hz", *body]).encode()
 
@@ -397,16 +398,16 @@ CASES = [
     Case("logger-pro", "cmbl", cmbl, None, options={"run": "run 1"}, text=False),
     Case("logger-pro", "gambl", gambl, None, options={"run": "run 1"}, text=False),
     Case("tracker", "trk", trk, None, options={"channel": "y"}, times=False, text=False),
-    Case("csv", "semicolon-comma", columns_with_units),
-    Case("example", "template", height_log, times=False),
+    Case("table", "semicolon-comma", columns_with_units),
+    Case("height-log", "package", height_log, times=False),
     Case("cassy", "labx", labx, None, text=False),
     Case("cassy", "lab", lab),
     Case("table", "names-alone", names_alone, options={"unit": "m"}),
     Case("table", "oscilloscope", oscilloscope),
     Case("table", "preamble", preamble),
     Case("table", "clock", clock),
-    Case("bare", "blanks", bare, options={"unit": "cm"}),
-    Case("bare", "tabs", lambda t, x: bare(t, x, "\t"), options={"unit": "cm"}),
+    Case("table", "bare-blanks", bare, options={"unit": "cm"}),
+    Case("table", "bare-tabs", lambda t, x: bare(t, x, "\t"), options={"unit": "cm"}),
 ]
 
 
@@ -428,8 +429,8 @@ FAMILIES = (*formats(), EXAMPLE)
 
 
 def format_of(name: str) -> Format:
-    """Return a family by its name; the template is none of the registry's."""
-    return EXAMPLE if name == "example" else get_format(name)
+    """Return a family by its name; that of the package is none of the registry's."""
+    return EXAMPLE if name == "height-log" else get_format(name)
 
 
 def whole(case: Case) -> bytes:
@@ -656,8 +657,6 @@ def test_measured_times_stand_and_are_told_from_nominal_ones(case: Case) -> None
         "vernier",
         "logger-pro",
         "tracker",
-        "csv",
-        "bare",
         "table",
         "cassy",
         "capstone",

@@ -68,7 +68,7 @@ def test_xarray_opens_the_signal(path: Path, engine: Literal["h5netcdf", "netcdf
     if engine == "netcdf4":
         pytest.importorskip("netCDF4")
     with open_run(path) as run:
-        own = run.load_dataset()
+        own = run.dataset()
     with xr.open_dataset(path, group="entry/signal", engine=engine) as result:
         assert tuple(result.sizes) == ("time",)
         assert result.time.dtype == np.float64
@@ -85,7 +85,7 @@ def test_xarray_opens_the_signal(path: Path, engine: Literal["h5netcdf", "netcdf
 def test_xarray_opens_the_file_without_being_told_a_group(path: Path, engine: Literal["h5netcdf", "netcdf4"]) -> None:
     """Time, distance, flags and what else the file has stand at the root, whichever engine xarray chooses."""
     with open_run(path) as run:
-        own = run.load_dataset()
+        own = run.dataset()
     with xr.open_dataset(path, engine=engine) as result:
         xr.testing.assert_equal(result, own)
         assert {"distance", "quality"} <= set(result)
@@ -96,13 +96,13 @@ def test_xarray_opens_the_file_without_being_told_a_group(path: Path, engine: Li
 def test_a_file_without_names_at_the_root_opens(path: Path) -> None:
     """As files from before there were any: it verifies, and its samples are the same."""
     with open_run(path) as run:
-        own = run.load_dataset()
+        own = run.dataset()
     with h5py.File(path, "r+") as file:
         for name in set(file) - {"entry", "raw", "wire"}:
             del file[name]
     with open_run(path) as run:
         run.verify()
-        xr.testing.assert_identical(run.load_dataset(), own)
+        xr.testing.assert_identical(run.dataset(), own)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

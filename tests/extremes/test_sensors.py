@@ -15,6 +15,7 @@ from acquisition.block import Flag
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import SensorError
 from acquisition.live.decoding import SensorChain
+from tests.encoders import ENCODERS
 
 LAST = 2**32 - 1
 STAMP = 2**63 - 1
@@ -58,7 +59,7 @@ WIRES: dict[str, tuple[str, dict[str, Any], bytes]] = {
         family.name,
         {},
         b"".join(
-            family.encoder().encode(
+            ENCODERS[family.name]().encode(
                 sequence=i, device_us=i * 10_000, echo_us=1000.0, distance_m=distance, temperature_c=20.0
             )
             for i, distance in enumerate((0.3, float("nan"), 0.0, 1e-9, 5.0, 9.0) * 30)

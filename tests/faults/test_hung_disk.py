@@ -26,10 +26,11 @@ from acquisition.readings import Read
 from springmass.cli import main
 from storage.recorder import QUEUE_BYTES, Recorder
 from storage.run_file.reading import open_run
-from storage.wire_log.appending import LogFile, open_log_file
+from storage.wire_log.log_file import LogFile, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.sampling import sampled
+from tests.wire import json_of
 
 TRIALS = 50 if os.environ.get("SPRINGMASS_TRIALS") else 12
 SECOND_NS = 1_000_000_000
@@ -137,19 +138,19 @@ def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_
     records = list(read_log(tmp_path / "run.wire"))
     dropped = sum(demand_complete(put[channel], records, channel) for channel in put)
     assert dropped == status.dropped_records == recorder.status.dropped_records
-    assert records[-1].json()["dropped_records"] == dropped
+    assert json_of(records[-1])["dropped_records"] == dropped
 
 
 def demand_complete(put: list[tuple[int, bytes]], records: list[Record], channel: int) -> int:
     """Demand every read of a channel, but those that its overflow event counts in its place; return their number."""
     of_channel = [record for record in records if record.channel == channel]
-    events = [record for record in of_channel if record.kind is Kind.EVENT and record.json()["kind"] == "overflow"]
+    events = [record for record in of_channel if record.kind is Kind.EVENT and json_of(record)["kind"] == "overflow"]
     recorded = [(record.mono_ns, record.payload) for record in of_channel if record.kind is Kind.DATA]
     if not events:
         assert recorded == put
         return 0
     (event,) = events
-    facts = event.json()["facts"]
+    facts = json_of(event)["facts"]
     first = next(i for i, (stamp_ns, _) in enumerate(put) if stamp_ns >= facts["first_ns"])
     lost = put[first : first + facts["records"]]
     assert (lost[0][0], lost[-1][0]) == (facts["first_ns"], event.mono_ns)

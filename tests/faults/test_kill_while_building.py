@@ -21,6 +21,7 @@ from storage.recovery.recover import recover
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from tests.wire import append
 
 TRIALS = max(10, int(os.environ.get("SPRINGMASS_KILLS", "12")) // 2)
 HEADER = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr"),), mono_ns=0, unix_ns=0, kind="simulated")
@@ -30,8 +31,8 @@ def log_of(path: Path, reads: int) -> None:
     """Write a log."""
     log = WireLogWriter(path, HEADER)
     for number in range(reads):
-        log.append(Kind.DATA, b"R%04d\r" % (1000 + number) * 5, mono_ns=number)
-    log.append(Kind.END, b"{}", mono_ns=reads)
+        append(log, Kind.DATA, b"R%04d\r" % (1000 + number) * 5, mono_ns=number)
+    append(log, Kind.END, b"{}", mono_ns=reads)
     log.close()
 
 

@@ -17,6 +17,7 @@ from springmass.cli import main
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from tests.wire import append
 
 KILLS = int(os.environ.get("SPRINGMASS_KILLS", "0"))
 PAGE = 4096
@@ -75,7 +76,7 @@ def recording(seed: int, log: int) -> tuple[Disk, Sent]:
     while at < len(stream):
         read += 1
         size = int(rng.integers(1, 60))
-        writer.append(Kind.DATA, stream[at : at + size], mono_ns=read * STEP_NS)
+        append(writer, Kind.DATA, stream[at : at + size], mono_ns=read * STEP_NS)
         at = min(at + size, len(stream))
         sent.by_time[read * STEP_NS] = values[done : at // 6]
         sent.ends += [(len(disk.data), value) for value in values[done : at // 6]]

@@ -9,6 +9,7 @@ import contextlib
 import json
 import os
 import pty
+import re
 import socket
 import subprocess
 import threading
@@ -113,7 +114,7 @@ def foreign(port: Path) -> Iterator[None]:
 @pytest.mark.trials
 @pytest.mark.parametrize("who", ["the sensor", "another one"])
 def test_what_comes_back_on_the_port_changes_no_reading_before(bench: Any, tmp_path: Path, who: str) -> None:
-    """The run file opens with the readings up to the loss, without a gap, and bytes of another form make none."""
+    """The run file has the readings up to the loss, without a gap; what came afterwards is another part of the log."""
     out = tmp_path / "run.h5"
     with bench.feeder() as feeder:
         recording = bench.record(feeder.port, out, "--seconds", "4")
@@ -125,11 +126,17 @@ def test_what_comes_back_on_the_port_changes_no_reading_before(bench: Any, tmp_p
     back = [*(np.flatnonzero(np.diff(numbers) < 0) + 1), len(numbers)][0]
     bench.demand_whole(numbers[:back].tolist())
     assert back > 30
+    assert back == len(numbers)
+    with open_run(out) as run:
+        (log,) = run.originals()
     if who == "the sensor":
         assert code == 0
-        bench.demand_whole(numbers[back:].tolist() or [0])
+        recorded = np.array([int(number) for number in re.findall(rb"\$R1,([0-9]+),[^*\n]*\*[0-9A-F]{4}\n", log.data)])
+        assert (np.diff(recorded) < 0).sum() == 1
+        assert len(recorded) > len(numbers) + 30
     else:
-        assert back == len(numbers)
+        assert code == 4
+        assert b"R0431\r" in log.data
 
 
 @pytest.mark.trials
@@ -161,14 +168,14 @@ def test_a_connection_that_says_nothing_any_more_is_a_sensor_gone(bench: Any, tm
 
 
 @pytest.fixture
-def terminals() -> Iterator[Callable[[], str]]:
-    """Return a function that makes a port."""
+def terminals() -> Iterator[Callable[[], tuple[str, int]]]:
+    """Return a function that makes a port, and a descriptor that writes to it."""
     open_: list[int] = []
 
-    def make() -> str:
+    def make() -> tuple[str, int]:
         master, slave = pty.openpty()
         open_.extend((master, slave))
-        return os.ttyname(slave)
+        return os.ttyname(slave), master
 
     yield make
     for descriptor in open_:
@@ -176,24 +183,37 @@ def terminals() -> Iterator[Callable[[], str]]:
 
 
 def test_an_adapter_is_known_by_its_serial_number(
-    monkeypatch: pytest.MonkeyPatch, terminals: Callable[[], str]
+    monkeypatch: pytest.MonkeyPatch, terminals: Callable[[], tuple[str, int]]
 ) -> None:
-    """Another on its name is refused; itself is found under whatever name it came back."""
+    """It is found under whatever name it came back; another on its name is opened only where it stays."""
     plugged: list[SimpleNamespace] = []
 
     def plug(name: str, number: str) -> None:
         plugged[:] = [SimpleNamespace(device=name, description="", vid=0x0403, pid=0x6001, serial_number=number)]
 
     monkeypatch.setattr(list_ports, "comports", lambda: list(plugged))
-    first, second = terminals(), terminals()
+    (first, _), (second, sender) = terminals(), terminals()
     plug(first, "A1")
     port = SerialPort(first, 9600)
     plug(first, "B2")
     with pytest.raises(PortError, match="serial number A1"):
         port.reopen()
     plug(second, "A1")
-    port.reopen()
-    assert os.ttyname(port.fileno()) == second
+    assert port.reopen() == "identified"
+    os.write(sender, b"at its new name\n")
+    assert port.read(5.0) == b"at its new name\n"
+    plug(first, "B2")
+    for _ in range(9):
+        with pytest.raises(PortError):
+            port.reopen()
+    assert port.reopen() == "another"
+    assert port.reopen() == "identified"  # it is expected from now on
+    plug(first, "")
+    with pytest.raises(PortError):
+        port.reopen()
+    plugged.clear()
+    with pytest.raises(PortError):
+        port.reopen()
     port.close()
 
 

@@ -4,50 +4,44 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
 from springmass.extend import (
-    Channel,
-    ColumnFormat,
-    Contents,
     Equation,
     Family,
-    FormatError,
     Formula,
     FramedDecoder,
+    Header,
+    Heading,
     LineSplitter,
     OneStep,
     Reading,
-    Sheet,
     acceleration,
-    head_lines,
     make_law,
-    text_of,
+    text_format,
 )
 
-TITLE = re.compile(r"Height log, (\d+) Hz")
+TITLE = re.compile(r"Height log, (\d*[1-9]\d*) Hz")
 
 
-def evidence(head: bytes) -> str:
-    """Say why a file is a height log."""
-    first = head_lines(head)[0]
-    return "line 1 is the title of a height log" if TITLE.fullmatch(first) else ""
+def header(lines: Sequence[str]) -> Header | None:
+    """Say what the title of a height log means."""
+    title = TITLE.fullmatch(lines[0])
+    if title is None:
+        return None
+    return Header(
+        why=f'line 1 is the title "{lines[0]}"',
+        lines=1,
+        delimiter=";",
+        headings=[Heading("n", role="ignored"), Heading("height", "mm")],
+        formula=Formula(start_s=0.0, step_s=1 / float(title[1])),
+        title=lines[0],
+    )
 
 
-def contents(path: str, data: bytes) -> Contents:
-    """Say where a height log keeps its one channel."""
-    text = text_of(path, data)
-    first = next(text.lines(), None)
-    found = TITLE.fullmatch(first.text) if first else None
-    if first is None or found is None:
-        raise FormatError(path, "expected the title of a height log", "export the run again", line=1)
-    rows = Sheet(text, start=first.next, stop=text.stop, first_line=2, delimiter=";")
-    height = Channel("height", "mm", rows, column=1, formula=Formula(start_s=0.0, step_s=1 / float(found[1])))
-    return Contents((height,), title=first.text, zeros=text.zeros)
-
-
-HEIGHT_LOG = ColumnFormat("height-log", "height log: number;millimetres", evidence, contents)
+HEIGHT_LOG = text_format("height-log", "height log: number;millimetres", header)
 
 
 class MillimetreDecoder(FramedDecoder):

@@ -15,6 +15,7 @@ from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from acquisition.readings import Read
 from springmass.session.reads import Tee
+from tests.encoders import ENCODERS
 
 SENSORS = 7
 STEP_US, STEP_NS = 10_000, 10_000_000
@@ -130,7 +131,7 @@ def test_sensors_of_other_families_go_through_their_own_decoders() -> None:
     """Lines of text between those of the line protocol, neither disturbed by the other."""
 
     other = get_family("maxbotix-hr")
-    encoder = other.encoder()
+    encoder = ENCODERS["maxbotix-hr"]()
 
     def mixed() -> list[SensorChain]:
         return [SensorChain(family, rate_hz=100.0) for family in (get_family("line-protocol"), other) * 3]

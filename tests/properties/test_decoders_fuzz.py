@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.readings import Reading
+from tests.encoders import ENCODERS
 from tests.hunt import hunt
 
 FAMILIES = {family.name: family for family in families()}
@@ -95,7 +96,7 @@ ORACLES: dict[str, Callable[[bytes], set[float]]] = {
 def own_stream(family: Family, seed: int, n: int = 12) -> list[bytes]:
     """Return frames as the simulated sensor sends them."""
     rng = random.Random(seed)
-    encoder = family.encoder()
+    encoder = ENCODERS[family.name]()
     frames = []
     for i in range(n):
         distance = math.nan if rng.random() < 0.2 else rng.uniform(0.3, 1.6)

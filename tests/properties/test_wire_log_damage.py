@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry, frame
-from storage.wire_log.scanning import LogContents, parse_log
+from storage.wire_log.scanning import LogContents
 from tests.sampling import sampled
+from tests.wire import parse_log
 
 LOG = 0x5EED
 PAGE = 4096

@@ -64,7 +64,7 @@ TABLE = [
         *("csvnames", "table", "y", 1000, 999, (0, 1), (0.012244149389694231, -0.0069972303705410615)),
         *("length", (UNIT,), say(unit="m")),
     ),
-    Row("datcsv", "csv", "Channel 1", 1000, 1000, (0, 0.999), (1.909113020050780538, 0.8965729794617469), "voltage"),
+    Row("datcsv", "table", "Channel 1", 1000, 1000, (0, 0.999), (1.909113020050780538, 0.8965729794617469), "voltage"),
     Row(
         *("ecp", "table", "Encoder 1 Pos", 677, 112.95, (0, 5.985), (0, -0.002)),
         *("length", (CHANNEL, UNIT), say("Encoder 1 Pos", "mm")),
@@ -80,7 +80,7 @@ TABLE = [
         *("voltage", (CHANNEL, RATE), say("Measurement (Gleichspannung)", rate_hz=100.0)),
     ),
     Row(
-        *("lvm__spikelucky__test2", "bare", "column 2", 718, 100, (0, 7.17), (4.482024, -0.003006)),
+        *("lvm__spikelucky__test2", "table", "column 2", 718, 100, (0, 7.17), (4.482024, -0.003006)),
         *("voltage", (CHANNEL, RATE, UNIT), say("column 2", "V", rate_hz=100.0)),
     ),
     Row(
@@ -88,11 +88,11 @@ TABLE = [
         *("voltage", (CHANNEL, RATE), say("Lead", rate_hz=100.0)),
     ),
     Row(
-        *("microbit__ES2Spring2019-ComputinginEngineering__L13", "bare", "column 1", 501, 49, (0.019, 10.205)),
+        *("microbit__ES2Spring2019-ComputinginEngineering__L13", "table", "column 1", 501, 49, (0.019, 10.205)),
         *((1344, 1104), "acceleration", (CHANNEL, TIME_UNIT, UNIT), say("column 1", "m/s2", time_unit="ms")),
     ),
     Row(
-        *("microbit__ES2Spring2019-ComputinginEngineering__data", "bare", "column 2", 415, 42.5, (0.01, 9.81)),
+        *("microbit__ES2Spring2019-ComputinginEngineering__data", "table", "column 2", 415, 42.5, (0.01, 9.81)),
         *((-2040, -1532), "acceleration", (CHANNEL, TIME_UNIT, UNIT), say("column 2", "m/s2", time_unit="ms")),
     ),
     Row(
@@ -134,7 +134,7 @@ TABLE = [
     ),
     Row("scope", "table", "1", 2000, 40000, (-0.025, 0.024975), (9724.24598694, 9724.24598694), "voltage"),
     Row(
-        *("tdisp", "bare", "column 2", 10142, 13.2, (1.6270253658294678, 767.7529900074005), (0.105, 0.1515)),
+        *("tdisp", "table", "column 2", 10142, 13.2, (1.6270253658294678, 767.7529900074005), (0.105, 0.1515)),
         *("length", (UNIT,), say(unit="cm")),
     ),
     Row("terr", "table", "θ", 9625, 30, (0, 319.91), (-0.156, 0.001), "angle", (UNIT,), say(unit="rad")),
@@ -152,7 +152,7 @@ TABLE = [
         *("angle", (UNIT,), say(unit="deg")),
     ),
     Row("tunit", "table", "θ", 3027, 30, (0, 100.8667), (-18.56635 * DEG, -0.8148416 * DEG), "angle"),
-    Row("vernier", "csv", "versnelling", 600, 99.83, (0, 6), (0, 0), "acceleration"),
+    Row("vernier", "table", "versnelling", 600, 99.83, (0, 6), (0, 0), "acceleration"),
     Row("waveforms", "table", "Channel 1", 2000, 100, (0, 19.99), (2.622803, 1.641071), "voltage"),
     Row("lab__", "cassy", "s s", 600, 10, (0, 59.901), (0, 0)),
     Row(

@@ -1,14 +1,11 @@
 """The firmware of the rangefinder, included in this package and built from firmware/springmass_rangefinder.
 
-The module provides the path and version of the hex file, and a text that shows the wiring. ``make firmware`` builds the
-hex file, and a test compares the result byte for byte with the file in this folder.
+``make firmware`` builds the hex file, and a test compares the result byte for byte with the file in this folder.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-
-__all__ = ["BAUDS", "HEX", "MODEL", "VERSION", "WIRING", "avrdude_arguments"]
 
 MODEL = "springmass-rangefinder"
 VERSION = "2.0.0"

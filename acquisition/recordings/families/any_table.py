@@ -1,100 +1,120 @@
-"""Any table: rows of numbers below any headings, from programs without a separate family.
+"""Any table: rows of numbers, with or without headings, from programs without a separate family.
 
-This family is tried last. :func:`acquisition.recordings.tables.table_layout.find_table` finds the table; this module
-decides which of its columns are times. What is easy to get wrong:
+This family is tried last. :func:`acquisition.recordings.tables.layout.find_table` finds the table; this module decides
+which of its columns are times. What is easy to get wrong:
 
 - A rising column is read as the times if its name denotes time, in one of a dozen languages. Otherwise a column with a
   neutral name may be the times because of its even steps, or because no other column rises. Row numbers and periods
   are not times.
 - Clock times (``10:04:59.812``) are converted to seconds since the first one; midnight may lie between them.
 - Oscilloscopes write ``Start`` and ``Increment`` above a column of row numbers.
+- A serial monitor writes the time of day in front of each line.
 """
 
 from __future__ import annotations
 
+import re
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
-from acquisition.errors import FormatError
-from acquisition.recordings.foreign import foreign_format
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.tables.contents import Channel, Contents, Formula, Heading, Sheet, numbered_apart
-from acquisition.recordings.tables.prefixed import without_prefix
-from acquisition.recordings.tables.roles import columns_of, is_aside, times_by_name, times_by_steps
-from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.table_layout import TableLayout, clock_s, find_table
-from acquisition.recordings.tables.text import Text, decode, is_text, parse_number, text_of
+from acquisition.recordings.tables.cells import clock_s, parse_number
+from acquisition.recordings.tables.dialect import Header, text_format
+from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading
+from acquisition.recordings.tables.layout import (
+    Layout,
+    are_row_numbers,
+    columns_of,
+    find_table,
+    is_aside,
+    times_by_name,
+    times_by_steps,
+)
+from acquisition.recordings.tables.table import Formula
+from acquisition.recordings.tables.text import Text, decode
 from acquisition.recordings.units import measure_of, time_power
 
-__all__ = ["FORMAT"]
+_MONITOR = re.compile(
+    r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",
+    re.MULTILINE,
+)
+_FEWEST, _SHARE = 3, 0.8
 
-_HEAD_LINES = 300
-_DAY_S = 86400.0
-_BLANKS = bytes.maketrans(b"[];", b"   ")
 
-
-def _evidence(head: bytes) -> str:
-    if not is_text(head) or head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<"):
-        return ""
-    if foreign_format("", head) is not None:
-        return ""  # the error message will name the kind of file
-    _, table = _find(Text.of(head))
+def header(lines: Sequence[str]) -> Header | None:
+    """Find the rows of numbers, and decide which columns are times."""
+    if "".join(lines).lstrip("\ufeff \r\n\t").startswith(("<", "%PDF")):
+        return None
+    if (headed := _headed(lines)) is not None:
+        return headed
+    table = find_table(tuple(lines))
     if table is None:
-        return ""
+        return None
     names = ", ".join(f'"{each.name}"' for each in table.headings if each.name)
-    return f"numbers begin in line {table.line.number}, below {names or 'no names'}"
-
-
-def _contents(path: str, data: bytes) -> Contents:
-    text, table = _find(text_of(path, data))
-    if table is None:
-        raise FormatError(path, "expected rows of numbers, three or more alike", "check that the export ended")
-    columns = columns_of(table.rows)
+    why = f"numbers begin in line {table.at + 1}, below {names or 'no names'}"
+    # The last row may be incomplete.
+    columns = columns_of(table.rows[:-1] if len(table.rows) > _FEWEST else table.rows)
     headings, words = _units_beside(table)
     times, formula = times_by_name(headings, columns), _formula(table)
     traps = list(_preamble(table))
-    clocks = [column for column, cell in enumerate(table.rows[0]) if clock_s(cell) and parse_number(cell) is None]
-    if table.brackets:
-        rows = text.data[table.line.start : text.stop].translate(_BLANKS)
-        text = replace(text, data=text.data[: table.line.start] + rows + text.data[text.stop :])
+    clocks = [at for at, cell in enumerate(table.rows[0]) if clock_s(cell) and parse_number(cell) is None]
+    clock = None
     if not times and formula is None and clocks:
-        text, first = _without_clock(text, table, clocks[0])
-        headings[clocks[0]] = replace(headings[clocks[0]], unit="s")
-        times = clocks[:1]
-        traps.append(Trap("clock_times", f"the file gives times of day; here time 0 is {first}"))
-    if not times and formula is None and (guess := times_by_steps(headings, columns)) is not None:
-        times = [guess]
-        message = f'"{_name(headings[guess], guess)}" was read as the times, because no other column rises like it'
-        traps.append(Trap("time_assumed", message))
-    names = numbered_apart([_name(each, column) for column, each in enumerate(headings)])
-    sheet = Sheet(text, table.line.start, text.stop, table.line.number, table.mark, names=tuple(names))
-    channels = []
-    for column, each in enumerate(headings):
-        if column in times or column in clocks or column in words or (formula is not None and column == 0):
-            continue
-        aside = is_aside(each, columns[column], bool(times) or len(columns) > 1)
-        time = max((at for at in times if at < column), default=times[0] if times else None)
-        channels.append(
-            Channel(
-                names[column],
-                each.unit,
-                sheet,
-                column=column,
-                time=time,
-                time_unit="" if time is None else headings[time].unit,
-                formula=formula,
-                ragged=True,
-                aside=aside,
-            )
-        )
-    if not channels:
-        raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
-    if all(each.aside for each in channels):
-        channels = [replace(each, aside=False) for each in channels]
-    title = table.preamble[0] if table.preamble else ""
-    return Contents(tuple(channels), title=title, traps=tuple(traps), zeros=text.zeros)
+        clock = clocks[0]
+        headings[clock] = replace(headings[clock], unit="s")
+        times = [clock]
+        traps.append(Trap("clock_times", f"the file gives times of day; here time 0 is {table.rows[0][clock]}"))
+    bare = not table.named and table.at == 0 and all(parse_number(cell) is not None for cell in table.rows[0])
+    # A single column besides row numbers contains measured values, even if it rises.
+    numbered = bare and len(columns) > 1 and are_row_numbers(columns[0])
+    if not times and formula is None and not (bare and len(columns) <= 1 + numbered):
+        guess = times_by_steps(headings, columns)
+        if guess is not None:
+            times = [guess]
+            if guess or not bare:
+                name = headings[guess].name or f"column {guess + 1}"
+                message = f'"{name}" was read as the times, because no other column rises like it'
+                traps.append(Trap("time_assumed", message))
+    ignored = {*words, *clocks} | ({0} if formula is not None or numbered else set())
+    values = [at for at in range(len(headings)) if at not in ignored and at not in times]
+    asides = {at for at in values if is_aside(headings[at], columns[at], bool(times) or len(columns) > 1)}
+    if bare or asides.issuperset(values):
+        asides = set()
+
+    def marked(at: int, heading: Heading) -> Heading:
+        if at in times:
+            return replace(heading, role="time")
+        return replace(heading, role="ignored" if at in ignored else "aside" if at in asides else "channel")
+
+    return Header(
+        why,
+        table.at,
+        table.mark,
+        [marked(at, each) for at, each in enumerate(headings)],
+        formula,
+        title=table.preamble[0] if table.preamble else "",
+        ragged=len(values) > 1,
+        traps=tuple(traps),
+        clock=clock,
+        brackets=table.brackets,
+    )
 
 
-def _units_beside(table: TableLayout) -> tuple[list[Heading], set[int]]:
+def _headed(lines: Sequence[str]) -> Header | None:
+    """Read headings with units in line 1, times first: these need no rows to be certain."""
+    cells, mark = split_heading(lines[0])
+    headings = [Heading(*name_and_unit(cell)) for cell in cells]
+    if len(headings) < 2 or not is_time(headings[0].name) or not all(each.unit for each in headings):
+        return None
+    cell = lines[1].split(mark)[0].strip(' "') if len(lines) > 1 else ""
+    if cell and parse_number(cell) is None:
+        return None
+    why = f'line 1 is headings with units that begin with "{headings[0].name} ({headings[0].unit})"'
+    return Header(why, 1, mark, headings)
+
+
+def _units_beside(table: Layout) -> tuple[list[Heading], set[int]]:
     """Return the headings, with units taken from columns of units to the right of the numbers, and these columns."""
     headings, words = list(table.headings), set()
     for column, cells in enumerate(zip(*table.rows, strict=True)):
@@ -105,21 +125,7 @@ def _units_beside(table: TableLayout) -> tuple[list[Heading], set[int]]:
     return headings, words
 
 
-def _find(text: Text) -> tuple[Text, TableLayout | None]:
-    """Remove prefixes of rows from a text, and find the table in it."""
-    text, headings = without_prefix(text) or (text, ())
-    table = find_table(text.head(_HEAD_LINES))
-    if table is not None and len(headings) == len(table.headings):
-        both = zip(headings, table.headings, strict=True)
-        table = replace(table, headings=tuple(Heading(a.name or b.name, a.unit or b.unit) for a, b in both))
-    return text, table
-
-
-def _name(heading: Heading, column: int) -> str:
-    return heading.name or f"column {column + 1}"
-
-
-def _preamble(table: TableLayout) -> tuple[Trap, ...]:
+def _preamble(table: Layout) -> tuple[Trap, ...]:
     if not table.preamble:
         return ()
     count = len(table.preamble)
@@ -128,35 +134,31 @@ def _preamble(table: TableLayout) -> tuple[Trap, ...]:
     return (Trap("preamble", message, count),)
 
 
-def _formula(table: TableLayout) -> Formula | None:
+def _formula(table: Layout) -> Formula | None:
     """Return the times that an oscilloscope states by a start and an increment after the names; else None."""
     settings = {name.lower(): parse_number(value) for name, value in table.spare}
     start, step = settings.get("start"), settings.get("increment")
     return None if start is None or not step or not step > 0 else Formula(start, step)
 
 
-def _without_clock(text: Text, table: TableLayout, column: int) -> tuple[Text, str]:
-    """Replace a column of clock times by seconds since the first clock time; return the text and the first time."""
-    mark = table.mark.encode() or None
-    lines: list[bytes] = []
-    first, last, days, shown = None, 0.0, 0, ""
-    for raw in text.data[table.line.start : text.stop].splitlines(keepends=True):
-        body = raw.rstrip(b"\r\n")
-        cells = body.split(mark)
-        cell = decode(cells[column]).strip().strip('"') if column < len(cells) else ""
-        clock = clock_s(cell)
-        if clock is not None:
-            _, at, decimals = clock
-            if first is None:
-                first, last, shown = at, at, cell
-            days += at < last - _DAY_S / 2
-            last = at
-            cells[column] = f"{at - first + days * _DAY_S:.{decimals}f}".encode()
-            body = (mark or b" ").join(cells)
-        lines.append(body + raw[len(raw.rstrip(b"\r\n")) :])
-    rows = b"".join(lines)
-    start = table.line.start
-    return replace(text, data=text.data[:start] + rows + text.data[text.stop :], stop=start + len(rows)), shown
+def without_monitor(text: Text) -> Text:
+    """Return a text in which the clock times that a serial monitor writes before each line are the first column."""
+    if not _MONITOR.search(decode(text.data[text.start : min(text.start + (1 << 16), text.stop)])):
+        return text
+    lines = decode(text.data[text.start : text.stop]).replace("\r\n", "\n").replace("\r", "\n")
+    found = len(_MONITOR.findall(lines))
+    if found < max(_FEWEST, _SHARE * len(re.findall(r"^.*\S", lines, re.MULTILINE))):
+        return text
+    messages = [line for line in _MONITOR.sub("", lines[: 1 << 16]).split("\n") if line.strip()]
+    marks = Counter(next((mark for mark in "\t;," if mark in line), " ") for line in messages)
+    mark = marks.most_common(1)[0][0] if marks else " "
+    return Text.of(_MONITOR.sub(rf"\1{mark}", lines).encode())
 
 
-FORMAT = ColumnFormat("table", "any other table: columns of numbers below their names", _evidence, _contents)
+FORMAT = text_format(
+    "table",
+    "any other table: columns of numbers, with or without names",
+    header,
+    expected="rows of numbers, three or more alike",
+    prepare=without_monitor,
+)

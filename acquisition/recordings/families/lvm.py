@@ -18,14 +18,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from acquisition.errors import FormatError
-from acquisition.recordings.tables.contents import Channel, Contents, Formula, Sheet, name_and_unit, numbered_apart
-from acquisition.recordings.tables.sheet import ColumnFormat
-from acquisition.recordings.tables.text import Line, Text, decode, is_text, parse_number, text_of
-
-__all__ = ["FORMAT"]
+from acquisition.recordings.tables.cells import parse_number
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.headings import name_and_unit
+from acquisition.recordings.tables.rows import read_rows
+from acquisition.recordings.tables.table import Column, Formula, Table
+from acquisition.recordings.tables.text import Line, Text, decode, is_text, text_of
 
 _MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
@@ -36,10 +39,9 @@ _MOST_SEGMENTS = 10_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Header:
-    """The keys of a header with their cells, its first line, and the start of the line after it."""
+    """The keys of a header with their cells, and the start and number of the line after it."""
 
     cells: Mapping[str, list[str]]
-    first: Line
     next_start: int
     next_line: int
 
@@ -59,45 +61,36 @@ def _evidence(head: bytes) -> str:
     return ""
 
 
-def _contents(path: str, data: bytes) -> Contents:
+def _tables(path: str, data: bytes) -> list[Table]:
     text = text_of(path, data)
-    mark = _separator(path, text)
+    lines = text.head(_MOST_HEADER_LINES)
+    if not lines or not lines[0].text.lstrip().startswith(_MAGIC):
+        raise FormatError(path, f'expected "{_MAGIC}" in the first line', "check that this is an LVM file", line=1)
+    tag = re.compile(rf"\s*{_SEPARATOR}([^\w])")
+    # The separator is the character after its tag, or else after the opening words of line 1.
+    mark = next(
+        (match[1] for line in lines if (match := tag.match(line.text))), lines[0].text.lstrip()[len(_MAGIC) :][:1]
+    )
+    mark = mark or "\t"
     top = _header(path, text, text.start, 1, mark)
-    channels: list[Channel] = []
     segments = list(_segments(path, text, top, mark))
+    tables: list[Table] = []
     for number, (segment, stop) in enumerate(segments, 1):
         run = f"Segment {number}" if len(segments) > 1 else ""
-        channels.extend(_channels(text, top, segment, stop, mark, run))
-    if not channels:
+        tables.extend(_of_segment(path, text, top, segment, stop, mark, run))
+    if not tables:
         raise FormatError(path, "expected channels below the header, got none", "export the run again")
-    return Contents(tuple(channels), title=_title(top, segments[0][0]), zeros=text.zeros)
-
-
-def _separator(path: str, text: Text) -> str:
-    """Return the separator: the character after the tag ``Separator``, or else after the opening words of line 1."""
-    first = next(text.lines(), None)
-    if first is None or not first.text.lstrip().startswith(_MAGIC):
-        problem = f'expected "{_MAGIC}" in the first line'
-        raise FormatError(path, problem, "check that this is an LVM file", line=1)
-    for line in text.lines():
-        tag = line.text.lstrip()
-        mark = tag.removeprefix(_SEPARATOR)[:1]
-        if tag.startswith(_SEPARATOR) and mark and not (mark.isalnum() or mark == "_"):
-            return mark
-        if line.text.startswith(_END) or line.number > _MOST_HEADER_LINES:
-            break
-    return first.text.lstrip()[len(_MAGIC) :][:1] or "\t"
+    title = segments[0][0].first_of("Notes") or top.first_of("Description")
+    return [replace(each, title=title) for each in tables]
 
 
 def _header(path: str, text: Text, start: int, number: int, mark: str) -> _Header:
     """Read the lines of a header up to its end mark."""
     cells: dict[str, list[str]] = {}
-    first = None
     for count, line in enumerate(text.lines(start, number)):
-        first = first or line
         key, *values = [cell.strip() for cell in line.text.split(mark)]
         if key == _END:
-            return _Header(cells, first, line.next, line.number + 1)
+            return _Header(cells, line.next, line.number + 1)
         if key:
             cells.setdefault(key, values)
         if count == _MOST_HEADER_LINES:
@@ -117,30 +110,16 @@ def _segments(path: str, text: Text, top: _Header, mark: str) -> Iterator[tuple[
         if end < 0:
             yield header, text.stop
             return
-        start = _begin_of_header(text, header.next_start, end)
-        number = header.next_line + _line_ends(text.data, header.next_start, start)
+        start = text.words_above(header.next_start, text.data.rfind(b"\n", header.next_start, end) + 1 or end)
+        number = header.next_line + text.line_ends(header.next_start, start)
         yield header, start
     raise FormatError(path, f"expected at most {_MOST_SEGMENTS} segments", "split the file")
 
 
-def _begin_of_header(text: Text, low: int, end: int) -> int:
-    """Return where a header begins: walk back from its end over empty lines and lines that begin with a word."""
-    at = text.data.rfind(b"\n", low, end) + 1 or low
-    while at > low:
-        previous = max(text.data.rfind(b"\n", low, at - 1) + 1, low)
-        line = text.data[previous:at].strip()
-        if (line and not re.match(rb"[A-Za-z*]", line)) or previous == at:
-            break
-        at = previous
-    return at
-
-
-def _line_ends(data: bytes, start: int, stop: int) -> int:
-    return data.count(b"\n", start, stop) or data.count(b"\r", start, stop)
-
-
-def _channels(text: Text, top: _Header, segment: _Header, stop: int, mark: str, run: str) -> Iterator[Channel]:
-    """Yield the channels that are listed in a segment's line of names."""
+def _of_segment(
+    path: str, text: Text, top: _Header, segment: _Header, stop: int, mark: str, run: str
+) -> Iterator[Table]:
+    """Yield a table for each channel in a segment's line of names; its header may state times of each channel."""
     names = next(iter(text.lines(segment.next_start, segment.next_line)), None)
     if names is None or names.start >= stop:
         return
@@ -149,26 +128,26 @@ def _channels(text: Text, top: _Header, segment: _Header, stop: int, mark: str, 
         cells.pop()
     if cells and cells[-1] == "Comment":
         cells.pop()
+    first = Line(names.number + 1, names.next, names.next, "")
+    read, lines, traps = read_rows(path, text, first, mark, stop=stop)
+    read += [Column("", "", np.empty(0), np.empty(0, np.int8))] * (len(cells) - len(read))
+    beside = tuple(replace(column, name=name) for name, column in zip(cells, read, strict=False))
     mode = (top.first_of("X_Columns") or "One").lower()
-    columns = range(1, len(cells), 2) if mode == "multi" else range(1, len(cells))
-    sheet = Sheet(text, names.next, stop, names.number + 1, mark, names=tuple(cells))
-    labels = [_name_and_unit(cells[column], segment.of_column("Y_Unit_Label", column), column) for column in columns]
-    apart = numbered_apart([name for name, _ in labels])
-    for name, (_, unit), column in zip(apart, labels, columns, strict=True):
-        dimension = segment.of_column("X_Dimension", column) or segment.first_of("X_Dimension") or "Time"
-        time = None if mode == "no" else column - 1 if mode == "multi" else 0
-        yield Channel(
-            name=name,
-            unit=unit,
-            source=sheet,
+    for at in range(1, len(cells), 2 if mode == "multi" else 1):
+        name, unit = _name_and_unit(cells[at], segment.of_column("Y_Unit_Label", at), at)
+        timed = (segment.of_column("X_Dimension", at) or segment.first_of("X_Dimension") or "Time") == "Time"
+        time = None if mode == "no" or not timed else beside[at - 1 if mode == "multi" else 0]
+        aside = segment.of_column("Samples", at) == "0"
+        yield Table(
+            (replace(beside[at], name=name, unit=unit, aside=aside),),
+            times=None if time is None else replace(time, unit="s"),
+            formula=_formula(segment, at) if timed else None,
             run=run,
-            column=column,
-            time=time if dimension == "Time" else None,
-            time_unit="s",
-            formula=_formula(segment, column) if dimension == "Time" else None,
-            start_time=_start_time(segment, column),
+            start_time=_start_time(segment, at),
             ragged=True,
-            aside=segment.of_column("Samples", column) == "0",
+            traps=traps,
+            lines=lines,
+            beside=beside,
         )
 
 
@@ -202,10 +181,6 @@ def _start_time(segment: _Header, column: int) -> str:
     return f"{start}T{clock[1]}.{clock[2]}" if clock[2] else f"{start}T{clock[1]}"
 
 
-def _title(top: _Header, segment: _Header) -> str:
-    return segment.first_of("Notes") or top.first_of("Description")
-
-
 FORMAT = ColumnFormat(
-    "lvm", "LVM: LabVIEW Measurement text, any separator, every kind of X_Columns", _evidence, _contents
+    "lvm", "LVM: LabVIEW Measurement text, any separator, every kind of X_Columns", _evidence, _tables
 )

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from acquisition.errors import FormatError
-from acquisition.recordings.tables.contents import Arrays, Channel, Contents, Formula, is_time
-from acquisition.recordings.tables.sheet import ColumnFormat
-
-__all__ = ["FORMAT"]
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.headings import is_time
+from acquisition.recordings.tables.table import Column, Formula, Table
 
 _MAGIC = b"TDSm"
 _UNITS = ("unit_string", "NI_UnitDescription", "wf_yunit_string", "Unit")
@@ -27,13 +27,13 @@ def _evidence(head: bytes) -> str:
     return 'it begins with the bytes "TDSm"' if head.startswith(_MAGIC) else ""
 
 
-def _contents(path: str, data: bytes) -> Contents:
+def _tables(path: str, data: bytes) -> list[Table]:
     from nptdms import TdmsFile
 
     try:
         with TdmsFile.open(io.BytesIO(data)) as file:
             groups = file.groups()
-            channels = [each for group in groups for each in _channels(path, group, len(groups) > 1, len(data))]
+            tables = [each for group in groups for each in _of_group(path, group, len(groups) > 1, len(data))]
             title = str(file.properties.get("Title") or file.properties.get("name") or "")
     except FormatError:
         raise
@@ -42,13 +42,13 @@ def _contents(path: str, data: bytes) -> Contents:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         problem = f"npTDMS cannot read it ({reason[:200]})"
         raise FormatError(path, problem, "check that it was copied whole; export it again") from error
-    if not channels:
+    if not tables:
         raise FormatError(path, "expected channels of numbers, got none", "check that the recording was saved")
-    return Contents(tuple(channels), title=title)
+    return [replace(each, title=title) for each in tables]
 
 
-def _channels(path: str, group: Any, several: bool, size: int) -> Iterator[Channel]:
-    numeric = []
+def _of_group(path: str, group: Any, several: bool, size: int) -> Iterator[Table]:
+    channels, columns = [], []
     for each in group.channels():
         kind = each.dtype
         if kind is None or kind.kind not in "fiu" or not len(each):
@@ -56,25 +56,22 @@ def _channels(path: str, group: Any, several: bool, size: int) -> Iterator[Chann
         if len(each) * kind.itemsize > size:
             problem = f'channel "{each.name}" states {len(each)} numbers, more than the file can hold'
             raise FormatError(path, problem, "check that it was copied whole")
-        numeric.append(each)
-    times = {id(each): each for each in numeric if is_time(each.name)}
-    own_time = next(iter(times.values()), None)
-    for each in numeric:
-        if id(each) in times and len(numeric) > 1:
+        unit = next((str(each.properties[key]) for key in _UNITS if each.properties.get(key)), "")
+        channels.append(each)
+        columns.append(Column(each.name, unit, np.asarray(each[:], np.float64)))
+    times = [column for column in columns if is_time(column.name)]
+    for each, column in zip(channels, columns, strict=True):
+        if column in times and len(columns) > 1:
             continue
-        values = np.asarray(each[:], np.float64)
-        step = each.properties.get("wf_increment")
-        time = None
-        if step is None and own_time is not None and len(own_time) == len(each) and own_time is not each:
-            time = np.asarray(own_time[:], np.float64)
-        yield Channel(
-            name=each.name,
-            unit=next((str(each.properties[key]) for key in _UNITS if each.properties.get(key)), ""),
-            source=Arrays(time, values, "" if own_time is None else own_time.name),
+        stated = "wf_increment" in each.properties
+        own_time = times[0] if times and times[0].values.size == column.values.size and column not in times else None
+        yield Table(
+            (column,),
+            times=None if stated or own_time is None else replace(own_time, unit="s"),
+            formula=_formula(each.properties) if stated else None,
             run=group.name if several else "",
-            formula=_formula(each.properties) if step is not None else None,
-            time_unit="s",
             start_time=_start_time(each.properties),
+            beside=tuple(columns),
         )
 
 
@@ -100,4 +97,4 @@ def _start_time(properties: Any) -> str:
     return f"{np.datetime_as_string(value, unit='us')}Z"
 
 
-FORMAT = ColumnFormat("tdms", "TDMS: National Instruments' binary waveforms (npTDMS)", _evidence, _contents)
+FORMAT = ColumnFormat("tdms", "TDMS: National Instruments' binary waveforms (npTDMS)", _evidence, _tables)

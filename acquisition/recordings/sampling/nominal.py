@@ -8,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import F8, I8, U8, Flag
-
-__all__ = ["Grid", "Rate", "find_rate", "median", "place_unread", "snap", "time_flags"]
+from acquisition.block import B1, F8, I8, U8, Flag
 
 _USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
 _SHARE_ON_GRID = 0.5
@@ -34,18 +32,11 @@ class Grid(NamedTuple):
 
 
 class Rate(NamedTuple):
-    """The rate of printed times.
+    """The rate of printed times, in samples per second.
 
-    Parameters
-    ----------
-    rate_hz : float
-        Samples per second, Hz.
-    relative_u : float
-        Relative half-width of the range of rates that are compatible with the rounding of the times.
-    grid : Grid or None
-        The grid from which the times were rounded; None if they fit no grid.
-    certain : bool
-        Whether no grid with a rate one hertz higher or lower fits equally well.
+    ``relative_u`` is the relative half-width of the range of rates that are compatible with the rounding of the times.
+    ``grid`` is the grid from which the times were rounded, or None if they fit no grid. The rate is ``certain`` if no
+    grid with a rate one hertz higher or lower fits equally well.
     """
 
     rate_hz: float
@@ -55,26 +46,9 @@ class Rate(NamedTuple):
 
 
 def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate | None:
-    """Infer the rate from printed times.
+    """Infer the rate from printed times (s) with a last digit of ``resolution``; None without two different times.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        Times as printed; some may repeat, run backward or be missing.
-    resolution : float
-        Last printed digit, s.
-    rate_hz : float, optional
-        The rate if it is known; then only grids of this rate are tried.
-
-    Returns
-    -------
-    Rate or None
-        None if there are fewer than two different times.
-
-    Examples
-    --------
-    >>> find_rate(np.array([0.0, 0.017, 0.033, 0.05, 0.067]), 0.001).rate_hz
-    60.0
+    Times may repeat, run backward or be missing. If the rate is known, only grids of this rate are tried.
     """
     times = t if (t[1:] > t[:-1]).all() else np.unique(t[np.isfinite(t)])
     if times.size < 2:
@@ -107,10 +81,7 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
 
 
 def median(values: NDArray[np.number]) -> float:
-    """Return the median of finite numbers.
-
-    This replaces numpy's median, which imports numpy.ma and thereby takes a tenth of the start-up time.
-    """
+    """Return the median of finite numbers; numpy's median imports numpy.ma, a tenth of the start-up time."""
     half = values.size // 2
     part = np.partition(values, half)
     return float(part[half] if values.size % 2 else 0.5 * (part[:half].max() + part[half]))
@@ -146,23 +117,10 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     return step, relative_u
 
 
-def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F8, NDArray[np.bool_]]:
+def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F8, B1]:
     """Replace each time by the nearest grid point if the two agree within the rounding of the printed time.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-    grid : Grid
-    resolution : float
-        Last printed digit, s.
-    out : (n,) float64, s, optional
-        Array that receives the result; may be ``t`` itself.
-
-    Returns
-    -------
-    t : (n,) float64, s
-        Grid points; a time that agrees with no grid point is unchanged.
-    agrees : (n,) bool
+    Return the times and a mask of those that agree. ``out`` may receive the times; it may be ``t`` itself.
     """
     snapped = np.empty(t.size) if out is None else out
     agrees = np.empty(t.size, bool)
@@ -174,65 +132,41 @@ def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F
     return snapped, agrees
 
 
-def place_unread(t: F8, unread: NDArray[np.bool_], grid: Grid | None, expected: dict[int, str], decimals: int) -> F8:
+def place_unread(t: F8, unread: B1, grid: Grid | None, cut: str, decimals: int) -> F8:
     """Return the times of all rows; infer those of unread rows from the grid and the neighbouring rows.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        Times; for an unread row, the printed time or NaN.
-    unread : (n,) bool
-    grid : Grid or None
-    expected : dict of int to str
-        The first cell of an unread row, by row index; only the cell of the last row is used.
-    decimals : int
-        Number of printed decimals of a time.
-
-    Returns
-    -------
-    (n,) float64, s
-        Times; NaN for unread rows whose time cannot be inferred, because nothing shows that they were samples.
+    The time of an unread row is its printed time or NaN. ``cut`` is the first cell of an incomplete last row, or empty;
+    it must begin like the next time with its decimals. A time that cannot be inferred is NaN, because nothing shows
+    that the row was a sample.
     """
     out = np.where(unread, np.nan, t)
     for start, stop in _runs(unread):
-        before = float(t[start - 1]) if start else np.nan
-        after = float(t[stop]) if stop < t.size else np.nan
-        count = stop - start
-        if grid is not None and round((after - before) * grid.rate_hz if after > before else 0) == count + 1:
-            first = grid.nearest(np.array([before]))[0]
-            out[start:stop] = grid.time(first + 1 + np.arange(count))
+        before = float(t[start - 1]) if start else -np.inf
+        after = float(t[stop]) if stop < t.size else np.inf
+        inside = bool(np.isfinite(after - before))
+        if grid is not None and inside and round((after - before) * grid.rate_hz) == stop - start + 1:
+            out[start:stop] = grid.time(grid.nearest(np.array([before]))[0] + 1 + np.arange(stop - start))
             continue
         last = before
         for row in range(start, stop):
-            ahead, behind = row - start + 1, stop - row
-            guess = _time_of_row(float(t[row]), last, after, (before, ahead), behind, grid)
-            if np.isnan(guess) and row == t.size - 1 and grid is not None and np.isfinite(last):
-                # The last row may be cut within its time. Its first cell must then begin like the next time.
-                follows = float(grid.time(grid.nearest(np.array([last])) + 1)[0])
-                if expected.get(row, "") and f"{follows:.{decimals}f}".startswith(expected[row]):
-                    guess = follows
-            out[row] = guess
-            last = last if np.isnan(guess) else guess
+            time = float(t[row])
+            fits = inside
+            if grid is not None and np.isfinite(time):
+                time = float(grid.time(grid.nearest(np.array([time])))[0])
+                # At either end of the file only the expected step is accepted, because a digit may be damaged.
+                steps = time - before, row - start + 1
+                steps = steps if start else (after - time, stop - row)
+                fits = inside or abs(steps[0] * grid.rate_hz - steps[1]) < 0.5
+            if fits and last < time < after:
+                out[row] = last = time
+        if cut and stop == t.size and np.isnan(out[-1]) and grid is not None and np.isfinite(last):
+            follows = float(grid.time(grid.nearest(np.array([last])) + 1)[0])
+            if f"{follows:.{decimals}f}".startswith(cut):
+                out[-1] = follows
     return out
 
 
-def _time_of_row(
-    printed: float, last: float, after: float, before: tuple[float, int], behind: int, grid: Grid | None
-) -> float:
-    """Return the printed time of an unread row if it lies at the expected place on the grid; else NaN."""
-    if not np.isfinite(printed) or printed <= last or printed >= after:
-        return np.nan
-    if grid is None:
-        return printed if np.isfinite(last) and np.isfinite(after) else np.nan
-    exact = float(grid.time(grid.nearest(np.array([printed])))[0])
-    if np.isfinite(last) and np.isfinite(after):
-        return exact if last < exact < after else np.nan
-    origin, steps = before if np.isfinite(before[0]) else (after, -behind)
-    # At either end of the file only the expected step is accepted, because a digit may be damaged.
-    return exact if abs(exact - origin - steps / grid.rate_hz) < 0.5 / grid.rate_hz else np.nan
-
-
-def _runs(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+def _runs(mask: B1) -> Iterator[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.view(np.int8), [0]))))
     yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
@@ -247,24 +181,10 @@ def _even(t: F8, longest: float) -> bool:
 
 
 def time_flags(t: F8, step: float) -> U8:
-    """Flag repeated times, backward times and gaps.
+    """Flag repeated times, backward times and gaps, given the nominal time between samples (s).
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-    step : float
-        Nominal time between samples, s.
-
-    Returns
-    -------
-    (n,) uint8
-        Flags. The times of samples with neither DUPLICATE_TIME nor NON_MONOTONIC_TIME increase strictly. If a single
-        time is ahead of its neighbours, only that time is flagged, and not all the times after it.
-
-    Examples
-    --------
-    >>> [Flag(int(f)).name for f in time_flags(np.array([0.0, 0.1, 0.1, 9.2, 0.3, 0.6]), 0.1)][2:]
-    ['DUPLICATE_TIME', 'NON_MONOTONIC_TIME', 'GAP_BEFORE', 'GAP_BEFORE']
+    The times of samples with neither DUPLICATE_TIME nor NON_MONOTONIC_TIME increase strictly. If a single time is
+    ahead of its neighbours, only that time is flagged, and not all the times after it.
     """
     flags = np.zeros(t.size, np.uint8)
     if t.size == 0 or _even(t, 1.5 * step):

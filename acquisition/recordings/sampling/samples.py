@@ -3,27 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import F8, I8, U8, Flag
+from acquisition.block import B1, F8, I8, U8, Flag
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.nominal import median, place_unread, snap, time_flags
-from acquisition.recordings.sampling.timing import Timing
-
-__all__ = [
-    "IRREGULAR",
-    "UNREAD_FLAGS",
-    "Rows",
-    "flags_of",
-    "place",
-    "row_traps",
-    "sample_traps",
-    "value_traps",
-    "within",
-]
+from acquisition.recordings.sampling.timing import Rows, Timing
 
 IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
@@ -34,53 +20,7 @@ _FAR_SPREADS, _FAR_GAP = 30.0, 3.0
 _SAMPLE = 65536
 _FEWEST = 50  # minimum number of distances; with fewer, a common step may be accidental
 _ZEROS = 10
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rows:
-    """The rows of one channel, before they become samples.
-
-    Parameters
-    ----------
-    printed : (n,) float64, s, or None
-        Times as printed; None if there are no times.
-    value : (n,) float64
-        Values in the channel's unit, multiplied by the wanted power of ten; NaN if unread or absent.
-    unread, remark : (n,) bool
-        Masks of the rows that could not be read, and of remarks: rows of text between samples, which are not samples.
-    line : callable
-        Returns the one-based line number of a row.
-    time_resolution, resolution : float
-        Size of the last printed digit of a time (s) and of a value; the latter is 0 for binary values.
-    tolerance : (n,) float64, s, or None
-        Half the last printed digit of each time, if the times are compared with a formula in the header.
-    cut : bool
-        Whether the last row is incomplete.
-    last_cell : str
-        The first cell of the last row.
-    decimals : int
-        Number of printed decimals of a time.
-    behind : tuple of (n,) float64
-        The columns after the value, in a sheet whose rows have a fixed width.
-    """
-
-    printed: F8 | None
-    value: F8
-    unread: NDArray[np.bool_]
-    remark: NDArray[np.bool_]
-    line: Callable[[int], int]
-    time_resolution: float
-    resolution: float
-    tolerance: F8 | None = None
-    cut: bool = False
-    last_cell: str = ""
-    decimals: int = 0
-    behind: tuple[F8, ...] = ()
-
-    @property
-    def numbers(self) -> I8:
-        """Sample number of each row, not counting remarks; a remark has the number of the preceding row."""
-        return np.cumsum(~self.remark) - 1
+_BACKWARD = "run backward or ahead of their neighbours"
 
 
 def place(rows: Rows, timing: Timing) -> F8:
@@ -99,16 +39,10 @@ def place(rows: Rows, timing: Timing) -> F8:
         return t if grid is None else snap(t, grid, timing.resolution_s, out=t)[0]
     if grid is not None:
         t[~unread] = snap(t[~unread], grid, timing.resolution_s)[0]
-    expected = {unread.size - 1: rows.last_cell} if unread[-1] else {}
-    return place_unread(t, unread, grid, expected, rows.decimals)
+    return place_unread(t, unread, grid, rows.last_cell if unread[-1] else "", rows.decimals)
 
 
-def within(values: F8, limit: float) -> bool:
-    """Return whether there are values and all of them lie between -limit and limit; false if there is a NaN."""
-    return bool(values.size and values.min() > -limit and values.max() < limit)  # any comparison with NaN is false
-
-
-def flags_of(t: F8, value: F8, unread: NDArray[np.bool_], rate_hz: float) -> U8:
+def flags_of(t: F8, value: F8, unread: B1, rate_hz: float) -> U8:
     """Return the flags for faults in the times and values."""
     flags = time_flags(t, 1.0 / rate_hz)
     missing = np.isnan(value)
@@ -119,7 +53,7 @@ def flags_of(t: F8, value: F8, unread: NDArray[np.bool_], rate_hz: float) -> U8:
     return flags
 
 
-def row_traps(rows: Rows, timed: NDArray[np.bool_], zeros: int) -> Iterator[Trap]:
+def row_traps(rows: Rows, timed: B1, zeros: int) -> Iterator[Trap]:
     """Report the rows that could not be read; ``timed`` marks the rows with a time, which become samples."""
     if zeros:
         yield Trap("zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted")
@@ -143,11 +77,7 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
         return
     kinds = (
         ("duplicate_time", Flag.DUPLICATE_TIME, "samples have the same time as an earlier one"),
-        (
-            "non_monotonic_time",
-            Flag.NON_MONOTONIC_TIME,
-            "samples have times that run backward or ahead of their neighbours",
-        ),
+        ("non_monotonic_time", Flag.NON_MONOTONIC_TIME, f"samples have times that {_BACKWARD}"),
         ("missing_samples", Flag.MISSING, "samples have no value"),
     )
     for code, flag, what in kinds:
@@ -168,22 +98,9 @@ def value_traps(
 ) -> tuple[float, tuple[Trap, ...]]:
     """Find zeros that fill the end, a lost target, and distances rounded more coarsely than printed.
 
-    Parameters
-    ----------
-    distance : (n,) float64, m
-        Zeros that fill the end are replaced by NaN in place.
-    flags : (n,) uint8
-        In place, samples of a lost target get FALSE_ECHO, and zeros that fill the end get MISSING.
-    resolution : float
-        Size of the last printed digit, m.
-    line : callable
-    length : bool
-        Whether these are distances. Voltages have no lost target, and 0 V is a normal reading.
-
-    Returns
-    -------
-    quantum_m : float
-    traps : tuple of Trap
+    Zeros that fill the end become NaN and MISSING, and samples of a lost target FALSE_ECHO, in place. ``resolution``
+    is the last printed digit. If the values are no lengths, there is no lost target, and zero is a normal reading.
+    Return the step of which all values are multiples, and the remarks.
     """
     traps = []
     if length and (tail := _zero_tail(distance)) < distance.size:
@@ -196,10 +113,8 @@ def value_traps(
     if far.size:
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
-        message = (
-            f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others: the target was lost; "
-            "kept and flagged"
-        )
+        distances = f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others"
+        message = f"{distances}: the target was lost; kept and flagged"
         traps.append(Trap("lost_target", message, int(far.size), line(int(far[0]))))
     quantum = _common_step(distance, resolution)
     if length and quantum >= _COARSE_M * (1 - 1e-9):
@@ -216,18 +131,13 @@ def _zero_tail(distance: F8) -> int:
     return int(nonzero[-1]) + 1 if nonzero.size else int(distance.size)
 
 
-def _some(values: F8) -> F8:
-    """Return at most about 130 000 finite values, evenly spaced in the recording."""
-    some = values[:: max(1, values.size // _SAMPLE)]
-    return some[np.isfinite(some)]
-
-
-def _far(distance: F8, resolution: float) -> NDArray[np.int64]:
+def _far(distance: F8, resolution: float) -> I8:
     """Return the samples that deviate far more from the median than the others, with a gap in between.
 
     The size of the experiment is unknown, so there is no absolute limit. A decaying motion has no such gap.
     """
-    values, no_samples = _some(distance), np.empty(0, np.int64)
+    values, no_samples = distance[:: max(1, distance.size // _SAMPLE)], np.empty(0, np.int64)
+    values = values[np.isfinite(values)]
     if values.size < _ZEROS:
         return no_samples
     middle = median(values)

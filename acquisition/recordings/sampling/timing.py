@@ -3,45 +3,76 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import F8, I8
+from acquisition.block import B1, F8, I8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.bursts import Bursts, find_bursts
-from acquisition.recordings.sampling.nominal import Grid, find_rate
-
-__all__ = ["Timing", "check_rate", "clock_traps", "rate_needed", "time_by_column", "time_by_formula", "time_by_rate"]
+from acquisition.recordings.sampling.nominal import Grid, find_rate, median
 
 _SHARE_OF_JITTER = 0.2
 _ANY_RATE_HZ = 100.0  # an example: the rate of many sensors
+_FEWEST_BURSTS = 20  # minimum number of bursts for which their interval can be determined
+_SHORT_STEP = 0.25  # maximum step within a burst, relative to the mean step
+_CLEAR_STEPS = 0.95  # minimum share of steps that are clearly within a burst or between two bursts
+_REGULAR_INTERVALS = 0.9  # minimum share of intervals that differ from the median by less than half of it
+_SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; two rows may be two sensors
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """The rows of one channel, before they become samples; every array has one element for each row.
+
+    ``printed`` are the times as printed, s, or None; ``value`` the values in SI or a power of ten of it, NaN if unread
+    or absent. ``remark`` marks rows of text between samples, which are not samples. ``time_resolution`` (s) and
+    ``resolution`` are the last printed digits, the latter 0 for binary values. ``tolerance`` is half the last digit of
+    each time, if the times are compared with a formula in the header. ``cut`` says that the last row is incomplete,
+    ``last_cell`` is its first cell, and ``decimals`` the number of printed decimals of a time.
+    """
+
+    printed: F8 | None
+    value: F8
+    unread: B1
+    remark: B1
+    line: Callable[[int], int]
+    time_resolution: float
+    resolution: float
+    tolerance: F8 | None = None
+    cut: bool = False
+    last_cell: str = ""
+    decimals: int = 0
+
+    @property
+    def numbers(self) -> I8:
+        """Sample number of each row, not counting remarks; a remark has the number of the preceding row."""
+        return np.cumsum(~self.remark) - 1
+
+
+class Bursts(NamedTuple):
+    """Samples that were stamped in bursts of ``size`` on average, one every ``interval_s``.
+
+    Spread evenly, they are ``step_s`` apart and begin at ``first_s``. They are ``complete`` if the last stamp of every
+    burst lies within one interval of its evenly spaced time; otherwise samples are missing somewhere.
+    """
+
+    size: float
+    interval_s: float
+    step_s: float
+    first_s: float
+    complete: bool
 
 
 class Timing(NamedTuple):
-    """Rate and grid of a file's times.
+    """Rate and grid of a file's times; no grid if the times fit none and are used as printed.
 
-    Parameters
-    ----------
-    rate_hz : float
-    grid : Grid or None
-        None if the times fit no grid and are used as printed.
-    resolution_s : float
-        Size of the last printed digit, s.
-    certain : bool
-        Whether the times or a header determine the rate.
-    given : bool
-        Whether the user gave the rate and the file does not confirm it.
-    steps_s : (float, float) or None
-        Range of the time steps (5th to 95th percentile) if the times fit no grid but jitter little about one step.
-    by_row : bool
-        Whether times computed from row numbers are better than the printed times.
-    bursts : Bursts or None
-        The bursts in the computer's times, if evenly spaced times replace them.
+    The rate is ``certain`` if the times or a header determine it, and ``given`` if the user gave it. ``steps_s`` is
+    the range of the time steps (5th to 95th percentile) if the times fit no grid but jitter little about one step.
+    ``by_row`` says that times computed from row numbers are better than the printed times.
     """
 
     rate_hz: float
@@ -61,26 +92,12 @@ def check_rate(path: str, rate_hz: float | None) -> None:
 
 
 def rate_needed(instead: MissingItem | None = None) -> MissingItem:
-    """Return the missing item that represents a rate.
-
-    Parameters
-    ----------
-    instead : MissingItem, optional
-        The missing item for a column of times, which could be given in place of the rate.
-    """
+    """Return the missing item for a rate; a column of times may be given instead."""
     return MissingItem(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
 
 
-def time_by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
-    """Infer the rate from the printed times (s) of valid rows.
-
-    Raises
-    ------
-    NeedsAnswer
-        If no rate was given, and there are fewer than two different times, or bursts of times with missing samples.
-    FormatError
-        If the given rate contradicts the times.
-    """
+def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
+    """Infer the rate from the printed times (s) of valid rows; ask for it if they do not show it."""
     if (bursts := find_bursts(printed)) is not None:
         return _spread(path, bursts, resolution, rate_hz)
     rate = find_rate(printed, resolution, rate_hz=rate_hz)
@@ -120,35 +137,46 @@ def _jitter(printed: F8) -> tuple[float, float] | None:
     return (low, high) if high - low <= _SHARE_OF_JITTER * middle else None
 
 
-def time_by_formula(
-    path: str,
-    start_s: float,
-    step_s: float,
-    printed: F8 | None,
-    tolerance: F8 | None,
-    numbers: I8,
-    rate_hz: float | None,
-) -> Timing | None:
-    """Use the times ``start_s + i step_s`` of a header, if the column of times agrees within its rounding.
+def find_timing(
+    path: str, rows: Rows, formula: tuple[float, float, int | None] | None, rate_hz: float | None
+) -> tuple[Timing, list[Trap]]:
+    """Return the rate and the grid of the times: those of the header if no column contradicts it, or of the column.
 
-    Parameters
-    ----------
-    printed, tolerance : (n,) float64, s, or None
-        Printed times of the rows (NaN if unread) and half the last digit of each; None if there is no column of times.
-    numbers : (n,) int64
-        The index i of each row.
-
-    Returns
-    -------
-    Timing or None
-        None if the header and the column disagree, or if the times of the header are impossible.
+    A formula is the start and the step of the times, s, and the number of samples, as a header states them. Without
+    any times the user must give the rate.
     """
+    traps: list[Trap] = []
+    timing = None
+    if formula is not None:
+        start_s, step_s, samples = formula
+        count = int(np.count_nonzero(~rows.remark))
+        if samples is not None and samples != count:
+            message = f"the header declares {samples} samples, but there are {count} rows; all are kept"
+            traps.append(Trap("stale_header", message, abs(samples - count)))
+        timing = _by_formula(path, start_s, step_s, rows, rate_hz)
+        if timing is None:
+            stated = f"the header states the times {start_s:g} s + i * {step_s:g} s"
+            what = "which are impossible" if rows.printed is None else "but the column of times differs and is used"
+            size = 1 if rows.printed is None else rows.printed.size
+            traps.append(Trap("stale_header", f"{stated}, {what}", size))
+    if timing is None and rows.printed is not None:
+        timing = _by_column(path, rows.printed[~rows.unread], rows.time_resolution, rate_hz)
+    if timing is None:
+        if rate_hz is None:
+            reason = "no column of times and no sampling interval"
+            raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
+        timing = Timing(rate_hz, Grid(rate_hz), 0.0, certain=True, given=True, by_row=True)
+    return timing, traps
+
+
+def _by_formula(path: str, start_s: float, step_s: float, rows: Rows, rate_hz: float | None) -> Timing | None:
+    """Return the times of a header; None if they are impossible or the column of times differs beyond its rounding."""
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
-    if printed is not None and tolerance is not None:
-        expected = start_s + step_s * numbers
-        slack = 1e-9 * np.maximum(np.abs(expected), step_s)
-        if (np.abs(printed - expected) > tolerance * 1.0001 + slack).any():  # the comparison is false for a NaN
+    if rows.printed is not None and rows.tolerance is not None:
+        expected = start_s + step_s * rows.numbers
+        slack = rows.tolerance * 1.0001 + 1e-9 * np.maximum(np.abs(expected), step_s)
+        if ((np.abs(rows.printed - expected) > slack) & ~rows.unread).any():  # the comparison is false for a NaN
             return None
     rate = 1.0 / step_s
     rounded = float(f"{rate:.9g}")
@@ -159,21 +187,12 @@ def time_by_formula(
     return Timing(rate, Grid(rate, start_s), 0.0, certain=True, by_row=True)
 
 
-def time_by_rate(path: str, rate_hz: float | None, why: str) -> Timing:
-    """Use the rate that the user gives for a file without times."""
-    if rate_hz is None:
-        raise NeedsAnswer(Question(path, (rate_needed(),), reason=why))
-    return Timing(rate_hz, Grid(rate_hz), 0.0, certain=True, given=True, by_row=True)
-
-
 def clock_traps(timing: Timing) -> Iterator[Trap]:
     """Report how the times were obtained."""
     if timing.bursts is not None:
         size, interval_ms = timing.bursts.size, 1e3 * timing.bursts.interval_s
-        message = (
-            f"the times come in bursts of {size:.3g} samples every {interval_ms:.4g} ms; "
-            f"the samples were spread evenly, at {timing.rate_hz:.6g} Hz"
-        )
+        bursts = f"bursts of {size:.3g} samples every {interval_ms:.4g} ms"
+        message = f"the times come in {bursts}; the samples were spread evenly, at {timing.rate_hz:.6g} Hz"
         yield Trap("times_in_bursts", message)
     elif timing.grid is not None:
         message = f"times are row numbers over a nominal {timing.rate_hz:g} Hz, not measured times"
@@ -187,31 +206,37 @@ def clock_traps(timing: Timing) -> Iterator[Trap]:
         message = f"the times are measured: their steps vary from {steps}"
         yield Trap("jittered_time", message)
     elif not timing.certain:
-        why = (
-            "there are too few rows to be certain"
-            if timing.grid is not None
-            else "the times fit no regular grid and are used as printed"
-        )
+        why = "the times fit no regular grid and are used as printed"
+        why = why if timing.grid is None else "there are too few rows to be certain"
         yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the most likely one: {why}")
 
 
-def tolerance_of(printed: F8, form: NDArray[np.int8], shift: int, exponent: int) -> F8:
-    """Return half the last printed digit of each time, s; for a time with an exponent, an estimate from its size.
+def find_bursts(t: F8) -> Bursts | None:
+    """Find bursts in the printed times of a recording (s); None for times that do not come in regular bursts.
 
-    The estimate is not too small if the mantissa is at least 1.
-
-    Parameters
-    ----------
-    printed : (n,) float64, s
-    form : (n,) int8
-        See :class:`acquisition.recordings.tables.table.Table`.
-    shift : int
-        Power of ten from the printed unit to seconds.
-    exponent : int
-        Constant that is added to the number of decimals in the form of a number with an exponent.
+    A computer that polls a sensor, or gets its samples in packets, stamps each sample when it arrives. The stamps of
+    one packet lie close together and contain no information on when its samples were taken. The stamps of the last
+    samples of the packets do: a straight line fitted to them against the row numbers gives the rate and the start.
     """
-    usual = int(form[0]) if form.size else 0
-    if 0 <= usual < exponent and (form == usual).all():
-        return np.broadcast_to(np.float64(0.5 * 10.0 ** (shift - usual)), form.size)
-    decimals = np.where(form < 0, 0.0, form % exponent)
-    return 0.5 * 10.0**-decimals * np.where(form >= exponent, np.abs(printed), 10.0**shift)
+    if t.size < 2 * _FEWEST_BURSTS or not np.isfinite(t).all():
+        return None
+    steps = np.diff(t)
+    mean = float(t[-1] - t[0]) / steps.size
+    if not mean > 0.0 or steps.min() < 0.0:
+        return None
+    within, between = steps < _SHORT_STEP * mean, steps >= mean
+    if np.count_nonzero(within) < 0.5 * (steps.size - 1) or np.mean(within | between) < _CLEAR_STEPS:
+        return None
+    last: I8 = np.flatnonzero(between)
+    if last.size < _FEWEST_BURSTS:
+        return None
+    intervals = np.diff(t[last])
+    interval = median(intervals)
+    size = t.size / (last.size + 1)
+    if np.mean(np.abs(intervals - interval) < 0.5 * interval) < _REGULAR_INTERVALS:
+        return None
+    if size < _SAME_TIME and not steps[within].any():
+        return None
+    step, start = (float(each) for each in np.polyfit(last, t[last], 1))
+    late = np.abs(t[last] - (start + step * last))
+    return Bursts(size, interval, step, start, bool(late.max() < interval))

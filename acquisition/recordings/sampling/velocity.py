@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import F8, I8
-
-__all__ = ["Path", "find_quantum", "find_tick", "integrate", "outer_join"]
+from acquisition.block import B1, F8, I8
 
 _FEWEST_VALUES = 20
 _FINEST = 4  # minimum tick, in last printed digits; a smaller one cannot be distinguished from rounding
@@ -19,31 +14,11 @@ _COHERENT = 0.9
 
 
 def find_tick(values: F8, resolution: float) -> float | None:
-    """Find the largest step of which the printed values are multiples, within rounding.
+    """Find the largest step of which the printed values are multiples, within rounding; None if there is none.
 
-    Parameters
-    ----------
-    values : (n,) float64
-        Printed values; NaN is ignored.
-    resolution : float
-        Size of the last printed digit, in the unit of the values.
-
-    Returns
-    -------
-    float or None
-        The step, in the unit of the values; None if there is no evident step.
-
-    Notes
-    -----
-    Gaps between neighbouring sizes of values are candidates for the step s. Each is refined by least squares of
-    ``v = k s`` over an increasing range of v, because the integers k of large v are certain only if s is accurate. The
-    step must explain 95 % of the different sizes.
-
-    Examples
-    --------
-    >>> k = np.random.default_rng(1).integers(-900, 900, 400)
-    >>> round(find_tick(np.round(k * 0.25536, 3), 0.001), 5)
-    0.25536
+    Gaps between neighbouring sizes of values are candidates for the step s. Each is refined by least squares of ``v =
+    k s`` over an increasing range of v, because the integers k of large v are certain only if s is accurate. The step
+    must explain 95 % of the different sizes.
     """
     size = np.unique(np.rint(np.abs(values[np.isfinite(values)]) / resolution))
     if size.size < _FEWEST_VALUES or size[-1] > 2**50:
@@ -75,17 +50,9 @@ def _refine(size: F8, step: float) -> float:
 def find_quantum(values: F8, tick: float) -> float:
     """Return the spacing of the clusters of values: ``tick`` itself, or a multiple of it.
 
-    Notes
-    -----
-    A device that converts timer ticks to distance by integer arithmetic gives values at ``j m tick`` and
-    ``(j m + 1) tick``: exact multiples of a small step, in clusters one timer tick apart. The spacing of the clusters
-    is the quantum. It is found by phase coherence, ``|mean exp(2 pi i k / m)|``, which must reach 0.9.
-
-    Examples
-    --------
-    >>> j = np.arange(-300, 300)
-    >>> round(find_quantum(0.43 * j + 0.043 * (j % 2), 0.043), 6)
-    0.43
+    A device that converts timer ticks to distance by integer arithmetic gives values at ``j m tick`` and ``(j m + 1)
+    tick``: exact multiples of a small step, in clusters one timer tick apart. The spacing of the clusters is the
+    quantum. It is found by phase coherence, ``|mean exp(2 pi i k / m)|``, which must reach 0.9.
     """
     k = np.rint(values[np.isfinite(values)] / tick).astype(np.int64)
     spread = float(np.std(k)) if k.size else 0.0
@@ -96,42 +63,12 @@ def find_quantum(values: F8, tick: float) -> float:
     return tick
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Path:
-    """Position integrated from velocity.
+def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, rounding: float) -> tuple[F8, B1]:
+    """Sum backward differences ``(x[i] - x[i-1]) * rate_hz`` to a position, m: zero at first, NaN if unknown.
 
-    Parameters
-    ----------
-    position : (n,) float64, m
-        Zero at the first sample; NaN if the velocity is unknown.
-    bridged : (n,) bool
-        Mask of the first sample after each gap; its offset from the earlier samples is not known.
-    """
-
-    position: F8
-    bridged: NDArray[np.bool_]
-
-
-def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, rounding: float) -> Path:
-    """Sum backward differences to obtain the position.
-
-    Parameters
-    ----------
-    velocity : (n,) float64, m/s
-        ``(x[i] - x[i-1]) * rate_hz``; NaN if unknown. The first value may be unknown.
-    index : (n,) int64
-        Sample numbers, increasing; a jump is a gap.
-    rate_hz : float
-    tick : float or None
-        Step of velocity, m/s. A value within ``rounding`` of a multiple is replaced by that multiple, so that rounding
-        errors do not add up.
-    rounding : float
-        Half the last printed digit, m/s.
-
-    Notes
-    -----
-    In a gap the velocity is interpolated linearly. The resulting offset is only an estimate, so the first sample after
-    the gap is marked.
+    ``index`` are sample numbers, increasing; a jump is a gap. A value within ``rounding`` of a multiple of the tick is
+    replaced by that multiple, so that rounding errors do not add up. In a gap the velocity is interpolated linearly.
+    The resulting offset is only an estimate, so the mask returned marks the first sample after each gap.
     """
     known = np.isfinite(velocity)
     v = velocity.copy()
@@ -145,7 +82,7 @@ def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, round
     if start:
         position[0] = 0.0
     if rows.size == 0:
-        return Path(position, bridged)
+        return position, bridged
     # A first sample without a velocity is at position zero, and the second one is relative to it.
     previous = np.concatenate(([index[0] if start else index[rows[0]] - 1], index[rows[:-1]]))
     v_before = np.concatenate(([v[rows[0]]], v[rows[:-1]]))
@@ -155,29 +92,16 @@ def integrate(velocity: F8, index: I8, rate_hz: float, tick: float | None, round
     if not start:
         position[rows] -= position[rows[0]]
     bridged[rows] = lost > 0
-    return Path(position, bridged)
+    return position, bridged
 
 
-def outer_join(left: I8, right: I8, regular: NDArray[np.bool_] | None = None) -> tuple[I8, I8]:
+def outer_join(left: I8, right: I8, regular: B1 | None = None) -> tuple[I8, I8]:
     """Pair the rows of two recordings by their sample numbers.
 
-    Parameters
-    ----------
-    left, right : (n,), (m,) int64
-        Sample numbers. If a number repeats, its n-th row on the left pairs with its n-th row on the right.
-    regular : (n,) bool, optional
-        Mask of the rows of ``left`` whose numbers are in order; all by default.
-
-    Returns
-    -------
-    from_left, from_right : (k,) int64
-        Row of each joined sample in ``left`` and in ``right``; -1 if there is none. Rows of ``left`` keep their order,
-        and rows that exist only in ``right`` are inserted according to their numbers.
-
-    Examples
-    --------
-    >>> [rows.tolist() for rows in outer_join(np.array([2, 3, 4]), np.array([1, 2, 4, 5]))]
-    [[-1, 0, 1, 2, -1], [0, 1, -1, 2, 3]]
+    If a number repeats, its n-th row on the left pairs with its n-th row on the right. ``regular`` marks the rows of
+    ``left`` whose numbers are in order. Return the row of each joined sample in ``left`` and in ``right``, -1 if there
+    is none. Rows of ``left`` keep their order, and rows that exist only in ``right`` are inserted according to their
+    numbers.
     """
     rows_of = {key: row for row, key in enumerate(_with_turn(right))}
     partner = np.array([rows_of.pop(key, -1) for key in _with_turn(left)], np.int64)

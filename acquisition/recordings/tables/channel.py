@@ -1,48 +1,31 @@
-"""Read one channel of a file: its rows, including those that could not be read, and its samples."""
+"""From a column of a table and its times to samples: rows of the channel, times on their grid, flags and remarks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.block import B1, F8, U8, Flag
+from acquisition.block import B1, F8, I8, U8, Flag
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.samples import Rows, flags_of, place, row_traps, sample_traps
-from acquisition.recordings.sampling.timing import Timing
-from acquisition.recordings.tables.contents import Arrays, Channel, Sheet
-from acquisition.recordings.tables.table import EMPTY, UNREAD, Table, read_table
-from acquisition.recordings.tables.times import last_digit, power_of_times, printed_times, timing_of
-from acquisition.recordings.units import time_factor
+from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps
+from acquisition.recordings.sampling.timing import Rows, Timing, clock_traps, find_timing
+from acquisition.recordings.tables.cells import EMPTY, EXPONENT, I1, UNREAD, scaled, usual_decimals
+from acquisition.recordings.tables.table import Column, Lines, Table
+from acquisition.recordings.units import TIMES, time_factor, time_power
 
-__all__ = ["ChannelSamples", "read_rows", "to_samples"]
-
-_T = TypeVar("_T", bound=np.generic)
+_LONGEST_S = 1e10
+"""Times beyond three hundred years are no times."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ChannelSamples:
-    """The samples of one channel.
+class Samples:
+    """The samples of one channel: seconds, values, flags, and what was noticed about them.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-    value : (n,) float64
-    flags : (n,) uint8
-    timing : Timing
-    resolution : float
-        Size of the last printed digit of a value.
-    traps : tuple of Trap
-        Remarks on times and rows.
-    line : callable
-        Returns the one-based line number of a sample; None for a binary file.
-    malformed_rows : int
-    behind : tuple of (rows,) float64
-        The columns after the value, without the rows that could not be read.
+    ``resolution`` is the size of the last printed digit of a value. ``line`` returns the line number of a sample; None
+    for a binary file. ``sound`` marks the rows of the table that could be read.
     """
 
     t: F8
@@ -53,195 +36,145 @@ class ChannelSamples:
     traps: tuple[Trap, ...]
     line: Callable[[int], int | None]
     malformed_rows: int
-    behind: tuple[F8, ...]
+    sound: B1
 
 
-def read_rows(path: str, channel: Channel, power: int) -> Rows:
-    """Read a channel's times and values.
+def read_samples(
+    path: str, table: Table, column: Column, power: int, rate_hz: float | None, *, difference: bool = False
+) -> Samples:
+    """Read a channel, its values multiplied by ten to a power.
 
-    Parameters
-    ----------
-    path : str
-        For messages.
-    channel : Channel
-    power : int
-        Values are multiplied by ten to this power.
-
-    Raises
-    ------
-    FormatError
-        If there are no numbers, or the times have an unknown unit.
+    ``difference`` says that each value is the difference from the row before, so that the first may be absent.
     """
-    if isinstance(channel.source, Arrays):
-        return _from_arrays(path, channel, channel.source, power)
-    return _from_sheet(path, channel, channel.source, power)
+    rows = rows_of(path, table, column, power)
+    stated = table.formula
+    formula = None if stated is None else (stated.start_s, stated.step_s, stated.samples)
+    timing, found = find_timing(path, rows, formula, rate_hz)
+    if table.formula is None and table.times is not None and not table.times.unit:
+        found.append(Trap("unit_assumed", "the times have no unit: read as seconds"))
+    found.extend(clock_traps(timing))
+    unread, t = rows.unread, place(rows, timing)
+    timed = np.isfinite(t)
+    where = _rows_in(timed)
+    t, value = t[where], rows.value[where]
+    if np.isnan(value).all():
+        problem = f'expected numbers as "{column.name}", got NaN in all {value.size} rows'
+        raise FormatError(path, problem, "record the run again", line=rows.line(0) or None)
+
+    def line(row: int) -> int | None:
+        return rows.line(row if isinstance(where, slice) else int(where[row])) or None
+
+    flags = flags_of(t, value, unread[where], timing.rate_hz)
+    if difference and not unread[0] and np.isnan(value[0]):
+        flags[0] &= ~np.uint8(Flag.MISSING)
+    zeros = table.lines.zeros if table.lines else 0
+    traps = (*found, *row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line))
+    malformed = int(np.count_nonzero(unread))
+    return Samples(t, value, flags, timing, rows.resolution, traps, line, malformed, ~unread)
 
 
-def _from_arrays(path: str, channel: Channel, arrays: Arrays, power: int) -> Rows:
-    value = arrays.values / 10.0**-power if power else arrays.values.copy()
-    # The times are copied, because channels may share them and they are changed later.
-    t = None if arrays.t is None else arrays.t * time_factor(channel.time_unit) / 10.0 ** -power_of_times(path, channel)
-    unread = np.zeros(value.size, bool) if t is None else ~np.isfinite(t)
-    if unread.any():
-        value[unread] = np.nan
+def rows_of(path: str, table: Table, column: Column, power: int) -> Rows:
+    """Return the rows of a channel, including those that could not be read; raise an error if there are no numbers."""
+    unit = table.times.unit if table.times else ""
+    to_seconds = time_power(unit) if unit else 0
+    if to_seconds is None:
+        problem = f'expected times in one of {", ".join(TIMES)}, got "{unit}"'
+        raise FormatError(path, problem, "export the times in seconds")
+    if table.lines is None:
+        return _binary_rows(table.times, column, power, to_seconds)
+    return _text_rows(path, table, table.lines, column, power, to_seconds)
+
+
+def _binary_rows(times: Column | None, column: Column, power: int, to_seconds: int) -> Rows:
+    size = max(column.values.size, times.values.size if times else 0)
+    value, t, unread = scaled(column.of_size(size).values, None, power), None, np.zeros(size, bool)
+    if times is not None:
+        t = scaled(times.of_size(size).values * time_factor(times.unit), None, to_seconds)
+        unread = ~np.isfinite(t)
+    value[unread] = np.nan
     largest = 0.0 if t is None else float(np.fmax.reduce(np.abs(t), initial=0.0))
-    return Rows(t, value, unread, np.zeros_like(unread), _no_line, max(float(np.spacing(largest)), 1e-12), 0.0)
+    return Rows(t, value, unread, np.zeros(size, bool), lambda _: 0, max(float(np.spacing(largest)), 1e-12), 0.0)
 
 
-def _no_line(row: int) -> int:  # noqa: ARG001
-    """Return 0: binary files have no lines."""
-    return 0
-
-
-def _from_sheet(path: str, channel: Channel, sheet: Sheet, power: int) -> Rows:
-    time_power = power_of_times(path, channel)
-    columns = _columns(channel, sheet)
-    table = read_table(
-        sheet.text,
-        columns,
-        sheet.delimiter,
-        width=sheet.width,
-        start=sheet.start,
-        stop=sheet.stop,
-        first_line=sheet.first_line,
-        shifts=[
-            time_power if column == channel.time else power if column >= channel.column else 0 for column in columns
-        ],
-    )
-    own = columns.index(channel.column)
-    at = None if channel.time is None else columns.index(channel.time)
-    keep, remark, unread = _own_rows(table, own, at, every=bool(sheet.width), ragged=channel.ragged)
+def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int, to_seconds: int) -> Rows:
+    own, time = column.of_size(lines.rows), table.times and table.times.of_size(lines.rows)
+    form = own.forms
+    # A row of words without a value is a remark between rows; a row of a longer channel is none of this channel's.
+    remark, present, unread = lines.words & (form == EMPTY), np.ones(form.size, bool), form == UNREAD
+    if time is not None:
+        remark &= (time.forms == EMPTY) | (time.forms == UNREAD)
+        present = (form != EMPTY) | (time.forms != EMPTY)
+        if lines.cut and time.forms[-1] == UNREAD:
+            unread[-1] = True  # its time is incomplete
+    if table.ragged or time is None:
+        # Empty cells at the end follow the channel's last sample; an empty cell before it is a lost sample.
+        filled = np.flatnonzero(form != EMPTY)
+        present[int(filled[-1]) + 1 if filled.size else 0 :] = False
+    keep = present | remark
     if not (keep & ~remark).any():
-        raise _no_rows(path, channel, sheet, 0, sheet.first_line)
-    chosen = None if keep.all() else np.flatnonzero(keep)
-    remark = _selected(remark, chosen)
-    unknown = _selected(unread, chosen) | remark
-    times = None
-    if at is not None:
-        printed = np.require(_selected(table.values[at], chosen), requirements="W")
-        form = _selected(table.form[at], chosen)
-        times = printed_times(channel, printed, form, table.decimals[at], table.exponents[at], time_power)
-        unknown |= times.unknown
-    value = np.require(_selected(table.values[own], chosen), requirements="W")
-    if unknown.any():
-        value = np.where(unknown, np.nan, value)
+        raise _no_numbers(path, column, 0, lines.first)
+    chosen = _rows_in(keep)
+    remark, unknown = remark[chosen], (unread | remark)[chosen]
+    printed, tolerance, time_digit, decimals = None, None, 0.0, 0
+    if time is not None:
+        printed = scaled(time.values, time.forms, to_seconds)[chosen]
+        time_digit, decimals = last_digit(printed, time.forms, to_seconds), usual_decimals(time.forms)[0]
+        if table.formula is not None:
+            tolerance = _tolerance(printed, time.forms[chosen], to_seconds)
+        printed, time_digit = printed * time_factor(time.unit), time_digit * time_factor(time.unit)
+        beyond = ~(np.abs(printed) < _LONGEST_S)  # true for a NaN
+        printed[beyond] = np.nan
+        unknown |= beyond
+    value = scaled(own.values, form, power)[chosen]
+    value[unknown] = np.nan
 
     def line(row: int) -> int:
-        return table.line(row if chosen is None else int(chosen[row]))
+        return lines.line(row if isinstance(chosen, slice) else int(chosen[row]))
 
     if unknown.all():
-        raise _no_rows(path, channel, sheet, unknown.size, line(0))
+        raise _no_numbers(path, column, unknown.size, line(0))
     return Rows(
-        printed=None if times is None else times.t,
+        printed=printed,
         value=value,
         unread=unknown,
         remark=remark,
         line=line,
-        time_resolution=0.0 if times is None else times.resolution_s,
-        resolution=last_digit(value, table.decimals[own], table.exponents[own], power),
-        tolerance=None if times is None else times.tolerance,
-        cut=table.cut and bool(unknown[-1]) and bool(keep[-1]),
-        last_cell=table.last_cell,
-        decimals=0 if at is None else table.decimals[at],
-        behind=tuple(_selected(column, chosen) for column in table.values[own + 1 :]),
+        time_resolution=time_digit,
+        resolution=last_digit(value, form, power),
+        tolerance=tolerance,
+        cut=lines.cut and bool(unknown[-1]) and bool(keep[-1]),
+        last_cell=lines.last_cell,
+        decimals=decimals,
     )
 
 
-def _columns(channel: Channel, sheet: Sheet) -> list[int]:
-    """Return the columns to read for a channel: all if rows have a fixed width, else only the columns it needs."""
-    if sheet.width:
-        return list(range(sheet.width))
-    # Unless it is empty, the first column distinguishes rows from remarks, even if it belongs to another channel.
-    row = next(sheet.text.lines(sheet.start), None)
-    leads = row is not None and row.text.split(sheet.delimiter or None)[:1] not in ([], [""])
-    needed = ([0] if leads else []) + ([] if channel.time is None else [channel.time]) + [channel.column]
-    return list(dict.fromkeys(needed))
+def _rows_in(mask: B1) -> I8 | slice:
+    """Return the indices of the rows in a mask; a slice of all rows takes no memory."""
+    return slice(None) if mask.all() else np.flatnonzero(mask)
 
 
-def _own_rows(table: Table, own: int, at: int | None, *, every: bool, ragged: bool) -> tuple[B1, B1, B1]:
-    """Return three masks of a table's rows: rows of the channel, remarks among them, and rows that could not be read.
-
-    Parameters
-    ----------
-    table : Table
-    own, at : int, int or None
-        The columns of the values and of the times.
-    every : bool
-        Whether every cell of a row must be a number, so that no row is a remark.
-    ragged : bool
-        See :class:`acquisition.recordings.tables.contents.Channel`.
-    """
-    if every:
-        keep, remark, unread = np.ones(len(table), bool), np.zeros(len(table), bool), table.unread
-    else:
-        remark = table.text & (table.form[own] == EMPTY)
-        if at is not None:
-            remark &= (table.form[at] == EMPTY) | (table.form[at] == UNREAD)
-        keep, unread = _present(table, own, at, ragged) | remark, table.form[own] == UNREAD
-    if at is not None and table.cut and table.form[at][-1] == UNREAD:
-        unread[-1] = True  # its time is incomplete
-    return keep, remark, unread
-
-
-def _no_rows(path: str, channel: Channel, sheet: Sheet, lines: int, line: int) -> FormatError:
-    numbers = f"{sheet.width} numbers" if sheet.width else f'numbers for "{channel.name}"'
-    problem = f"expected rows of {numbers}, got none" + (f" in {lines} lines" if lines else "")
-    remedy = "check that rows and headings belong together" if lines else "check that the export ended"
+def _no_numbers(path: str, column: Column, rows: int, line: int) -> FormatError:
+    problem = f'expected rows of numbers for "{column.name}", got none' + (f" in {rows} lines" if rows else "")
+    remedy = "check that rows and headings belong together" if rows else "check that the export ended"
     return FormatError(path, problem, remedy, line=line)
 
 
-def _selected(column: NDArray[_T], rows: NDArray[np.int64] | None) -> NDArray[_T]:
-    return column if rows is None else column[rows]
+def last_digit(values: F8, decimals: I1, power: int) -> float:
+    """Return the size of the last printed digit of numbers that were multiplied by ten to a power.
 
-
-def _present(table: Table, own: int, at: int | None, ragged: bool) -> B1:
-    """Return the mask of the rows of the channel; other rows belong to a longer channel of the same table."""
-    empty = table.form[own] == EMPTY
-    keep = np.ones(empty.size, bool) if at is None else ~(empty & (table.form[at] == EMPTY))
-    if ragged or at is None:
-        # Empty cells at the end follow the channel's last sample; an empty cell before it is a lost sample.
-        some = np.flatnonzero(~empty)
-        keep[int(some[-1]) + 1 if some.size else 0 :] = False
-    return keep
-
-
-def to_samples(path: str, channel: Channel, rows: Rows, rate_hz: float | None, zeros: int = 0) -> ChannelSamples:
-    """Return the samples of a channel from its rows; the arrays of the rows are changed.
-
-    Parameters
-    ----------
-    path : str
-        For messages.
-    channel : Channel
-    rows : Rows
-    rate_hz : float or None
-        The rate that the user gives, if any.
-    zeros : int
-        Number of zero bytes at the end of the file, which were left out.
-
-    Raises
-    ------
-    NeedsAnswer
-        If the rate is neither stated nor given.
-    FormatError
-        If the given rate contradicts the file, or all values are NaN.
+    If the numbers have exponents, it is that of the largest number.
     """
-    timing, traps = timing_of(path, channel, rows, rate_hz)
-    value, unread, t = rows.value, rows.unread, place(rows, timing)
-    timed = np.isfinite(t)
-    where = None if timed.all() else np.flatnonzero(timed)
-    t, value = _selected(t, where), _selected(value, where)
-    if np.isnan(value).all():
-        problem = f'expected numbers as "{channel.name}", got NaN in all {value.size} rows'
-        raise FormatError(path, problem, "record the run again", line=rows.line(0) or None)
+    usual, exponents = usual_decimals(decimals)
+    if exponents:
+        largest = float(np.fmax.reduce(np.abs(values), initial=0.0))
+        power = int(np.floor(np.log10(largest))) if largest > 0 else power
+    return float(f"1e{power - usual}")
 
-    def line(row: int) -> int | None:
-        return rows.line(row if where is None else int(where[row])) or None
 
-    flags = flags_of(t, value, _selected(unread, where), timing.rate_hz)
-    if channel.difference and not unread[0] and np.isnan(value[0]):
-        flags[0] &= ~np.uint8(Flag.MISSING)
-    row_traps_found = (*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line))
-    malformed = int(np.count_nonzero(unread))
-    behind = tuple(column[~unread] if malformed else column for column in rows.behind)
-    return ChannelSamples(t, value, flags, timing, rows.resolution, (*traps, *row_traps_found), line, malformed, behind)
+def _tolerance(printed: F8, decimals: I1, power: int) -> F8:
+    """Return half the last printed digit of each time, s; with an exponent, an estimate from the size of the time.
+
+    The estimate is not too small if the mantissa is at least 1.
+    """
+    places = np.where(decimals < 0, 0.0, decimals % EXPONENT)
+    return 0.5 * 10.0**-places * np.where(decimals >= EXPONENT, np.abs(printed), 10.0**power)

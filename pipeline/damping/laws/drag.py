@@ -36,7 +36,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.damping.laws.law import Unit
+from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
 
 COEFFICIENTS = ("mu", "gamma", "beta")  # coefficients of the powers 0, 1 and 2 of the amplitude

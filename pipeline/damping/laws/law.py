@@ -3,48 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fractions import Fraction
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
-
-
-class Unit(NamedTuple):
-    """The exponents of metre and second in the unit of a parameter.
-
-    Parameters
-    ----------
-    metre, second : float
-        The exponents.
-    less : str
-        Name of a parameter whose value is subtracted from the exponent of the metre. It is ``"n"`` for the coefficient
-        c in :math:`c A^n`.
-
-    Examples
-    --------
-    >>> print(Unit(1, -1), Unit(-0.5, -1), Unit(1, -1, less="n"), Unit(-1), sep=", ")
-    m/s, 1/(m^1/2 s), m^(1-n)/s, 1/m
-    """
-
-    metre: float = 0.0
-    second: float = 0.0
-    less: str = ""
-
-    def __str__(self) -> str:
-        above: list[str] = []
-        below: list[str] = []
-        for symbol, exponent in (("m", self.metre), ("s", self.second)):
-            if symbol == "m" and self.less:
-                above.append(f"m^({exponent:g}-{self.less})")
-            elif exponent:
-                size = Fraction(abs(exponent)).limit_denominator(1000)
-                (above if exponent > 0.0 else below).append(symbol if size == 1 else f"{symbol}^{size}")
-        if not below:
-            return " ".join(above)
-        divisor = " ".join(below)
-        return f"{' '.join(above) or '1'}/{divisor if len(below) == 1 else f'({divisor})'}"
 
 
 class Law(Protocol):
@@ -78,9 +42,9 @@ class Law(Protocol):
         ...
 
 
-def units_of(law: Law) -> tuple[str, ...]:
-    """Return the units of a law's parameters as they are printed."""
-    return tuple(str(unit) for unit in law.parameters.values())
+def units_of(law: Law, unit: str = "m") -> tuple[str, ...]:
+    """Return the units of a law's parameters as they are printed for a recording in a unit."""
+    return tuple(each.of(unit) for each in law.parameters.values())
 
 
 def words_of(law: Law) -> str:

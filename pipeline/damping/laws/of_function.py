@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.damping.laws.drag import DRAGS
-from pipeline.damping.laws.law import Law, Unit
+from pipeline.damping.laws.law import Law
 from pipeline.damping.laws.power import Power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import central_differences
+from pipeline.numerics.quantity import Unit
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.track import F8
 

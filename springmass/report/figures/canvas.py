@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.numerics.quantity import SHOWN, in_unit
+from pipeline.numerics.quantity import SHOWN, Unit
 from pipeline.track import F8
 from springmass.report.tables import page_unit
 from storage.atomic import write_whole
@@ -205,17 +205,15 @@ def value_label(what: str, unit: str) -> str:
     return f"{what} / {_in_brackets(own)}" if own else what
 
 
-def derivative_label(what: tuple[str, str], form: str, unit: str) -> str:
-    """Return the label of an axis of a derivative.
-
-    ``what`` is its name for a length and for another quantity, and ``form`` is its unit for a length.
+def derivative_label(what: tuple[str, str], order: int, unit: str) -> str:
+    """Return the label of an axis of a derivative by time; ``what`` is its name for a length and for anything else.
 
     Examples
     --------
-    >>> derivative_label(("velocity", "rate"), "m/s", "m"), derivative_label(("velocity", "rate"), "m/s", "rad")
+    >>> derivative_label(("velocity", "rate"), 1, "m"), derivative_label(("velocity", "rate"), 1, "rad")
     ('velocity / (m/s)', 'rate / (rad/s)')
     """
-    return f"{what[unit != 'm']} / {_in_brackets(in_unit(form, unit))}"
+    return f"{what[unit != 'm']} / {_in_brackets(Unit(1, -order).of(unit))}"
 
 
 def _in_brackets(unit: str) -> str:

@@ -97,7 +97,7 @@ def phase_panel(panel: Axes, analysis: Analysis) -> ScalarMappable:
         x, v = model_phase(motion, t)
         panel.plot(x * factor, v, color=colours(scale(start)), lw=1.0, label=None if i else "fitted motion")
     panel.set_xlabel(value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit))
-    panel.set_ylabel(derivative_label(("velocity", "derivative"), "m/s", unit))
+    panel.set_ylabel(derivative_label(("velocity", "derivative"), 1, unit))
     return ScalarMappable(scale, colours)
 
 

@@ -61,7 +61,7 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
     with style():
         heights = [2.2, 1.6, 1.4, 1.5]
         figure, axes = panels([1.5, *heights] if long else heights)
-        label = derivative_label(("velocity v", "derivative"), "m/s", unit)
+        label = derivative_label(("velocity v", "derivative"), 1, unit)
         if long:
             whole, *axes = axes
             keep = thinned(velocity, 2 * BINS)
@@ -75,9 +75,9 @@ def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figur
         axes[0].set_ylabel(label)
         acceleration, u_acceleration = smoothed.acceleration[rows], smoothed.u_acceleration[rows]
         _draw_value(axes[1], t[inside], acceleration[inside], u_acceleration[inside])
-        axes[1].set_ylabel(derivative_label(("acceleration a", "2nd derivative"), "m/s^2", unit))
+        axes[1].set_ylabel(derivative_label(("acceleration a", "2nd derivative"), 2, unit))
         _draw_difference(axes[2], t, factor * (velocity - model_phase(motion, t)[1]), factor * u_velocity)
-        axes[2].set_ylabel("v − law / (mm/s)" if unit == "m" else derivative_label(("", "− law"), "m/s", unit))
+        axes[2].set_ylabel("v − law / (mm/s)" if unit == "m" else derivative_label(("", "− law"), 1, unit))
         _draw_uncertainties(axes[3], t, factor * u_velocity, factor * u_acceleration, unit)
         axes[3].set_xlabel("time / s")
         share(axes[0], axes[1], start, detail)
@@ -126,7 +126,7 @@ def _draw_uncertainties(panel: Axes, t: F8, u_velocity: F8, u_acceleration: F8, 
     beside.grid(visible=False)
     labels = ("u(v) / (mm/s)", "u(a) / (mm/s²)")
     if unit != "m":
-        labels = derivative_label(("", "its u"), "m/s", unit), derivative_label(("", "its u"), "m/s^2", unit)
+        labels = derivative_label(("", "its u"), 1, unit), derivative_label(("", "its u"), 2, unit)
     for axes, u, colour, dashes, label in (
         (panel, u_velocity, BLUE, "-", labels[0]),
         (beside, u_acceleration, VERMILLION, (0, (3, 1.5)), labels[1]),

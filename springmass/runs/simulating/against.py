@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem
-from pipeline.dynamics.band import Band
-from pipeline.dynamics.sensitivity import C16
+from pipeline.dynamics.band import C16, Band
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
 from springmass.errors import UNREADABLE, ProgramError
@@ -157,12 +156,12 @@ def _moves(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> t
     """Return the least-squares change of each input alone that brings the prediction closest to the record."""
     from scipy.optimize import minimize_scalar
 
-    found, sensitivity = [], band.sensitivity
-    # Evaluated at the times of the sensitivities, whose states are a fifth of a radian apart.
-    rows = np.unique(np.searchsorted(sensitivity.t, since).clip(max=sensitivity.t.size - 1))
-    at = np.interp(sensitivity.t[rows], since, left)
-    middle = sensitivity.middle[rows]
-    for name, log in zip(sensitivity.names, sensitivity.of_log, strict=True):
+    found = []
+    # Evaluated at the times of the band, whose states are two fifths of a radian apart.
+    rows = np.unique(np.searchsorted(band.t, since).clip(max=band.t.size - 1))
+    at = np.interp(band.t[rows], since, left)
+    middle = band.middle[rows]
+    for name, log in zip(band.quantities, band.of_log, strict=True):
         if name not in values or values[name].u <= 0.0:
             continue
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from pipeline.dynamics import Problem, Trajectory, get_integrator
 from pipeline.dynamics.band import Band
-from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, solved_once
-from pipeline.dynamics.rounding import rounding_error
+from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
 from pipeline.dynamics.solve_ivp import DOP853
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError

@@ -110,6 +110,5 @@ def _band_summary(band: Band, t: F8) -> dict[str, Any]:
         "members": band.members,
         "seed": band.seed,
         "quantities": list(band.quantities),
-        "linear": band.linear,
         **widths,
     }

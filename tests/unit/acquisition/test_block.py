@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from acquisition import Block, Flag, concatenate
+from acquisition.block import Block, Flag, concatenate
 
 
 def block(first: int = 0, count: int = 4, **more: np.ndarray) -> Block:

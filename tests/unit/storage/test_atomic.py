@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import threading
 from pathlib import Path
 
 import h5py
 import pytest
 
-from storage.atomic import whole_file, whole_h5, write_whole
+from storage.atomic import whole_file, write_whole
 from storage.errors import RunExists, WriteFailed
+from storage.hdf5 import whole_h5
 
 
 def beaten_to(path: Path) -> None:
@@ -131,7 +133,7 @@ def test_a_failing_sync_fails_the_write(tmp_path: Path, monkeypatch: pytest.Monk
 def test_hdf5_is_written_whole_too(tmp_path: Path) -> None:
     """The HDF5 file comes into being complete, or not at all."""
     path = tmp_path / "analysis.h5"
-    with whole_h5(path) as file:
+    with whole_h5(path, overwrite=True) as file:
         file["a"] = 1
         assert not path.exists()
     with h5py.File(path) as file:
@@ -139,7 +141,7 @@ def test_hdf5_is_written_whole_too(tmp_path: Path) -> None:
     before = path.read_bytes()
 
     def half() -> None:
-        with whole_h5(path) as file:
+        with whole_h5(path, overwrite=True) as file:
             file["b"] = 1
             raise RuntimeError("in the middle")
 
@@ -161,13 +163,31 @@ def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
     assert write_whole(tmp_path / "a", "x").stat().st_mode == (tmp_path / "usual").stat().st_mode
 
 
-def test_what_a_killed_writer_left_goes_with_the_next_file(tmp_path: Path) -> None:
-    """A temporary file that nobody holds is removed; one that a living writer is at work on stays."""
-    remaining = tmp_path / ".old.h5.0123abcd.part"
-    remaining.write_bytes(b"half")
+def test_what_a_killed_writer_left_is_written_over(tmp_path: Path) -> None:
+    """Its temporary file goes with the next file of the name, whatever is in it."""
     with whole_file(tmp_path / "a") as working:
-        assert not remaining.exists()
-        working.write_text("mine")
-        write_whole(tmp_path / "b", "another")
-        assert working.exists()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+        name = working.name
+    (tmp_path / name).write_bytes(b"half of a long file")
+    write_whole(tmp_path / "a", "new")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "new"}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="this system has no such locks")
+def test_two_writers_of_a_file_come_one_after_the_other(tmp_path: Path) -> None:
+    """The second waits for the first, and neither's content is mixed with the other's."""
+    path, waiting = tmp_path / "a", threading.Event()
+
+    def second() -> None:
+        waiting.set()
+        write_whole(path, "second")
+
+    thread = threading.Thread(target=second)
+    with whole_file(path) as temporary:
+        temporary.write_text("fir")
+        thread.start()
+        assert waiting.wait(60)
+        thread.join(0.2)
+        assert thread.is_alive()
+        temporary.write_text("first")
+    thread.join(60)
+    assert {each.name: each.read_text() for each in tmp_path.iterdir()} == {"a": "second"}

@@ -45,7 +45,7 @@ def decode(data: bytes) -> tuple[list[tuple[float, ...]], dict[str, int]]:
     """Return sequence, device us, echo us, degC and flags of each reading, and the faults that were counted."""
     decoder = LineProtocolDecoder()
     r = decoder.feed(0, data)
-    rows = zip(r.sequence, r.device_us, r.echo_us, r.temperature_c, r.flags, strict=True)
+    rows = [(*row[1:4], row.temperature_c, flag) for row, flag in zip(r, r.flags, strict=True)]
     return [tuple(map(float, row)) for row in rows], {k: v for k, v in decoder.faults.items() if v}
 
 

@@ -209,7 +209,6 @@ def test_grams_are_no_acceleration(tmp_path: Path) -> None:
         assert caught.value.question.missing == (Missing.UNIT,)
 
 
-SETTINGS = ["Record Length,2.5e+03", "Sample Interval,5.0e-02", "Source,CH1", "Vertical Units,V", "Horizontal Units,s"]
 MONITOR = "15:00:{s:06.3f} -> "
 DIALECTS = {
     "monitor": (rows(MONITOR + "{x:.4f}"), {"unit": "m"}),
@@ -223,13 +222,6 @@ DIALECTS = {
     "words first": ("Date and Time Run 5,Time (s) Run 5,Position (m) Run 5\n" + rows("2023-10-09,{t:.3f},{x:.4f}"), {}),
     "DEF": ('DEC=2\nDEF="n";"t / s";"x / m"\n' + commas("{i}\t{t:.3f}\t{x:.4f}"), {}),
     "side by side": ("t1,x1,t2,x2\n" + rows("{s:.3f},0.5,{t:.3f},{x:.4f}"), {"channel": "x2", "unit": "m"}),
-    "settings beside": (
-        "\n".join(
-            f"{SETTINGS[i] if i < len(SETTINGS) else ','},,{a:+.6f},{b:.5f},"
-            for i, (a, b) in enumerate(zip(T, X, strict=True))
-        ),
-        {},
-    ),
     "zeros left out": ("t (s),x (m)\n" + "\n".join(f"{a:g},{b:g}" for a, b in zip(T, X, strict=True)), {}),
 }
 

@@ -11,7 +11,6 @@ from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator
-from pipeline.dynamics.amplitude import amplitude, stopping_time
 from pipeline.dynamics.terms import required
 from pipeline.errors import SceneError
 from springmass.session.simulated_bench import REST_M, bench_position
@@ -75,21 +74,6 @@ def test_laws_go_forth_and_back() -> None:
     """The coefficients of the amplitude come back from those of the equation."""
     given = {"gamma_per_s": 0.1, "beta_per_m_s": 0.3, "mu_m_per_s": 0.002}
     assert Equation.from_laws(7.0, **given).laws() == pytest.approx(tuple(given.values()), rel=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("gamma", "beta", "mu"), [(0.1, 0.0, 0.01), (0.0, 0.5, 0.01), (0.1, 0.5, 0.01), (0.1, 3.0, 0.0), (0.2, 0.1, 0.1)]
-)
-def test_the_averaged_amplitude_solves_its_equation(gamma: float, beta: float, mu: float) -> None:
-    """The derivative of the closed form is its law, until it stops at its stopping time."""
-    end = min(float(stopping_time(0.05, gamma, beta, mu)), 20.0)
-    t = np.linspace(0.0, 0.999 * end, 4001)
-    a = amplitude(0.05, gamma, beta, mu, t)
-    slope = (a[2:] - a[:-2]) / (t[2:] - t[:-2])
-    np.testing.assert_allclose(slope, -(mu + gamma * a + beta * a * a)[1:-1], rtol=1e-4)
-    if mu > 0:
-        assert amplitude(0.05, gamma, beta, mu, np.array([end * (1 - 1e-9)]))[0] < 1e-9
-        assert amplitude(0.05, gamma, beta, mu, np.array([end, 2 * end, 100 * end])).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_the_bench_moves_by_the_equation() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
+from pipeline.findings.finding import Found, word
 from pipeline.track import F8, Track
 from tests.synthetic import Truth, noisy, times
 
@@ -163,3 +164,11 @@ def test_implausible_values_are_one_warning() -> None:
     """Two masses in grams are one warning."""
     found = in_scene({"bob": {"mass_kg": 217.6}, "spring": {"mass_kg": 27.5}}).findings
     assert [f.severity for f in found if f.code == "scene_implausible"] == ["warning"]
+
+
+def test_numbers_have_the_unit_of_the_recording() -> None:
+    """A step of a length is in mm, one of a voltage in V, and the sentence names what steps."""
+    found = Found("quantised", {"step_m": 0.002, "noise_m": 1e-4})
+    assert {"distances", "2", "mm,"} <= set(word(found, "m").message.split())
+    assert {"voltages", "0.002", "V,"} <= set(word(found, "V").message.split())
+    assert word(found, "V").values == found.numbers

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -41,7 +42,9 @@ class Page:
 
         given = [(name.encode(), value.encode("latin-1")) for name, value in headers.items()]
         scope = {"type": kind, "path": path, "query_string": query.encode(), "headers": given}
-        asyncio.run(self._guarded(scope, receive, send))
+        # A browser of other tests may keep a loop running in this thread.
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(asyncio.run, self._guarded(scope, receive, send)).result()
         first = sent[0]
         got = {name.decode(): value.decode() for name, value in first.get("headers", ())}
         return int(first.get("status", 0)), got

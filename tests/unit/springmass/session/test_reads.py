@@ -11,13 +11,16 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from acquisition.block import Block, concatenate
+from acquisition.block import Block, Flag, concatenate
+from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
+from acquisition.live.serial_port import SerialPort
 from acquisition.readings import Read, Readings
 from springmass.session import reads
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
+from springmass.session.sensors import Sensor
 from storage.recorder import Recorder
 
 STEP_NS = 10_000_000
@@ -46,10 +49,8 @@ def chain() -> SensorChain:
 
 def frame(i: int) -> bytes:
     """Return one reading."""
-    return (
-        get_family("line-protocol")
-        .encoder()
-        .encode(sequence=i, device_us=i * 10_000, echo_us=1500.0 + i, distance_m=0.25, temperature_c=21.0)
+    return LineProtocolEncoder().encode(
+        sequence=i, device_us=i * 10_000, echo_us=1500.0 + i, distance_m=0.25, temperature_c=21.0
     )
 
 
@@ -156,3 +157,94 @@ def test_a_run_begins_with_the_reads_kept_from_before() -> None:
     assert [host_ns // STEP_NS for _, host_ns, _ in log.taken] == list(range(5, 21))
     np.testing.assert_allclose(block.t, met(range(5, 21)) - 0.05, atol=1e-12)
     assert block.first == 0
+
+
+class Bench:
+    """One line-protocol sensor on a port whose bytes are recorded."""
+
+    def __init__(self, address: str) -> None:
+        port = SimpleNamespace(name=address, is_network="://" in address)
+        sensor = Sensor(get_family("line-protocol"), cast(SerialPort, port), rate_hz=100.0)
+        self.chains = [sensor.chain()]
+        self.tee = Tee(self.chains, sensors=[sensor])
+        self.log = started(self.tee, self.chains, 0)
+
+    def send(self, at: int, data: bytes) -> None:
+        """Send bytes at a time in readings."""
+        self.tee.reads([(0, at * STEP_NS, data)])
+
+    def away(self, since: int, until: int) -> None:
+        """Lose the port, and let it come back."""
+        self.tee.event(0, since * STEP_NS, "lost", {"why": "cable"})
+        self.tee.event(0, until * STEP_NS, "reopened", {"gap_s": 0.01 * (until - since), "sensor": "assumed"})
+
+    @property
+    def kinds(self) -> list[str]:
+        """Channels and kinds of the recorded events."""
+        return [" ".join(event.split()[::2][:2]) for event in self.log.events]
+
+
+def test_a_sensor_that_returns_begins_a_channel_with_its_own_time() -> None:
+    """On a cable: what is sent afterwards is in the next channel, whose times begin anew."""
+    bench = Bench("/dev/ttyUSB0")
+    bench.send(0, frame(0) + frame(1))
+    bench.away(2, 200)
+    bench.send(201, frame(201) + frame(202))
+    assert bench.kinds == ["0 lost", "0 replaced", "1 continues"]
+    assert [(channel, data) for channel, _, data in bench.log.taken] == [
+        (0, frame(0) + frame(1)),
+        (1, frame(201) + frame(202)),
+    ]
+    (_, first), (channel, second) = bench.tee.blocks()
+    assert (len(first), channel, bench.tee.first) == (2, 1, 1)
+    np.testing.assert_allclose(second.t, met([201, 202]) - 2.01, atol=1e-12)
+    assert not second.flags.any()
+    assert bench.tee.absent(203 * STEP_NS) == []
+    assert bench.tee.absent(400 * STEP_NS) == [0]
+
+
+@pytest.mark.parametrize(("runs_on", "kinds"), [(True, ["0 lost", "0 reopened"]), (False, ["0 lost", "0 replaced"])])
+def test_behind_a_break_of_the_network_the_part_goes_on_if_the_counter_does(runs_on: bool, kinds: list[str]) -> None:
+    """Its first whole reading decides, and no byte before that is lost; the gap has its length."""
+    bench = Bench("socket://sensor:23")
+    for i in range(3):
+        bench.send(i, frame(1000 + i))
+    bench.away(3, 200)
+    first = 1201 if runs_on else 5
+    bench.send(201, frame(1200)[20:])
+    bench.send(202, frame(first)[:9])
+    assert len(bench.log.taken) == 3
+    bench.send(203, frame(first)[9:])
+    bench.send(204, frame(first + 1))
+    assert bench.kinds[:2] == kinds
+    assert b"".join(data for _, _, data in bench.log.taken[3:6]) == frame(1200)[20:] + frame(first)
+    assert {channel for channel, _, _ in bench.log.taken[3:]} == {0 if runs_on else 1}
+    block = concatenate([block for channel, block in bench.tee.blocks() if channel == bench.tee.first])
+    sent = [1000, 1001, 1002, 1201, 1202] if runs_on else [5, 6]
+    np.testing.assert_allclose(block.t, met(sent) - 0.01 * sent[0], atol=1e-12)
+    assert block.flags.tolist() == ([0, 0, 0, Flag.GAP_BEFORE, 0] if runs_on else [0, 0])
+
+
+def test_what_a_network_port_sent_before_it_was_lost_again_is_recorded() -> None:
+    """Bytes that show no reading stay in the channel before, so that the run over a poor network is one."""
+    for lost in (True, False):
+        bench = Bench("socket://sensor:23")
+        bench.send(0, frame(0))
+        bench.away(1, 100)
+        bench.send(101, b"half a li")
+        if lost:
+            bench.tee.event(0, 102 * STEP_NS, "lost", {"why": "cable"})
+        bench.tee.stop()
+        assert bench.log.taken[1:] == [(0, 101 * STEP_NS, b"half a li")]
+        assert bench.kinds == ["0 lost", *(["0 lost"] if lost else [])]
+        assert bench.tee.absent(103 * STEP_NS) == ([0] if lost else [])
+
+
+def test_a_sensor_that_was_away_when_the_run_began_has_one_part() -> None:
+    """Nothing of it is in the run before, so what it sends is the first part."""
+    bench = Bench("/dev/ttyUSB0")
+    bench.away(0, 100)
+    bench.send(101, frame(7))
+    assert bench.kinds == ["0 lost"]
+    assert bench.log.taken == [(0, 101 * STEP_NS, frame(7))]
+    assert bench.tee.gone == {}

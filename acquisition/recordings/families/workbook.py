@@ -1,0 +1,87 @@
+"""Workbooks, xlsx and xls (python-calamine): every sheet with rows of numbers is a run.
+
+Cells are binary numbers without printed decimals; a column has as many decimals as its longest number needs for the
+fifteen digits that a workbook shows. Times of day and dates are separate types of cells. A file of a few bytes can make
+calamine reserve any amount of memory, and crash its process if there is not enough, so calamine runs in a child process
+with limits of time and memory.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import partial
+
+from acquisition.errors import FormatError
+from acquisition.recordings.families import workbook_child
+from acquisition.recordings.families.archive import tables_of_parts
+from acquisition.recordings.foreign import foreign_format
+from acquisition.recordings.identify import formats
+from acquisition.recordings.tables.dialect import tables_of_text
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.rows import Sheet
+from acquisition.recordings.tables.table import Table
+
+MOST_BYTES = 1 << 27
+"""Maximum size of a workbook, bytes."""
+MOST_LETTERS = 1 << 27
+"""Maximum number of characters of all cells; a number counts as eight."""
+MEMORY_BYTES = 1 << 30
+"""Memory limit of the child process, bytes: a million rows of three columns take 600 MB."""
+TIME_LIMIT_S = 60.0
+"""Time limit of the child process: a million rows of three columns take 10 s on a laptop of 2020."""
+
+_ZIP = b"PK\x03\x04"
+_OLE = bytes.fromhex("d0cf11e0a1b11ae1")
+_REMEDY = "export the sheet as CSV"
+_HEAD_LINES = 300
+
+
+def _evidence(head: bytes) -> str:
+    if head.startswith(_OLE):
+        return "it begins with the bytes of an OLE file, as xls does"
+    sheets = b"[Content_Types].xml" in head or b"xl/" in head
+    return "it is a zip archive with the parts of an xlsx" if head.startswith(_ZIP) and sheets else ""
+
+
+def _tables(path: str, data: bytes) -> list[Table]:
+    if len(data) > MOST_BYTES:
+        raise FormatError(path, f"expected a workbook of at most {MOST_BYTES} bytes, got {len(data)}", _REMEDY)
+    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.header is not None]
+
+    def reader(name: str, sheet: Sheet) -> Callable[[], list[Table]] | None:
+        lines = [line.text for line in sheet.head(_HEAD_LINES)]
+        header = next((each.header for each in families if lines and each.header and each.header(lines)), None)
+        return None if header is None else partial(tables_of_text, f"{path}, sheet {name}", sheet, header, "rows")
+
+    return tables_of_parts(path, ((name, reader(name, sheet)) for name, sheet in _sheets(path, data)), "sheet")
+
+
+def _sheets(path: str, data: bytes) -> list[tuple[str, Sheet]]:
+    """Return the name and the cells of every sheet, as read by the child process."""
+    # With -P the folder of the script is not searched for modules. subprocess also works inside a worker of a pool.
+    command = [sys.executable, "-P", workbook_child.__file__, str(MEMORY_BYTES), str(MOST_LETTERS)]
+    try:
+        done = subprocess.run(command, input=data, capture_output=True, timeout=TIME_LIMIT_S, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise FormatError(path, f"expected a workbook that opens within {TIME_LIMIT_S:g} s", _REMEDY) from error
+    except OSError as error:
+        problem = f"the process that reads workbooks cannot be started ({error.strerror})"
+        raise FormatError(path, problem, _REMEDY) from error
+    if done.returncode:
+        reason = done.stderr.decode("utf-8", "replace").strip().partition("\n")[0].strip()[:200] or "no message"
+        problem = f"the process that reads workbooks ended with status {done.returncode} ({reason})"
+        raise FormatError(path, problem, _REMEDY)
+    answer = json.loads(done.stdout)
+    if "refused" in answer:
+        raise foreign_format(path, b"") or FormatError(
+            path, f"calamine cannot read it ({answer['refused'][:200]})", _REMEDY
+        )
+    return [(name, Sheet(tuple(map(tuple, columns)))) for name, columns in answer["sheets"]]
+
+
+FORMAT = ColumnFormat(
+    "workbook", "workbook, xlsx or xls: every sheet with rows of numbers is a run", _evidence, _tables
+)

@@ -1,0 +1,93 @@
+"""The child process that reads a workbook with calamine: bytes on standard input, JSON in UTF-8 on standard output.
+
+This file is run as a script, by its path. It imports neither numpy nor the package around it, whose name differs
+between a checkout and a wheel, so that it starts in a few hundredths of a second. Its arguments are the memory limit,
+in bytes, and the maximum number of characters to write.
+
+The JSON is ``{"sheets": [[name, columns], ...]}``, each column a list of numbers and texts, or ``{"refused": reason}``.
+"""
+
+from __future__ import annotations
+
+import datetime
+import io
+import json
+import math
+import sys
+from typing import Any
+
+_DIGITS = 15
+_BLANK = str.maketrans("\t\r\n", "   ")
+
+
+Cell = float | str
+
+
+def read_sheets(data: bytes, most_letters: int) -> list[tuple[str, list[list[Cell]]]]:
+    """Return the name and the columns of every sheet; raise an error if all texts together have too many characters."""
+    from python_calamine import CalamineWorkbook
+
+    book = CalamineWorkbook.from_object(io.BytesIO(data))
+    sheets = []
+    letters = 0
+    for name in book.sheet_names:
+        rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+        columns = []
+        for column in zip(*rows, strict=True):
+            columns.append([_rounded(cell) if _is_number(cell) else _word(cell) for cell in column])
+            letters += sum(len(cell) if isinstance(cell, str) else 8 for cell in columns[-1])
+            if letters > most_letters:
+                raise ValueError("its cells are too many or too long")
+        sheets.append((name, columns))
+    return sheets
+
+
+def _rounded(number: float) -> Cell:
+    """Round to the digits that spreadsheet programs show and compute with; infinite numbers become text."""
+    return float(f"{number:.{_DIGITS}g}") if math.isfinite(number) else str(number)
+
+
+def _is_number(cell: object) -> bool:
+    """Return whether a cell is a number; an xls has two types of numbers."""
+    return isinstance(cell, (int, float)) and not isinstance(cell, bool)
+
+
+def _word(cell: object) -> str:
+    """Return a cell that is not a number as text; a duration is given in seconds."""
+    if isinstance(cell, datetime.timedelta):
+        return f"{cell.total_seconds():g}"
+    if isinstance(cell, datetime.datetime):
+        return cell.isoformat(" ")
+    if isinstance(cell, datetime.time):
+        return cell.isoformat()
+    return "" if cell is None else str(cell).translate(_BLANK).strip()
+
+
+def _limit_memory(most_bytes: int) -> None:
+    """Limit the memory of this process, if the system can, and prevent core files."""
+    if sys.platform in ("win32", "darwin"):  # Windows has no such limit, and macOS does not enforce it
+        return
+    import resource
+
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    resource.setrlimit(resource.RLIMIT_AS, (most_bytes if hard < 0 else min(most_bytes, hard), hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def main() -> None:
+    """Read a workbook from standard input and write JSON to standard output."""
+    most_bytes, most_letters = map(int, sys.argv[1:])
+    _limit_memory(most_bytes)
+    answer: dict[str, Any]
+    try:
+        answer = {"sheets": read_sheets(sys.stdin.buffer.read(), most_letters)}
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:
+        # calamine raises an error for most damage. For the rest Rust panics, and that error is not an ``Exception``.
+        answer = {"refused": " ".join(str(error).split()) or type(error).__name__}
+    sys.stdout.buffer.write(json.dumps(answer, ensure_ascii=False).encode())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,225 @@
+"""Cells of rows of text as numbers: their values as printed, and how many decimals are printed."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.block import B1, F8, I8
+
+I1 = NDArray[np.int8]
+NAN, EMPTY, UNREAD = -1, -2, -3
+"""In place of a number of decimals: the word NaN, an empty cell, a cell that is not a number."""
+EXPONENT = 64
+"""Added to the number of decimals of the mantissa if a number has an exponent."""
+
+_CELL = re.compile(r"([+-]?(?:\d+[.,]?(\d*)|[.,](\d+)))(?:[eE]([+-]?\d{1,3}))?", re.ASCII)
+_LONGEST = 64  # bytes of a cell that are examined; longer cells are rare and are read one by one
+_DIGIT, _SIGN, _MARK, _E, _OTHER = 1, 2, 3, 4, 5
+_KINDS = np.full(256, _OTHER, np.uint8)
+for _kind, _characters in ((0, b"\0"), (_DIGIT, b"0123456789"), (_SIGN, b"+-"), (_MARK, b".,"), (_E, b"eE")):
+    _KINDS[list(_characters)] = _kind
+_DAMAGE = bytes.maketrans(b"\0\x0b\x0c\x1c\x1d\x1e\x1f", b"?" * 7)
+"""Control characters that numpy or ``split`` would ignore: a number next to one may have lost digits."""
+_BLOCK = 65536
+_MOST_EXACT, _MOST_TENS = 1e15, 22  # whole numbers and powers of ten up to here are exact in binary
+_TENS = np.array([float(f"1e{power}") for power in range(_MOST_TENS + 1)])
+CLOCK = re.compile(
+    r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?"
+    r"(?:(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d{1,9})?))?|(?P<m2>\d{1,2}):(?P<s2>\d\d[.,]\d{1,9}))"
+    r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
+    re.ASCII,
+)
+
+
+def cell(text: str) -> tuple[float, int]:
+    """Return the number in a cell, with a point or a comma, and its printed decimals; NaN and a code if there is none.
+
+    This is stricter than ``float()``: it rejects ``1_000``, ``inf``, digits of other scripts, and overflow.
+    """
+    if not text:
+        return math.nan, EMPTY
+    match = _CELL.fullmatch(text)
+    if match is None:
+        return math.nan, NAN if text.lower() in ("nan", "-nan", "+nan") else UNREAD
+    value = float(text.replace(",", "."))
+    if not math.isfinite(value):
+        return math.nan, UNREAD
+    decimals = min(len(match[2] or match[3] or ""), EXPONENT - 1)
+    return value, decimals + (EXPONENT if match[4] else 0)
+
+
+def clock_s(cell: str) -> tuple[str, float, int] | None:
+    """Return the printed date, the second of the day and the number of decimals; None for any other text."""
+    match = CLOCK.fullmatch(cell)
+    if match is None:
+        return None
+    hour = int(match["h"] or 0)
+    hour = hour % 12 + 12 * (match["half"][0] in "pP") if match["half"] else hour
+    seconds = (match["s"] or match["s2"] or "0").replace(",", ".")
+    decimals = len(seconds.partition(".")[2])
+    at = hour * 3600 + int(match["m"] or match["m2"]) * 60 + float(seconds)
+    return (match["date"] or "").strip(" ,T"), round(at, decimals), decimals
+
+
+def clock_times(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
+    """Return times of day in seconds, the decimals of each, and a mask without commas, as :func:`read_cells` does."""
+    plain = [each.strip(b'"') for each in cells]
+    if all(len(each) >= 8 and each[2:3] == each[5:6] == b":" and each[6:8].isdigit() for each in plain):
+        hours, minutes = (read_cells([each[at : at + 2] for each in plain])[0] for at in (0, 3))
+        values, decimals, _ = read_cells([each[6:] for each in plain])
+        if (decimals >= 0).all() and np.isfinite(hours + minutes).all():
+            return hours * 3600.0 + minutes * 60.0 + values, decimals, np.zeros(values.size, bool)
+    values, decimals = np.full(len(plain), np.nan), np.full(len(plain), UNREAD, np.int8)
+    for row, each in enumerate(plain):
+        if (time := clock_s(each.decode("latin-1"))) is not None:
+            _, values[row], decimals[row] = time
+    return values, decimals, np.zeros(values.size, bool)
+
+
+def parse_number(text: str) -> float | None:
+    """Return the number in a cell, which may be NaN; None for any other text."""
+    value, decimals = cell(text)
+    return None if decimals in (EMPTY, UNREAD) else value
+
+
+def split_page(page: bytes, delimiter: str, *, brackets: bool = False) -> list[list[bytes]]:
+    """Split whole lines into cells without blanks and quotes; an empty list for a blank line.
+
+    The delimiter is empty for runs of white space. With brackets, ``[``, ``]`` and ``;`` are blanks.
+    """
+    page = page.translate(_DAMAGE).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if brackets:
+        page = page.translate(bytes.maketrans(b"[];", b"   "))
+    lines = page.split(b"\n")
+    if not lines[-1]:
+        lines.pop()
+    if not delimiter:
+        return [line.split() if b'"' not in line else _quoted(line.replace(b"\t", b" "), " ") for line in lines]
+    mark = delimiter.encode()
+    if b'"' not in page and b" " not in page and b"\t" not in page.replace(mark, b""):
+        return [line.split(mark) if line.strip(b"\t") else [] for line in lines]
+    return [
+        ([each.strip(b" ") for each in line.split(mark)] if b'"' not in line else _quoted(line, delimiter))
+        if line.strip(b" \t")
+        else []
+        for line in lines
+    ]
+
+
+def _quoted(line: bytes, delimiter: str) -> list[bytes]:
+    text = line.decode("latin-1")
+    try:
+        cells = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True, strict=True), [])
+    except csv.Error:  # a quote without its partner: the cell is damaged
+        cells = text.split(delimiter)
+    return [each.strip(" ").encode("latin-1") for each in cells if each or delimiter != " "]
+
+
+def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
+    """Return the values and decimals of the cells of a column, as :func:`cell` gives them, and which have a comma."""
+    longest = max(map(len, cells))
+    text = np.array(cells if longest <= _LONGEST else [each[: _LONGEST + 1] for each in cells], np.bytes_)
+    raw = text.view(np.uint8).reshape(text.size, -1)
+    kinds = _KINDS[raw]
+    lengths, marks = np.count_nonzero(kinds, axis=1), kinds == _MARK
+    marked, digits = np.count_nonzero(marks, axis=1), np.count_nonzero(kinds == _DIGIT, axis=1)
+    fixed = (digits + marked + (kinds[:, 0] == _SIGN) == lengths) & (digits > 0) & (marked <= 1)
+    fixed &= lengths <= _LONGEST
+    values = np.full(text.size, np.nan)
+    places = np.where(marked == 1, lengths - 1 - marks.argmax(axis=1), 0)
+    decimals = np.where(lengths == 0, EMPTY, np.minimum(places, EXPONENT - 1)).astype(np.int8)
+    comma = raw == ord(",")
+    raw[comma] = ord(".")
+    values[fixed] = text[fixed].astype(np.float64)
+    rest = ~fixed & (lengths > 0)
+    if rest.any() and not (kinds[rest] == _OTHER).any() and _exponents(text, kinds, places, rest, values, decimals):
+        return values, decimals, comma.any(axis=1)
+    for row in np.flatnonzero(rest).tolist():
+        values[row], decimals[row] = cell(cells[row].decode("latin-1"))
+    return values, decimals, comma.any(axis=1)
+
+
+def _exponents(
+    text: NDArray[np.bytes_], kinds: NDArray[np.uint8], places: I8, rows: B1, values: F8, decimals: I1
+) -> bool:
+    """Read the numbers in some rows, if all have a mantissa with a mark, and an exponent of up to three digits."""
+    letters = kinds[rows] == _E
+    exponent = np.count_nonzero(kinds[rows], axis=1) - letters.argmax(axis=1)  # with its letter
+    own = places[rows] - exponent
+    if not ((letters.sum(axis=1) == 1) & (own >= 0) & (own < EXPONENT) & (exponent <= len("e-99"))).all():
+        return False
+    try:
+        read = text[rows].astype(np.float64)
+    except ValueError:
+        return False
+    if not np.isfinite(read).all():
+        return False
+    values[rows], decimals[rows] = read, own + EXPONENT
+    return True
+
+
+def scaled(values: F8, decimals: I1 | None, power: int) -> F8:
+    """Return printed numbers times ten to a power, each rounded only once; binary numbers are only multiplied.
+
+    A number printed with d decimals is a whole number over 10**d, so it is divided once by 10**(d - power).
+    """
+    if decimals is None:
+        result: F8 = values / 10.0**-power if power else values.copy()
+        return result
+    scaled_values = values.copy()
+    for start in range(0, values.size if power else 0, _BLOCK):  # blocks take little memory
+        rows = slice(start, start + _BLOCK)
+        _scale(scaled_values[rows], decimals[rows], power)
+    return scaled_values
+
+
+def _scale(values: F8, decimals: I1, power: int) -> None:
+    places = np.clip(decimals, 0, _MOST_TENS).astype(np.int64)
+    net = places - power
+    near = np.minimum(np.abs(net), _MOST_TENS)
+    with np.errstate(over="ignore", invalid="ignore"):  # these numbers are not exact, and are scaled below
+        whole = np.rint(values * _TENS[places])
+        exact = (decimals >= 0) & (decimals <= _MOST_TENS) & (np.abs(net) <= _MOST_TENS) & (np.abs(whole) < _MOST_EXACT)
+        result = np.where(net >= 0, whole / _TENS[near], whole * _TENS[near])
+    for row in np.flatnonzero(~exact & np.isfinite(values)).tolist():
+        mantissa, _, exponent = repr(float(values[row])).partition("e")
+        result[row] = float(f"{mantissa}e{int(exponent or 0) + power}")
+    values[:] = np.where(np.isfinite(values), result, np.nan)
+
+
+def usual_decimals(decimals: I1) -> tuple[int, bool]:
+    """Return the most frequent number of decimals (of two, the greater), and whether numbers usually have exponents."""
+    counts = np.bincount(decimals[decimals >= 0], minlength=2 * EXPONENT)
+    exponents = bool(counts[EXPONENT:].sum() > counts[:EXPONENT].sum())
+    half = counts[EXPONENT:] if exponents else counts[:EXPONENT]
+    return (int(half.size - 1 - half[::-1].argmax()) if half.any() else 0), exponents
+
+
+def is_cut(values: F8, decimals: I1) -> bool:
+    """Return whether the last number of a column, at the end of a text without a line end, may have lost digits.
+
+    It is complete if it has the decimals that its column always prints. In a column of varying or no decimals nothing
+    shows that it is complete. Decimals vary if trailing zeros are not printed: several numbers are then shorter, and
+    none of the usual length ends in zero.
+    """
+    if decimals[-1] < 0 or decimals.size == 1:
+        return False
+    usual, exponents = usual_decimals(decimals)
+    form = usual + EXPONENT * exponents
+    numbers = decimals[(decimals >= 0) & (exponents | (decimals < EXPONENT))]
+    others = int(np.count_nonzero(numbers != form))
+    if usual == 0 or others > 0.1 * numbers.size:
+        return True
+    if others >= 2:
+        alike = np.abs(values[decimals == form])
+        with np.errstate(divide="ignore"):
+            size = np.where(alike > 0, np.floor(np.log10(alike)), 0.0) if exponents else 0.0
+        if not (np.rint(alike / 10.0**size * 10.0**usual) % 10 == 0).any():
+            return True
+    return int(decimals[-1]) != form

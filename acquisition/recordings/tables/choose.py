@@ -1,0 +1,231 @@
+"""Choose a channel according to the user's answers, and ask for information that neither file nor user states."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from acquisition.block import F8
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.questions import Missing, MissingItem, Question, Times
+from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.nominal import median
+from acquisition.recordings.sampling.timing import rate_needed
+from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
+from acquisition.recordings.tables.table import Column, Table
+from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_power, unit_words
+
+_SLOW_S = 0.999
+"""Time steps of a second or more without a unit may be milliseconds, so their unit must be stated."""
+_FIRST_ROWS = 50
+_SHARE_OF_RESTARTS = 0.2
+_EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
+"""Units of times since 1970, each with the minimum of the numbers to which it applies."""
+_LIKELY = (
+    (re.compile(r"gyr|omega|ω|ang\w*[ _.]*(vel|speed|ges)|winkelges|^g[xyz](?![^\W_])", re.IGNORECASE), "rad/s"),
+    (re.compile(r"acc|beschl|versn|^a[xyz](?![^\W_])|g[-_ ]?f|^ac[xyz]", re.IGNORECASE), "m/s2"),
+    (re.compile(r"vel|speed|^v(?![^\W\d_])|^v[xyz](?![^\W_])|geschw", re.IGNORECASE), "m/s"),
+    (re.compile(r"theta|θ|phi|φ|ang|winkel|rad|rotat|roll|pitch|yaw", re.IGNORECASE), "rad"),
+    (re.compile(r"volt|spannung|^ch|signal|tens|^ai?\d|ampl", re.IGNORECASE), "V"),
+    (re.compile(r"force|kraft|forza|fuerza", re.IGNORECASE), "N"),
+)
+
+Channel = tuple[Table, Column]
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """The user's statements about a file; None for each item that is not stated."""
+
+    channel: str | None = None
+    rate_hz: float | None = None
+    unit: str | None = None
+    run: str | None = None
+    time: str | None = None
+    time_unit: str | None = None
+
+
+def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Channel:
+    """Return the channel to read, in a table with its times, or ask for everything that is missing in one question."""
+    needs: list[MissingItem] = []
+    runs = tuple(dict.fromkeys(table.run for table in tables))
+    if answers.run is None and len(runs) > 1:
+        needs.append(MissingItem(Missing.RUN, runs, runs[0]))
+    run = _run_of_name(path, runs, answers.run)
+    channels = [(table, column) for table in tables if table.run == run for column in table.columns]
+    if answers.channel is not None:
+        table, column = channels[_index_of_name(path, [each for _, each in channels], answers.channel)]
+    else:
+        fit = _candidates([each for each in channels if each[1].name != answers.time] or channels)
+        table, column = next((each for each in fit if each[1].measure), fit[0])
+        if len(fit) > 1:
+            needs.append(MissingItem(Missing.CHANNEL, tuple(each.name for _, each in fit), column.name))
+    if answers.time is not None:
+        table = _timed_by(path, table, column, answers.time)
+    if table.times is not None and table.lines is not None and _restarts(table.times):
+        table = replace(table, times=None, formula=None)  # chunks of times, with unknown intervals between them
+    if answers.time_unit is not None:
+        table = _with_time_unit(path, table, answers.time_unit)
+    needs.extend(_missing_times([each for _, each in channels], table, column, answers))
+    if column.measure is None and answers.unit is None:
+        needs.append(_unit_needed(column))
+    if needs:
+        labels = tuple(each.label for _, each in channels)
+        raise NeedsAnswer(Question(path, tuple(needs), labels, _range_of(table.times)))
+    return table, column
+
+
+def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple[Trap, ...]]:
+    """Return the measure of a channel's values, and the assumptions made for it."""
+    stated = column.measure
+    given = None if unit is None else measure_of(unit)
+    if unit is not None and given is None:
+        raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
+    if given is None:
+        if stated is None:
+            raise NeedsAnswer(Question(path, (_unit_needed(column),), (column.label,)))
+        return stated, ()
+    if stated == given:
+        return given, ()
+    if stated is not None and (stated.quantity in ("length", given.quantity)):
+        problem = f'unit must be {unit_words(column.unit)} as stated by "{column.label}", got "{unit}"'
+        raise FormatError(path, problem, "leave the unit out")
+    if not column.unit:
+        return given, (Trap("unit_given", f'you stated the unit of "{column.name}": {unit}'),)
+    holds = "times, frequencies and damping rates are not affected"
+    if given.quantity == "number":
+        return given, (Trap("unit_given", f'"{column.label}" is read as plain numbers, as you asked; {holds}'),)
+    kind = f"is no {'distance' if given.quantity == 'length' else given.quantity.replace('_', ' ')}"
+    holds += ", but everything in metres is in that unit" if given.quantity == "length" else ""
+    message = f'"{column.label}" {kind}: one {column.unit} counts as one {unit}, as you asked; {holds}'
+    return given, (Trap("unit_assumed", message),)
+
+
+def _candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
+    """Return the possible channels if the user names none: the lengths, or else all but auxiliary columns."""
+    fit = [each for each in channels if not each[1].aside] or channels
+    return [each for each in fit if each[1].is_length] or fit
+
+
+def _run_of_name(path: str, runs: Sequence[str], run: str | None) -> str:
+    if run is None or run == runs[0]:
+        return runs[0]
+    if runs == ("",):
+        raise FormatError(path, f'the file has one run without a name, got run "{run}"', "leave run out")
+    alike = [name for name in runs if name == run] or [name for name in runs if _plain(name) == _plain(run)]
+    # "2" is enough for "Run #2".
+    alike = alike or [name for name in runs if re.fullmatch(rf"\D*#?\s*0*{re.escape(run.strip())}", name)]
+    if len(alike) == 1:
+        return alike[0]
+    reason = f'run "{run}" ' + (f"is the name of {len(alike)} runs" if alike else "is not in the file")
+    raise NeedsAnswer(Question(path, (MissingItem(Missing.RUN, tuple(runs), runs[0]),), reason=reason))
+
+
+def _index_of_name(path: str, columns: Sequence[Column], name: str, what: Missing = Missing.CHANNEL) -> int:
+    """Return the index of the column with a name, which may include the unit, or ask which one is meant."""
+    forms = (lambda each: each.name == name, lambda each: each.label == name)
+    wanted = _plain(name)
+    for fits in (*forms, lambda each: wanted in (_plain(each.label), _plain(each.name))):
+        alike = [at for at, each in enumerate(columns) if fits(each)]
+        if len(alike) == 1:
+            return alike[0]
+        if alike:
+            break
+    choices = tuple(each.name for each in columns)
+    reason = f'{what} "{name}" ' + (f"is the name of {len(alike)} columns" if alike else "is not in the file")
+    raise NeedsAnswer(Question(path, (MissingItem(what, choices, choices[0]),), reason=reason))
+
+
+def _plain(name: str) -> str:
+    match = BRACKETED.fullmatch(name.strip())
+    if match and match["name"]:
+        name = f"{match['name']} ({unit_words(match['unit'])})"
+    return " ".join(name.lower().split())
+
+
+def _timed_by(path: str, table: Table, column: Column, time: str) -> Table:
+    """Return the table with another column as its times, named with or without its unit, or by its number."""
+    beside = table.beside or table.columns
+    plain = " ".join(name_and_unit(time)[0].lower().split())
+    number = re.fullmatch(r"column (\d{1,4})", plain)
+    at = next((at for at, each in enumerate(beside) if plain == " ".join(each.name.lower().split())), None)
+    if at is None and number and 0 < int(number[1]) <= len(beside):
+        at = int(number[1]) - 1
+    if at is None:
+        others = [each for each in table.columns if each.values is not column.values] or [column]
+        times = others[_index_of_name(path, others, time, Missing.TIME)]
+    else:
+        times = beside[at]
+    if table.times is not None and times.values is table.times.values:
+        return table
+    if times.values is column.values:
+        raise FormatError(path, f'"{time}" cannot be both channel and time', "name another column for one of them")
+    if table.lines is None and times.values.size != column.values.size:
+        raise FormatError(path, f'"{time}" and "{column.name}" differ in length', "name another column of times")
+    unit = times.unit if time_power(times.unit) is not None else ""
+    return replace(table, times=replace(times, unit=unit), formula=None)
+
+
+def _with_time_unit(path: str, table: Table, unit: str) -> Table:
+    if time_power(unit) is None:
+        raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
+    if table.times is None:
+        raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
+    stated = unit_words(table.times.unit)
+    if time_power(stated) is not None and stated != unit_words(unit):
+        raise FormatError(path, f'time unit must be {stated} as stated by the file, got "{unit}"', "leave it out")
+    return replace(table, times=replace(table.times, unit=unit))
+
+
+def _missing_times(columns: Sequence[Column], table: Table, column: Column, answers: Answers) -> list[MissingItem]:
+    if not table.is_timed:
+        if answers.rate_hz is not None:
+            return []
+        others = tuple(each.name for each in columns if each.name != column.name)
+        return [rate_needed(MissingItem(Missing.TIME, others, others[0]) if others else None)]
+    if table.times is None or table.formula is not None or time_power(table.times.unit) is not None:
+        return []
+    first = _first_numbers(table.times)
+    if table.times.unit or (first.size > 1 and float(median(np.diff(first))) >= _SLOW_S):
+        unit, name = table.times.unit, table.times.name
+        return [MissingItem(Missing.TIME_UNIT, tuple(TIMES), _likely_time_unit(first), of=name, stated=unit)]
+    return []
+
+
+def _unit_needed(column: Column) -> MissingItem:
+    likely = next((unit for words, unit in _LIKELY if words.search(column.name)), "m")
+    example = "1" if column.unit else likely
+    others = (unit for unit in MEASURES if unit != unit_words(example))
+    return MissingItem(Missing.UNIT, (example, *others), example, of=column.name, stated=column.unit)
+
+
+def _likely_time_unit(times: F8) -> str:
+    """Return the most likely unit of times, judging by their size and their steps."""
+    if times.size < 2:
+        return "ms"
+    since_1970 = next((unit for from_size, unit in _EPOCHS if times[0] >= from_size), None)
+    return since_1970 or ("us" if median(np.diff(times)) >= 1000.0 else "ms")
+
+
+def _restarts(times: Column) -> bool:
+    """Return whether times repeatedly jump back, as in chunks of a few samples."""
+    steps = np.diff(_first_numbers(times))
+    return bool(steps.size >= 4 and np.mean(steps < 0) >= _SHARE_OF_RESTARTS)
+
+
+def _first_numbers(column: Column) -> F8:
+    head = column.values[: 10 * _FIRST_ROWS]
+    return head[np.isfinite(head)][:_FIRST_ROWS]
+
+
+def _range_of(times: Column | None) -> Times | str:
+    """Return the range of times, only their name if there are too few numbers, or an empty text without times."""
+    if times is None:
+        return ""
+    first, known = _first_numbers(times), times.values[np.isfinite(times.values)]
+    if first.size < 2:
+        return times.name or "time"
+    return Times(times.name or "time", float(first[0]), float(known[-1]), median(np.diff(first)))

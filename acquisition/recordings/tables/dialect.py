@@ -1,0 +1,154 @@
+"""Families of text that differ only in what stands above their rows: one function reads these lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+from acquisition.errors import FormatError
+from acquisition.recordings.recording import Trap
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.headings import Heading
+from acquisition.recordings.tables.rows import Sheet, read_rows
+from acquisition.recordings.tables.table import Formula, Table, side_by_side
+from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
+
+_HEAD_LINES = 300
+_MOST_RUNS = 5000
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What the lines above the rows of a text say.
+
+    Parameters
+    ----------
+    why : str
+        A few words on why the text belongs to its family.
+    lines : int
+        Number of lines above the rows.
+    delimiter : str
+        The separator of cells; empty for runs of white space.
+    headings : sequence of Heading
+        One for each column.
+    formula : Formula or None
+        The times, if no column contains them.
+    run, title, start_time : str
+    ragged : bool
+        Whether a channel may end before its times, because longer channels share them.
+    traps : tuple of Trap
+        Remarks on the file as a whole.
+    clock : int or None
+        A column of times of day.
+    brackets : bool
+        Whether rows are a matrix of MATLAB, in brackets and with semicolons at their ends.
+    """
+
+    why: str
+    lines: int
+    delimiter: str
+    headings: Sequence[Heading]
+    formula: Formula | None = None
+    run: str = ""
+    title: str = ""
+    start_time: str = ""
+    ragged: bool = False
+    traps: tuple[Trap, ...] = ()
+    clock: int | None = None
+    brackets: bool = False
+
+
+def text_format(
+    name: str,
+    title: str,
+    header: Callable[[Sequence[str]], Header | None],
+    *,
+    expected: str = "other lines above the rows",
+    prepare: Callable[[Text], Text] | None = None,
+    blocks: Callable[[Text, Header], Iterator[tuple[Line, Header]]] | None = None,
+) -> ColumnFormat:
+    """Return a format of text whose rows follow below some lines that identify it.
+
+    Parameters
+    ----------
+    name, title : str
+        Name in the registry and on the command line, and one line for the user.
+    header : callable
+        Takes the first lines of a text; returns what they say, or None for lines of another family. It never raises.
+    expected : str, optional
+        What the lines above the rows should be, for an error message.
+    prepare : callable, optional
+        Takes the text and returns it without what precedes its rows.
+    blocks : callable, optional
+        Takes the text and its first header; yields the first line and the header of each further run below.
+
+    Returns
+    -------
+    ColumnFormat
+    """
+
+    def evidence(head: bytes) -> str:
+        lines = head_lines(head)
+        if prepare is not None and lines != [""]:
+            lines = [line.text for line in prepare(Text.of(head)).head(_HEAD_LINES)]
+        found = header(lines[:_HEAD_LINES])
+        return found.why if found else ""
+
+    def tables(path: str, data: bytes) -> list[Table]:
+        text = text_of(path, data)
+        return tables_of_text(path, prepare(text) if prepare else text, header, expected, blocks)
+
+    return ColumnFormat(name, title, evidence, tables, header)
+
+
+def tables_of_text(
+    path: str,
+    text: Text | Sheet,
+    header: Callable[[Sequence[str]], Header | None],
+    expected: str,
+    blocks: Callable[[Text, Header], Iterator[tuple[Line, Header]]] | None = None,
+) -> list[Table]:
+    """Read a text or a sheet: its header, the rows below it, and further runs with their headers."""
+    head = text.head(_HEAD_LINES)
+    found = header([line.text for line in head] or [""])
+    if found is None or not head:
+        raise FormatError(path, f"expected {expected}", "export the run again", line=1)
+    begins = [(head[0], found)]
+    if blocks is not None and isinstance(text, Text):
+        begins += islice(blocks(text, found), _MOST_RUNS)
+    if len(begins) > _MOST_RUNS:
+        raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
+    if len(begins) == 1:
+        return _tables(path, text, head[0], replace(found, run=""), None)
+    title = " / ".join([each.title for _, each in begins if each.title][:4])
+    tables: list[Table] = []
+    for (begin, own), (end, _) in zip(begins, [*begins[1:], (None, found)], strict=True):
+        stop = None if end is None else end.start
+        tables += _tables(path, text, begin, replace(own, title=title), stop)
+    return tables
+
+
+def _tables(path: str, text: Text | Sheet, begin: Line, header: Header, stop: int | None) -> list[Table]:
+    """Read the rows below a header that begins at a line."""
+    if isinstance(text, Sheet):
+        first = Line(begin.number + header.lines, 0, 0, "")
+    else:
+        end = Line(begin.number + header.lines, text.stop, text.stop, "")
+        first = next(islice(text.lines(begin.start, begin.number), header.lines, None), end)
+    columns, rows, traps = read_rows(
+        path, text, first, header.delimiter, stop=stop, clock=header.clock, brackets=header.brackets
+    )
+    common = Table(
+        (),
+        formula=header.formula,
+        title=header.title,
+        start_time=header.start_time,
+        ragged=header.ragged,
+        traps=(*header.traps, *traps),
+        lines=rows,
+    )
+    tables = side_by_side(columns, header.headings, common, header.run)
+    if not tables:
+        raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
+    return tables

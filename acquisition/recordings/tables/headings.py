@@ -1,0 +1,160 @@
+"""Headings of columns: their words for time and uncertainty, their units, and names that can be told apart."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from acquisition.recordings.units import measure_of, time_power
+
+
+def words(text: str) -> frozenset[str]:
+    """Return the words in a text."""
+    return frozenset(text.split())
+
+
+_TIME_WORDS = words(
+    "time times t elapsed timestamp seconds secs millis milliseconds micros zeit tempo tempi temps tiempo tiempos tijd "
+    "tid czas čas aika idő zaman время 时间 時間 시간"
+)
+_BESIDE_TIME = words(
+    "axis value stamp data set run latest elapsed relative absolute since start velocity acceleration raw sensor gps "
+    "system rel abs"
+)
+"""Words that may accompany the word for time in a time column's name; other words denote, for example, a period."""
+_WORDS = re.compile(r"[^\W\d_]+\d*|\d+")
+_CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
+_UNCERTAIN = re.compile(
+    r".*\b(u?n?certain\w*|err\w*|sigma|std|incert\w*|unsicher\w*|fehler|sd)\b.*|[dδΔσu][_ ]?[a-zθφ]|[a-zθφ]'|[\d.,]+",
+    re.IGNORECASE,
+)
+BRACKETED = re.compile(r"(?P<name>.*?)\s*[(\[<](?P<unit>[^()\[\]<>]*)[)\]>]\s*")
+_NO_UNIT = re.compile(r"\d+|.*:.*")  # text in brackets that is the number of a channel, or a remark
+_SLASH = re.compile(r"(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]+(?:/[^\s/]+)?)")
+_TAIL = re.compile(r"(?P<name>.*?[^\W_])(?:[_ ](?:in )?|,\s*|:)(?P<unit>[^\W_]+(?:/s(?:ec)?(?:\^?2|²)?)?|°(?:/s)?)")
+_IN = re.compile(r"(?P<name>.*?\S)\s+in\s+(?P<unit>\S+)")
+_NO_TAIL = frozenset(("1", "in", "g", "mg"))
+"""Units that often end a name without being its unit: ``V_in``, ``x_1``."""
+
+Role = Literal["", "channel", "time", "aside", "ignored"]
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """What the lines above the rows say of a column.
+
+    Parameters
+    ----------
+    name, unit : str
+        As printed; empty if there is none.
+    run : str
+        Name of the run, if the runs of a file are side by side.
+    role : {"", "channel", "time", "aside", "ignored"}
+        By default the name decides. A column that is aside is read only if the user names it.
+    """
+
+    name: str
+    unit: str = ""
+    run: str = ""
+    role: Role = ""
+
+
+def role_of(heading: Heading) -> Role:
+    """Return the role of a column, from its name if the heading does not state it."""
+    if heading.role:
+        return heading.role
+    if is_time(heading.name):
+        return "time"
+    return "aside" if heading.name.lower().startswith("date") or is_uncertainty(heading.name) else "channel"
+
+
+def name_and_unit(heading: str) -> tuple[str, str]:
+    """Split a heading into its name and its unit in brackets."""
+    plain = heading.strip().strip('"').strip()
+    match = BRACKETED.fullmatch(plain)
+    if not match or not match["name"] or _NO_UNIT.fullmatch(match["unit"].strip()):
+        return plain, ""
+    return match["name"].strip(), match["unit"].strip()
+
+
+def heading_of(cell: str) -> tuple[str, str]:
+    """Split a heading into name and unit: the unit is in brackets, after a slash, or after a last underscore."""
+    name, unit = name_and_unit(cell)
+    if unit:
+        return name, unit
+    for form in (_SLASH, _TAIL, _IN):
+        match = form.fullmatch(name)
+        if match and (form is _SLASH or _ends(match["name"], match["unit"])):
+            return match["name"].strip(), match["unit"].strip()
+    return name, ""
+
+
+def _ends(name: str, unit: str) -> bool:
+    """Return whether the end of a name is its unit; h is a unit only for a time."""
+    if unit in _NO_TAIL or (unit == "h" and not is_time(name)):
+        return False
+    return measure_of(unit) is not None or time_power(unit) is not None
+
+
+def is_time(name: str) -> bool:
+    """Return whether a column's name denotes time, in one of a dozen languages."""
+    found = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
+    time_words = [word for word in found if word in _TIME_WORDS]
+    others = [word for word in found if word not in time_words]
+    if not time_words or found[0].isdecimal() or (len(found[0]) == 1 and found[0] not in _TIME_WORDS):
+        return False
+    return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in others)
+
+
+def is_uncertainty(name: str) -> bool:
+    """Return whether a column's name denotes the uncertainty of another column."""
+    return bool(_UNCERTAIN.fullmatch(name.strip()))
+
+
+def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
+    """Split a line of headings, quoted or not; return its cells and their separator, which is found if not given."""
+    bare = re.sub(r'"[^"]*"', "", line)
+    mark = mark or next((mark for mark in "\t;," if mark in bare), "\t")
+    cells = [each.strip() for each in re.split(rf'{re.escape(mark)}(?=(?:[^"]*"[^"]*")*[^"]*$)', line)]
+    while cells and not cells[-1]:
+        cells.pop()
+    return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells], mark
+
+
+def guess_delimiter(line: str) -> str:
+    """Return the separator of the cells of a row; an empty string means runs of white space.
+
+    A comma is the separator only if there is no other separator, because it may be a decimal mark.
+    """
+    for mark in "\t;":
+        if mark in line:
+            return mark
+    if "," not in line:
+        return ""
+    # "0,43 16,5" is separated by blanks; "0.43, 16.5" by commas.
+    by_blanks = any(cell and cell[-1] != "," for cell in line.strip(" ").split(" ")[:-1])
+    return "" if by_blanks and ", " not in line else ","
+
+
+def split_cells(line: str, delimiter: str) -> list[str]:
+    """Split a row into cells without blanks; separators at the end of the row are ignored."""
+    if not delimiter:
+        return [cell for cell in line.replace("\t", " ").split(" ") if cell]
+    cells = [cell.strip(" ") for cell in line.split(delimiter)]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def numbered_apart(names: Sequence[str]) -> list[str]:
+    """Return unique names: repetitions of a name get a number."""
+    seen: dict[str, int] = {}
+    apart: dict[str, None] = {}
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        while (numbered := name if seen[name] == 1 else f"{name} [{seen[name]}]") in apart:
+            seen[name] += 1  # the file already contains this numbered name
+        apart[numbered] = None
+    return list(apart)

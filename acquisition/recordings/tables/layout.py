@@ -1,0 +1,306 @@
+"""Find the table in the first lines of any text, and the roles of its columns."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from acquisition.block import F8
+from acquisition.recordings.tables.cells import CLOCK, parse_number
+from acquisition.recordings.tables.headings import (
+    Heading,
+    heading_of,
+    is_time,
+    is_uncertainty,
+    split_cells,
+    split_heading,
+)
+from acquisition.recordings.units import measure_of, time_power
+
+_MARKS = ("\t", ";", ",", "")
+_PROBE, _FEWEST, _SOUND = 20, 3, 0.8
+_ABOVE = 6  # number of lines above the rows that are searched for names
+_COMMENT = "#%*!'/ \ufeff"
+_BRACKETS = re.compile(r"[\[\];]")  # brackets and semicolons of a matrix as MATLAB writes it
+_NUMBERS = re.compile(r"[-+\d.,;eE\s\[\]]*\d[-+\d.,;eE\s\[\]]*")
+_DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}", re.ASCII)
+_SETTING = re.compile(r"[=]|:(?!\s*$)")
+_LONGEST_NAME = 5  # maximum number of words
+_BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
+_TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
+_NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
+_INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
+_FIRST_NUMBERS = 10  # row numbers begin below this; the first may be missing, in rows unlike the others
+_NEUTRAL = re.compile(
+    r"|x|(?-i:t)|x[-_ ]?(axis|value|achse)|(column|col|spalte|colonna|columna|var|field|unnamed:)[-_ ]?\d+",
+    re.IGNORECASE,
+)
+"""Names that do not prevent a column from being read as the times."""
+_SPAN = re.compile(r"^(?-i:T)\b|^[Ττ]|period|durat|dauer|half|halb|interval|tau|delay|[dΔ]t|mean|10", re.IGNORECASE)
+"""Names of durations, which are not times of samples."""
+_SPARSE = 0.2  # minimum share of rows with a number in a column of samples
+_CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
+
+
+class Layout(NamedTuple):
+    """The layout of a table: its first row is line ``at``, counted from 0.
+
+    ``headings`` has one heading for each column. ``spare`` are names beyond the last column, each with the cell below
+    it in the line of units. ``rows`` are the cells of the first rows, which all have the same number of cells. The
+    rows of a matrix in ``brackets`` end in semicolons.
+    """
+
+    preamble: tuple[str, ...]
+    headings: tuple[Heading, ...]
+    spare: tuple[tuple[str, str], ...]
+    at: int
+    mark: str
+    brackets: bool
+    rows: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def named(self) -> bool:
+        """Whether a line names the columns."""
+        return any(each.name for each in self.headings)
+
+
+@lru_cache(maxsize=1)  # the same table is needed twice: to recognise a file, and to read it
+def find_table(lines: tuple[str, ...]) -> Layout | None:
+    """Find the first rows of numbers in a text, and the names of their columns; None if there are none.
+
+    Rows are lines in which each column contains either only numbers or only words, apart from empty cells. The chosen
+    separator gives the earliest rows; among several such separators, it is one that also fits a line of names.
+    """
+    best: tuple[tuple[int, bool, int], _Split, _Rows, Layout] | None = None
+    for order, mark in enumerate(_MARKS):
+        if order and mark and not any(mark in each for each in lines):
+            continue  # each line would be a single cell, a case that the first separator has covered
+        split = _Split(lines, mark)
+        if (rows := split.first_rows()) is not None:
+            table = _with_names(lines, rows.start, mark, split.brackets, rows.width)
+            trial = (rows.start, not table.named, order), split, rows, table
+            best = trial if best is None else min(best, trial, key=lambda each: each[0])
+    return None if best is None else best[3]._replace(rows=best[1].all_rows(best[2]))
+
+
+def _kind(cell: str) -> str:
+    if not cell:
+        return ""
+    if parse_number(cell) is not None:
+        return "number"
+    if CLOCK.fullmatch(cell):
+        return "clock"
+    if _DATE.fullmatch(cell):
+        return "text"
+    return "mixed" if _NUMBERS.fullmatch(cell) else "text"
+
+
+class _Rows(NamedTuple):
+    """The first rows: index of the first, kinds of its cells, maximum number of cells, and later non-empty lines."""
+
+    start: int
+    first: list[str]
+    width: int
+    filled: list[int]
+
+
+class _Split:
+    """Lines that are split into cells by one separator; a line is split when it is first needed."""
+
+    def __init__(self, lines: Sequence[str], mark: str) -> None:
+        self.lines, self.mark = lines, mark
+        ends = 0 if mark else sum(each.rstrip().endswith(";") for each in lines)
+        self.brackets = ends > len(lines) / 2  # as in a MATLAB matrix
+        self._split: dict[int, tuple[list[str], list[str]]] = {}
+
+    def at(self, line: int) -> tuple[list[str], list[str]]:
+        """Return the cells of a line and their kinds."""
+        if line not in self._split:
+            cells = self._cells(self.lines[line])
+            self._split[line] = cells, [_kind(cell) for cell in cells]
+        return self._split[line]
+
+    def _cells(self, line: str) -> list[str]:
+        if '"' in line and self.mark and not self.brackets:
+            return split_heading(line, self.mark)[0]
+        cells = split_cells(_BRACKETS.sub(" ", line) if self.brackets else line, self.mark)
+        return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells]
+
+    def first_rows(self) -> _Rows | None:
+        """Return the first rows; None if there are none."""
+        blanks = self.mark + " " if self.mark else "\t [];" if self.brackets else "\t "
+        filled = [at for at, each in enumerate(self.lines) if each.strip(blanks)]
+        for position, start in enumerate(filled):
+            cells, first = self.at(start)
+            if not _is_row(first) or cells[0] == "-" or any("=" in cell for cell in cells):  # "- 0.5" is a list of YAML
+                continue
+            probe = [self.at(at)[1] for at in filled[position : position + _PROBE]]
+            width = max((len(kinds) for kinds in probe if _is_row(kinds)), default=0) if self.mark else len(first)
+            like = [_alike(kinds, first, width, self.mark) for kinds in probe]
+            if sum(like[:_FEWEST]) == _FEWEST and sum(like) >= _SOUND * len(like):
+                return _Rows(start, first, width, filled[position:])
+        return None
+
+    def all_rows(self, rows: _Rows) -> tuple[tuple[str, ...], ...]:
+        """Return the cells of every line that is like the first row."""
+        split = (self.at(at) for at in rows.filled)
+        like = [cells for cells, kinds in split if _alike(kinds, rows.first, rows.width, self.mark)]
+        return tuple(tuple(cells + [""] * (rows.width - len(cells))) for cells in like)
+
+
+def _is_row(kinds: Sequence[str]) -> bool:
+    values = kinds.count("number") + kinds.count("clock")
+    return "number" in kinds and values >= kinds.count("text") and "mixed" not in kinds
+
+
+def _alike(kinds: Sequence[str], first: Sequence[str], width: int, mark: str) -> bool:
+    """Return whether a line is a row like the first: text below text, numbers below numbers, or empty cells."""
+    if not _is_row(kinds) or (not mark and len(kinds) != width) or len(kinds) > width:
+        return False
+    return all(a == b or "" in (a, b) for a, b in zip(kinds, first, strict=False))
+
+
+def _with_names(lines: Sequence[str], start: int, mark: str, brackets: bool, width: int) -> Layout:
+    """Return the layout of a table whose first row is known, without its rows."""
+    above = [at for at in range(start - 1, -1, -1) if lines[at].strip(_COMMENT)][:_ABOVE]
+    names, units, at_names = [""] * width, [""] * width, start
+    spare: tuple[tuple[str, str], ...] = ()
+    for at in above:
+        cells = _names(lines[at], mark, width, numbered=at_names < start)
+        if not cells:
+            continue
+        below = cells[:width] + [""] * (width - len(cells))
+        if at_names == start and _are_units(cells):
+            units, at_names, spare = below, at, tuple(("", each) for each in cells[width:])
+            continue
+        names, at_names = below, at
+        behind = [each for _, each in spare] + [""] * len(cells)
+        spare = tuple(zip(cells[width:], behind, strict=False))
+        break
+    if at_names < start and not any(names) and not any(each.startswith(("(", "[")) for each in units):
+        names, units = units, names  # a single line of words contains names, even if some of the words are also units
+    headings = []
+    for name, unit in zip(names, units, strict=True):
+        plain, own = heading_of(name)
+        headings.append(Heading(plain, own or unit.strip(" ()[]")))
+    preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t")))
+    return Layout(preamble, tuple(headings), spare, start, mark, brackets)
+
+
+def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[str]:
+    """Split a line into one name for each column; return an empty list if that is impossible.
+
+    At least half of the names must be words, or one name if channels may be ``numbered``. For a single column, a
+    setting or a sentence is not a name.
+    """
+    plain = line.lstrip(_COMMENT).rstrip().removeprefix("DEF=")
+    if width == 1 and (_SETTING.search(plain) or len(plain.split()) > _LONGEST_NAME):
+        return []
+    for cells in _splits(plain, mark, width):
+        words = [cell for cell in cells if cell and parse_number(cell) is None and not CLOCK.fullmatch(cell)]
+        if words and (numbered or 2 * len(words) >= len([cell for cell in cells if cell])):
+            return cells
+    return []
+
+
+def _splits(line: str, mark: str, width: int) -> Iterator[list[str]]:
+    """Yield the possible splits of a line into cells, with the most likely split first."""
+    by_mark = split_heading(line) if any(each in line for each in "\t;,") else ([line], "")
+    own = [cell.strip().strip('"') for cell in line.split(mark)] if mark and '"' not in line else by_mark[0]
+    if mark and mark in line:
+        while len(own) > width and not own[-1]:
+            own.pop()
+        if len(own) >= width or 2 * len(own) > width > 2:
+            yield own
+        return
+    if len(by_mark[0]) == width and (width > 1 or by_mark[1] == ""):
+        yield by_mark[0]
+    apart = [re.split(r"\s{2,}|\t", line), [each.group() for each in _TOKEN.finditer(line)], line.split()]
+    yield from (each for each in apart if len(each) == width)
+    # More names than columns are accepted only if the names are short.
+    tokens = line.split()
+    if not mark and width < len(tokens) <= 3 * width and all(len(each) < 6 for each in tokens):
+        yield tokens
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Return whether a line contains units: at least half of its words are units or bracketed, and none means time."""
+    filled = [cell for cell in cells if cell]
+    known = [
+        measure_of(plain) is not None or time_power(plain) is not None or bool(_BRACKETED.fullmatch(cell))
+        for cell in filled
+        if parse_number(cell) is None
+        for plain in (cell.strip(" ()[]"),)
+    ]
+    return bool(known) and sum(known) * 2 >= len(known) and not any(is_time(cell) for cell in filled)
+
+
+def columns_of(rows: Sequence[Sequence[str]]) -> list[F8]:
+    """Return the numbers of each column; NaN for cells that are not numbers."""
+    read = [[parse_number(cell) for cell in row] for row in rows]
+    return [np.array([np.nan if x is None else x for x in column]) for column in zip(*read, strict=True)]
+
+
+def are_row_numbers(column: F8) -> bool:
+    """Return whether a column starts at a small number and increases by one in every row."""
+    return bool(column.size > 1 and column[0] in range(_FIRST_NUMBERS) and (np.diff(column) == 1.0).all())
+
+
+def runs_forward(column: F8) -> bool:
+    """Return whether a column rises in all but a few rows."""
+    known = column[np.isfinite(column)]
+    steps = np.diff(known)
+    return bool(known.size >= 3 and known[-1] > known[0] and np.mean(steps >= 0) >= 0.95 and np.mean(steps > 0) >= 0.5)
+
+
+def _is_even(column: F8) -> bool:
+    steps = np.diff(column[np.isfinite(column)])
+    usual = float(np.median(steps))
+    return bool(usual > 0 and np.mean(np.abs(steps - usual) <= 0.5 * usual) >= 0.8)
+
+
+def is_aside(heading: Heading, column: F8, others: bool) -> bool:
+    """Return whether a column is row numbers (if ``others`` may be the times), an uncertainty, or nearly empty."""
+    name = " ".join(heading.name.lower().replace("_", " ").split())
+    index = others and are_row_numbers(column) and (name in _INDEX or bool(_NUMBERED.fullmatch(name)))
+    return index or is_uncertainty(name) or bool(np.mean(np.isfinite(column)) < _SPARSE)
+
+
+def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[int]:
+    """Return the rising columns that are named as times, and the first column if its even steps have a unit of time.
+
+    A capital T is not accepted as a name of times, because it often denotes a period.
+    """
+    named = [
+        column
+        for column, each in enumerate(headings)
+        if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_power(each.unit) is None))
+        or (column == 0 and time_power(each.unit) is not None and not _SPAN.search(each.name) and _is_even(columns[0]))
+    ]
+    return [column for column in named if runs_forward(columns[column])]
+
+
+def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | None:
+    """Return the column that must be the times because of its steps; None if there is no such column.
+
+    This is the first column if it rises in even steps, else the only column that does so, else the only column that
+    rises. Row numbers are not considered, because their step is unknown. Neither are columns whose name or unit
+    denotes something else.
+    """
+    fit = [
+        column
+        for column, each in enumerate(headings)
+        if _NEUTRAL.fullmatch(each.name) and (not each.unit or time_power(each.unit) is not None)
+        if runs_forward(columns[column]) and not are_row_numbers(columns[column])
+    ]
+    even = [column for column in fit if _is_even(columns[column])]
+    if even and even[0] == 0:
+        return 0
+    for choice in (even, fit):
+        if len(choice) == 1:
+            return choice[0]
+    return None

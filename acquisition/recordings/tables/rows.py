@@ -1,0 +1,215 @@
+"""Read all rows of a text, or of a sheet of a workbook, as columns of numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import NamedTuple
+
+import numpy as np
+
+from acquisition.block import B1, F8
+from acquisition.errors import FormatError
+from acquisition.recordings.recording import Trap
+from acquisition.recordings.tables.cells import (
+    EMPTY,
+    EXPONENT,
+    I1,
+    UNREAD,
+    cell,
+    clock_times,
+    is_cut,
+    read_cells,
+    split_page,
+)
+from acquisition.recordings.tables.table import Column, Lines
+from acquisition.recordings.tables.text import Line, Text
+
+_FIRST_ROWS = 4
+_MOST_EMPTY = 4_000_000
+"""Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
+_DIGITS, _MOST_DECIMALS = 15, 12  # the significant digits that spreadsheet programs show; more decimals: an exponent
+_REMEDY = "export the numbers without thousands separators"
+_GROUP = rb"[-+]?[1-9]\d{0,2}"
+_THOUSANDS = re.compile(
+    _GROUP
+    + rb"(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:,\d{3}){2,}|(?:\.\d{3}){2,}"
+    + rb"|(?:(?: |'|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)\d{3})+(?:[.,]\d*)?)(?:[eE][-+]?\d+)?"
+)
+
+
+class Rows(NamedTuple):
+    """Columns without names, each as long as its last cell, where the rows stand, and remarks on all of them."""
+
+    columns: list[Column]
+    lines: Lines
+    traps: tuple[Trap, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """The cells of a sheet of a workbook, by column: numbers, or text."""
+
+    columns: tuple[tuple[float | str, ...], ...]
+
+    def head(self, limit: int) -> list[Line]:
+        """Return the first rows as lines of text between tabs, like those of a :class:`Text`."""
+        rows = zip(*(column[:limit] for column in self.columns), strict=True)
+        return [Line(at, at, at + 1, "\t".join(map(_printed, row))) for at, row in enumerate(rows, 1)]
+
+
+def _printed(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.{_DIGITS}g}"
+
+
+def read_rows(
+    path: str,
+    text: Text | Sheet,
+    first: Line,
+    mark: str,
+    *,
+    stop: int | None = None,
+    clock: int | None = None,
+    brackets: bool = False,
+) -> Rows:
+    """Read the rows from line ``first`` on; blank lines are no rows.
+
+    The cells of column ``clock`` are times of day. With brackets, ``[``, ``]`` and ``;`` are blanks.
+    """
+    if isinstance(text, Sheet):
+        return _rows_of_sheet(text, first.number, clock)
+    stop = text.stop if stop is None else stop
+    pieces: list[list[tuple[F8, I1]]] = []
+    sizes: list[int] = []
+    skipped: list[int] = []
+    marks, most, count = _Marks(path, bool(mark)), stop - first.start + _MOST_EMPTY, 0
+    head: list[list[bytes]] = []
+    last: list[bytes] = []
+    for page in text.pages(first.start, stop):
+        rows = []
+        for line in split_page(page, mark, brackets=brackets):
+            if line:
+                rows.append(line)
+            else:
+                skipped.append(count + len(rows))
+        if not rows:
+            continue
+        most -= len(rows) * max(map(len, rows))
+        if most < 0:
+            raise FormatError(path, "expected rows of like length, got a few much longer rows", "split the file")
+        for at, cells in enumerate(zip_longest(*rows, fillvalue=b"")):
+            if at == len(pieces):
+                pieces.append([])
+                sizes.append(0)
+            if missing := count - sizes[at]:
+                pieces[at].append((np.full(missing, np.nan), np.full(missing, EMPTY, np.int8)))
+            values, decimals, commas = read_cells(cells) if at != clock else clock_times(cells)
+            marks.look(at, cells, values, decimals, commas)
+            pieces[at].append((values, decimals))
+            sizes[at] = count + len(rows)
+        count, last, head = count + len(rows), rows[-1], head or rows[:_FIRST_ROWS]
+    columns = []
+    for own in pieces:
+        values, decimals = (np.concatenate(each) for each in zip(*own, strict=True))
+        own.clear()
+        columns.append(Column("", "", values, decimals))
+    traps = marks.judged(columns)
+    ended = first.start >= stop or text.data[stop - 1 : stop] in (b"\n", b"\r")
+    cut = False
+    if count and not ended:
+        own_values, own_decimals = columns[len(last) - 1].values, columns[len(last) - 1].forms
+        if is_cut(own_values, own_decimals):
+            own_values[-1], own_decimals[-1] = np.nan, UNREAD
+        cut = any(column.values.size == count and column.forms[-1] == UNREAD for column in columns)
+    if clock is not None and clock < len(columns):
+        _count_from_first(columns[clock])
+    words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
+    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut)
+    shown = tuple(tuple(each.decode("latin-1") for each in row) for row in head)
+    last_cell = last[0].decode("latin-1").replace(",", ".") if last else ""
+    return Rows(columns, lines._replace(last_cell=last_cell, zeros=text.zeros, cells=shown), traps)
+
+
+def _count_from_first(column: Column) -> None:
+    """Make times of day seconds since the first one, in place; midnight may lie between them."""
+    known = np.flatnonzero(column.forms >= 0)
+    if known.size:
+        at = column.values[known]
+        days = np.concatenate(([0.0], np.cumsum(np.diff(at) < -43200.0)))
+        since, places = (at - at[0] + 86400.0 * days).tolist(), column.forms[known].tolist()
+        column.values[known] = [round(each, decimals) for each, decimals in zip(since, places, strict=True)]
+
+
+def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Rows:
+    columns = []
+    for at, cells in enumerate(sheet.columns):
+        below = cells[first - 1 :]
+        if at == clock:
+            values, decimals, _ = clock_times([_printed(each).encode("latin-1", "replace") for each in below])
+        else:
+            numbers = [_printed(each) for each in cells if not isinstance(each, str)]
+            most = max((_DIGITS if "e" in each else len(each.partition(".")[2]) for each in numbers), default=0)
+            form = most if most <= _MOST_DECIMALS else _DIGITS - 1 + EXPONENT
+            read = [cell(each) if isinstance(each, str) else (each, form) for each in below]
+            values = np.array([value for value, _ in read], np.float64)
+            decimals = np.array([form for _, form in read], np.int8)
+        columns.append(Column("", "", values, decimals))
+    filled = np.any([column.forms != EMPTY for column in columns], axis=0)
+    columns = [Column("", "", column.values[filled], column.forms[filled]) for column in columns]
+    if clock is not None:
+        _count_from_first(columns[clock])
+    head = zip(*(map(_printed, column[first - 1 : first - 1 + _FIRST_ROWS]) for column in sheet.columns), strict=True)
+    skipped = np.cumsum(filled)[~filled].astype(np.int64)
+    lines = Lines(first, int(filled.sum()), skipped, columns[0].forms == UNREAD, cells=tuple(head))
+    return Rows(columns, lines)
+
+
+class _Marks:
+    """Finds thousands separators (``1,234.5``): reading one as a decimal mark gives an error of a factor 1000.
+
+    A comma or point is a decimal mark if anywhere it is not followed by exactly three digits, or follows a zero or four
+    digits.
+    """
+
+    def __init__(self, path: str, by_mark: bool) -> None:
+        self.path, self.by_mark = path, by_mark
+        self.decimal: set[bytes] = set()
+        self.doubtful: dict[tuple[int, bytes], bytes] = {}
+
+    def look(self, at: int, cells: Sequence[bytes], values: F8, decimals: I1, commas: B1) -> None:
+        """Look at the cells of column ``at`` in one page."""
+        for row in np.flatnonzero(decimals == UNREAD).tolist() if self.by_mark else ():
+            if _THOUSANDS.fullmatch(cells[row]):
+                raise self._refusal(f"expected plain numbers, got a thousands separator in {_shown(cells[row])}")
+        with np.errstate(invalid="ignore"):
+            group = (decimals == 3) & (np.abs(values) >= 1.0) & (np.abs(values) < 1000.0)
+        numbers, places = decimals >= 0, decimals % EXPONENT > 0
+        for mark, marked in ((b",", numbers & commas), (b".", numbers & ~commas & places)):
+            if mark not in self.decimal and marked.any():
+                if (marked & ~group).any():
+                    self.decimal.add(mark)
+                else:
+                    self.doubtful.setdefault((at, mark), cells[int(marked.argmax())])
+
+    def judged(self, columns: Sequence[Column]) -> tuple[Trap, ...]:
+        """Refuse doubtful numbers; return a remark if a comma was read as a decimal mark, which nothing confirms."""
+        doubtful = {key: number for key, number in self.doubtful.items() if key[1] not in self.decimal}
+        for (at, _), number in doubtful.items():
+            whole = np.abs(columns[at].values[columns[at].forms == 0])
+            if self.decimal or (whole.size and whole.max() < 1000.0):
+                raise self._refusal(f"{_shown(number)} may have a thousands separator or a decimal mark")
+        if not doubtful or any(mark == b"." for _, mark in doubtful):
+            return ()
+        shown = _shown(next(iter(doubtful.values())))
+        return (
+            Trap("decimal_comma", f"the comma in {shown} was read as a decimal comma, not as a thousands separator"),
+        )
+
+    def _refusal(self, problem: str) -> FormatError:
+        return FormatError(self.path, problem, _REMEDY)
+
+
+def _shown(number: bytes) -> str:
+    return f'"{number.decode("utf-8", "replace")}"'

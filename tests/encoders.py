@@ -1,0 +1,105 @@
+"""Encoders of every family, written from the data sheets and not from the decoders, so that each checks the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from acquisition.decoders.family import Encoder
+from acquisition.decoders.line_protocol import LineProtocolEncoder
+
+LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}
+
+
+def with_sum(body: bytes) -> bytes:
+    """Return bytes followed by the low eight bits of their sum."""
+    return body + bytes([sum(body) & 0xFF])
+
+
+class Distances:
+    """Writes distances alone, by a function of metres that may be NaN."""
+
+    def __init__(self, frame_of: Callable[[float], bytes]) -> None:
+        self._frame_of = frame_of
+
+    def encode(self, *, distance_m: float, **_: float) -> bytes:
+        """Return one frame."""
+        return self._frame_of(distance_m)
+
+
+def steps(distance_m: float, step_m: float, lowest: int, highest: int, none: int) -> int:
+    """Return a distance in whole steps, or the code for none where it is NaN or out of range."""
+    count = none if math.isnan(distance_m) else round(distance_m / step_m)
+    return count if lowest <= count <= highest else none
+
+
+def maxbotix(digits: int, step_m: float, none: int, tail: str = "") -> Callable[[], Encoder]:
+    """Return a maker of ``R`` lines."""
+    return lambda: Distances(lambda d: f"R{steps(d, step_m, 1, none - 1, none):0{digits}d}{tail}\r".encode())
+
+
+def ffhls() -> Encoder:
+    """Return an encoder of FF H L SUM."""
+    return Distances(lambda d: with_sum(b"\xff" + steps(d, 1e-3, 0, 10_000, 0).to_bytes(2, "big")))
+
+
+def us100() -> Encoder:
+    """Return an encoder of two bytes without a header."""
+    return Distances(lambda d: steps(d, 1e-3, 20, 4500, 0).to_bytes(2, "big"))
+
+
+def urm37() -> Encoder:
+    """Return an encoder of 22 H L SUM."""
+    return Distances(lambda d: with_sum(b"\x22" + steps(d, 1e-2, 1, 1000, 0xFFFF).to_bytes(2, "big")))
+
+
+def sen0149() -> Encoder:
+    """Return an encoder of 55 AA address length command H L SUM."""
+    return Distances(
+        lambda d: with_sum(bytes([0x55, 0xAA, 0x11, 2, 2]) + steps(d, 1e-3, 1, 12_000, 0xFFFF).to_bytes(2, "big"))
+    )
+
+
+class TextLines:
+    """Writes lines in which every column and name that the options ask for has its number."""
+
+    def __init__(self, **options: Any) -> None:
+        self._unit = options.get("unit", "cm")
+        self._time_us = TIMES_US[options.get("time_unit", "us")]
+        self._separator = options.get("separator") or ","
+        places = {"column": 0, **options}
+        self._places = {what: places[what] for what in ("column", "sequence", "time", "temperature") if what in places}
+
+    def encode(
+        self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
+    ) -> bytes:
+        """Return one line; the value 0 means no target."""
+        value = echo_us if self._unit == "us" else distance_m / LENGTHS_M[self._unit]
+        numbers = {
+            "column": "0" if math.isnan(distance_m) or math.isnan(value) else f"{value:.8g}",
+            "sequence": f"{sequence}",
+            "time": f"{device_us / self._time_us:.10g}",
+            "temperature": f"{temperature_c:.2f}",
+        }
+        placed = {where: numbers[what] for what, where in self._places.items() if isinstance(where, int)}
+        cells = [placed.get(index, "0") for index in range(max(placed, default=-1) + 1)]
+        cells += [f"{where}={numbers[what]}" for what, where in self._places.items() if not isinstance(where, int)]
+        return self._separator.join(cells).encode() + b"\r\n"
+
+
+ENCODERS: dict[str, Callable[..., Encoder]] = {
+    "line-protocol": LineProtocolEncoder,
+    "maxbotix-lv": maxbotix(3, 0.0254, 255),
+    "maxbotix-lv-p": maxbotix(3, 0.0254, 255, " P0"),
+    "maxbotix-xl": maxbotix(3, 0.01, 765),
+    "maxbotix-xl-long": maxbotix(4, 0.01, 1068),
+    "maxbotix-hr": maxbotix(4, 0.001, 5000),
+    "maxbotix-wr": maxbotix(4, 0.001, 9999),
+    "ffhls": ffhls,
+    "us100": us100,
+    "urm37": urm37,
+    "sen0149": sen0149,
+    "text-lines": TextLines,
+}
