@@ -107,12 +107,13 @@ _WHERE = {
     "acquisition.recordings.tables.headings": ("Heading",),
     "acquisition.recordings.tables.table": ("Column", "Formula", "Table"),
     "acquisition.source": ("SourceInfo",),
-    "pipeline.damping.laws.law": ("Law", "Unit"),
+    "pipeline.damping.laws.law": ("Law",),
     "pipeline.damping.laws.of_function": ("make_law",),
     "pipeline.dynamics": ("Equation", "Integrator", "Problem", "Trajectory", "get_integrator"),
     "pipeline.dynamics.halving": ("auto",),
     "pipeline.dynamics.methods": ("OneStep", "acceleration"),
     "pipeline.errors": ("AnalysisError", "DynamicsError"),
+    "pipeline.numerics.quantity": ("Unit",),
 }
 
 
