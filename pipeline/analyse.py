@@ -68,6 +68,7 @@ MOST_PARTS = 4  # maximum number of times that a freely moving part is sought wi
 # Share of the amplitude by which typical periods differ from the fitted oscillation, above which two modes are fitted:
 # the difference if one mode is a third of the other.
 BEATING = 0.3
+LEAST_HALVED = 128  # minimum number of samples of which the later half may show a motion
 CLEAR = 0.25  # maximum noise over the amplitude for a motion that only the later half shows
 
 
@@ -166,6 +167,8 @@ def _free_part(samples: Conditioned, options: Options) -> _FreePart | NoOscillat
     if isinstance(cycles, NoOscillation):
         # A long time in the hand hides the motion after it, which the later half may show.
         t = samples.track.t[samples.used]
+        if t.size < LEAST_HALVED:
+            return cycles
         half_s = float(np.median(t))
         later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
         trial = condition(later.flagged(samples.track))

@@ -33,13 +33,15 @@ class Smoothing:
 def held_count(conditioned: Conditioned) -> int:
     """Return the number of samples over which each reading is held; 1 if every sample is new.
 
-    Readings in coarse steps repeat too, but new ones have values that occurred before.
+    Readings in coarse steps repeat too, but new ones have values that occurred before. Readings at rest repeat for
+    longer than others.
     """
     y = conditioned.track.y[conditioned.used]
-    changes = int(np.count_nonzero(np.diff(y)))
-    if changes < 8 or changes > (1.0 - EQUAL) * y.size or np.unique(y).size < 0.5 * changes:
+    changes = np.flatnonzero(np.diff(y))
+    if not 8 <= changes.size <= (1.0 - EQUAL) * y.size or np.unique(y).size < 0.5 * changes.size:
         return 1
-    return round(y.size / changes)
+    runs = np.diff(changes)
+    return round(y.size / changes.size) if np.quantile(runs, 0.95) <= np.median(runs) + 1.0 else 1
 
 
 def held(conditioned: Conditioned, residuals: Residuals) -> Misfit | None:
@@ -53,7 +55,7 @@ def held(conditioned: Conditioned, residuals: Residuals) -> Misfit | None:
         rounding = max(2.02 * (conditioned.quantum_m or 0.0), 1e-12 * float(np.ptp(y)))
         # A reading between two samples bends the line at both.
         count, late = 2.0 / max(float(np.mean(np.abs(np.diff(y, 2)) > rounding)), 1e-3), 0.0
-        if count < LINES or rounding > 2.0 * residuals.noise_m:
+        if count < LINES or rounding > 1.1 * residuals.noise_m:
             return None
     loss = min((2.0 - late) * (count * turn) ** 2 / 24.0, 1.0)
     amplitude_m, phase_rad = residuals.amplitude_m * loss, late * 0.5 * (count - 1.0) * turn
