@@ -69,7 +69,7 @@ MOST_PARTS = 4  # maximum number of times that a freely moving part is sought wi
 # the difference if one mode is a third of the other.
 BEATING = 0.3
 LEAST_HALVED = 128  # minimum number of samples of which the later half may show a motion
-CLEAR = 0.25  # maximum noise over the amplitude for a motion that only the later half shows
+CLEAR = 0.05  # maximum noise over the amplitude for a motion that only the later half shows
 
 
 @one_thread

@@ -13,6 +13,7 @@ from pipeline.damping.law_fit import LawFit, Minimum, mean_squared_rate, minimum
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
+from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 
@@ -118,11 +119,12 @@ def fit_damping(
     Notes
     -----
     Real amplitudes scatter more than their noise, for example because of beats with a sideways mode or clusters of
-    false echoes. The excess scatter is measured about a smooth curve that is independent of all laws, so that a wrong
-    law cannot hide its misfit in it. Correlated points count as fewer
-    points: chi-square, BIC and degrees of freedom are divided by the correlation length, and the covariance is
-    multiplied by it. If chi-square rejects a law, its covariance comes from its own residuals: it is multiplied by the
-    reduced chi-square, and the correlation length is that of the residuals.
+    false echoes. The excess scatter is measured about a smooth curve that is independent of all laws, so that a
+    wrong law cannot hide its misfit in it. If few windows decay fast, or friction stops the motion, no smooth curve
+    follows the decay. A law whose residuals are less than half as large then replaces the curve. Correlated points
+    count as fewer points: chi-square, BIC and degrees of freedom are divided by the correlation length, and the
+    covariance is multiplied by it. If chi-square rejects a law, its covariance comes from its own residuals: it is
+    multiplied by the reduced chi-square, and the correlation length is that of the residuals.
 
     Drag coefficients are not negative, but their estimates may be by chance; only unbounded estimates are unbiased and
     have correct intervals. So the fits are unbounded. A law is rejected if a coefficient is negative by more than two
@@ -193,6 +195,9 @@ def _fit_laws(points: _Points, wanted: Sequence[str | Law], known: Law | None) -
         every.append(known)
     laws = _affordable(every, int(np.count_nonzero(points.spread.kept)), unfitted)
     fits = _weigh_all(laws, points, unfitted)
+    if fits and (closer := _corner(fits, points)) is not None:
+        points = replace(points, spread=closer, minima={})
+        fits = _weigh_all(laws, points, unfitted)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
     stated = "" if known is None else known.name
@@ -259,3 +264,18 @@ def _astray(law: Law, fit: Minimum, t: F8, y: F8) -> str | None:
         # A fit has failed if its growth rate times the duration exceeds 20 times the largest amplitude, or at a pole.
         astray = np.any(growth > 20.0 * top) or not np.isfinite(law.curve(end, fit.theta)[0][0])
     return "its numbers ran out of range" if astray else None
+
+
+def _corner(fits: Mapping[str, LawFit], points: _Points) -> Scatter | None:
+    """Return the scatter about a law that fits the points much better than the smooth curve; None if none does."""
+    fit = min(fits.values(), key=lambda fit: fit.reduced_chi2)
+    if points.spread.excess == 0.0 or not fit.reduced_chi2 < 0.25:
+        return None
+    residual = points.amplitude - fit.amplitude(points.t)
+    typical, noise = mad_sigma(residual), float(np.median(points.noise))
+    excess = math.sqrt(typical**2 - noise**2) if typical > 1.3 * noise else 0.0
+    u = np.hypot(points.noise, excess)
+    kept = np.abs(residual) <= 5.0 * u
+    if np.count_nonzero(kept) < 0.8 * kept.size:
+        return None
+    return Scatter(u, excess, kept, correlation_length(residual[kept] / u[kept]))

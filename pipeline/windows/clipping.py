@@ -16,7 +16,7 @@ from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Conditioned, Cut
 from pipeline.track import F8, Quality
 from pipeline.windows.cycles import Cycles
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import ROUNDING, Demodulated
 from pipeline.windows.sinusoids import Windows, refit, solve
 
 LEVELS = 40  # number of heights tried for the level, from the middle of the swing to its top
@@ -86,7 +86,9 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
     nineteen in twenty samples on the plateau exceed, with one more sample on either side. The model selects them, not
     their own values, so this causes no bias.
     """
-    least_m = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
+    # A record whose crests are flat may show no noise at all.
+    rounding_m = ROUNDING * float(np.max(np.abs(demodulated.amplitude)))
+    least_m = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), rounding_m)
     unexplained = _of_windows(Windows.cut(conditioned, cycles.bounds), demodulated)
     if not any(_cut_windows(unexplained, sign, least_m) for sign in (1.0, -1.0)):
         return None
