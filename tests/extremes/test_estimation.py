@@ -8,10 +8,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError, SceneError, TrackError
+from pipeline.options import TIERS, options_for
 from pipeline.track import Track
 
 F8 = np.ndarray
@@ -41,7 +41,7 @@ def noise(size: int = 2000, sigma_m: float = 3e-4) -> F8:
 def outcome(t: F8, y: F8, tier: str, scene: Scene | None = None) -> Analysis | str:
     """Return the analysis, or the one line that refuses the record."""
     try:
-        return analyse(Track.from_arrays(t, y, kind="simulated"), scene, params_for(tier))
+        return analyse(Track.from_arrays(t, y, kind="simulated"), scene, options_for(tier))
     except PipelineError as error:
         line = str(error)
         assert line
