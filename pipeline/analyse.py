@@ -59,7 +59,7 @@ from pipeline.windows.clipping import find_cuts
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated, demodulate, model_error
 from pipeline.windows.disturbances import separate
-from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part
+from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part, long_after_stop
 
 __all__ = ["Analysis", "Oscillation", "Overdamped", "Still", "analyse"]
 
@@ -155,13 +155,13 @@ class _FreePart:
 def _free_part(samples: Conditioned, options: Options) -> _FreePart | NoOscillation:
     """Find the part that oscillates freely.
 
-    The time before the trigger and all but one free part are left out. The samples are conditioned again after each
-    step, because the part left out may have hidden the noise of the rest.
+    The time before the trigger, the time long after the stop and all but one free part are left out. The samples are
+    conditioned again after each step, because the part left out may have hidden the noise of the rest.
     """
-    segments = None
-    if (outside := before_trigger(samples)) is not None:
-        samples = condition(outside.flagged(samples.track))
-        segments = outside
+    segments: Segments | None = None
+    for outside in (before_trigger(samples), long_after_stop(samples, options.early)):
+        if outside is not None:
+            samples, segments = condition(outside.flagged(samples.track)), outside.within(segments)
     cycles, stopped = _cycles(samples, options, options.early)
     if isinstance(cycles, NoOscillation):
         # A long time in the hand hides the motion after it, which the later half may show.
