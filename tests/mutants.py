@@ -115,7 +115,7 @@ def drawn(count: int, seed: int) -> list[Fault]:
         line = source.splitlines()[node.lineno - 1]
         changed = line[: _column(line, node.col_offset)] + text + line[_column(line, node.end_col_offset) :]
         if source.count(line) == 1 and changed != line:
-            found.append(Fault(f"{kind}_{Path(path).stem}_{node.lineno}", path, line, changed))
+            found.append(Fault(f"{kind}_{Path(path).stem}", path, line, changed))
     return found
 
 

@@ -2,10 +2,10 @@
 
 Only the command line is called, so nothing here holds a module, a class or a stage in place. A golden is a table of
 path -> [value, tolerance]. A value may move by a tenth of its uncertainty u, and u by a quarter of itself (``VALUES``
-and ``US`` in the environment); counts, codes of findings, laws and exit codes are exact. Goldens are never regenerated, so that small moves do not add
-up. A change on purpose is a line of the ``.allow`` file: a pattern of ``command line | path``, ``#`` and the reason; it
-names one code or one kind of recording. Where an option or a JSON name changes, one table in ``run`` or ``outcome``
-translates the old into the new.
+and ``US`` in the environment); counts, codes of findings, laws and exit codes are exact. Goldens are never regenerated,
+so that small moves do not add up. A change on purpose is a line of the ``.allow`` file: a pattern of ``command line |
+path``, ``#`` and the reason; it names one code or one kind of recording. Where an option or a JSON name changes, one
+table in ``run`` or ``outcome`` translates the old into the new.
 
 In a command line ``{0}`` stands for the shared recordings, ``{1}`` for sample_data, ``{2}`` for the synthetic records
 of the archive, ``{C}`` for a course of 24 of them, ``{H}`` for this folder and ``{O}`` for a fresh one.
