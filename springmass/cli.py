@@ -23,6 +23,7 @@ from springmass.errors import (
     internal_error,
     manner,
 )
+from springmass.stops import STOPS
 
 __all__ = ["main"]
 
@@ -30,10 +31,12 @@ __all__ = ["main"]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit code; a user's error and a program defect each give one line on stderr."""
     before = manner()
+    STOPS.begin()
     try:
         return _run(arguments)
     finally:
         adopt(*before)
+        STOPS.end(program=arguments is None)
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -81,7 +84,8 @@ def _call(words: Sequence[str]) -> int:
     from springmass.command_line import COMMANDS, call, without_reading
 
     try:
-        return call(words)
+        with STOPS.raised():
+            return call(words)
     except CycloptsError as error:
         from springmass.terminal.usage import worded
 

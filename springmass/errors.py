@@ -8,7 +8,7 @@
 4     sensor, port or calibration error, or a nearly full disk
 5     rejected under ``--strict``
 70    internal error: a defect of the program
-130   Ctrl-C, with the file closed cleanly
+130   Ctrl-C, SIGTERM or SIGHUP
 ====  ================================================================
 """
 

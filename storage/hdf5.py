@@ -6,12 +6,13 @@ import contextlib
 import io
 import os
 import re
+import signal
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from storage.atomic import whole_file, write_failed
-from storage.errors import OutOfMemory, RunDamaged, RunOpen, StorageError, WriteFailed, one_line
+from storage.errors import OutOfMemory, RunDamaged, RunOpen, WriteFailed, one_line
 
 if TYPE_CHECKING:
     import h5py
@@ -24,6 +25,7 @@ _OPEN = {
     "file is already open for write": "if it has crashed: h5clear -s FILE",
 }
 """Errors of HDF5 if another program has a file open for writing, and what else can cause each of them."""
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _LIBVER = ("v110", "v110")
 """The file format of HDF5 1.10 (2016), the oldest with checksums in all of the file's metadata."""
 
@@ -34,17 +36,19 @@ def whole_h5(path: Path, *, overwrite: bool) -> Iterator[h5py.File]:
 
     Errors of the body pass through, unless the disk has failed before; :func:`writing_h5` converts those of HDF5.
     """
-    import h5py
-
     with whole_file(path, overwrite=overwrite) as temporary, temporary.open("r+b", buffering=0) as raw:
-        sink = _ErrorKeepingFile(raw)
-        file = h5py.File(sink, "w", libver=_LIBVER)
+        sink, file = _ErrorKeepingFile(raw), None
         try:
+            with _signals_wait():
+                import h5py
+
+                file = h5py.File(sink, "w", libver=_LIBVER)
             yield file
         except BaseException:
             # Closing also writes and may fail for the same reason, so report the first error.
-            with contextlib.suppress(*_ERRORS):
-                file.close()
+            with _signals_wait(), contextlib.suppress(*_ERRORS):
+                if file is not None:
+                    file.close()
             if sink.error is None:
                 raise
         else:
@@ -58,7 +62,8 @@ def whole_h5(path: Path, *, overwrite: bool) -> Iterator[h5py.File]:
 def writing_h5(path: Path) -> Iterator[None]:
     """Convert the errors that HDF5 raises on a full disk or an unstorable value to :class:`WriteFailed`."""
     try:
-        yield
+        with _signals_wait():
+            yield
     except _ERRORS as error:
         _raise_if_out_of_memory(path, error)
         remedy = "check the disk space and the values to be written"
@@ -66,12 +71,26 @@ def writing_h5(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def _signals_wait() -> Iterator[None]:
+    """Call the handlers of signals only at the end: HDF5 breaks if one of them raises in :class:`_ErrorKeepingFile`."""
+    before, arrived = dict[int, Any](), list[int]()
+    try:
+        with contextlib.suppress(ValueError):  # another thread than the main thread, in which no handler runs
+            for number in [each for each in _SIGNALS if callable(signal.getsignal(each))]:
+                before[number] = signal.signal(number, lambda number, _: arrived.append(number))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in arrived:
+            before[number](number, None)
+
+
+@contextlib.contextmanager
 def reading_h5(path: Path, what: str) -> Iterator[None]:
     """Convert the errors that HDF5 raises on damaged bytes to :class:`RunDamaged`; ``what`` is read."""
     try:
         yield
-    except StorageError:
-        raise
     except _ERRORS as error:
         _raise_if_out_of_memory(path, error)
         for sign, otherwise in _OPEN.items():

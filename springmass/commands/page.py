@@ -19,6 +19,7 @@ from springmass.page.web.server import Opening, serve
 from springmass.page.web.sharing import address_in_network, code_for_terminal
 from springmass.runs.loading import kind_of, load
 from springmass.runs.options import ReadOptions
+from springmass.stops import STOPS
 
 __all__ = ["run"]
 
@@ -37,6 +38,7 @@ def run(recording: str | Path, page: PageOptions, read: ReadOptions, *, recorder
         _look_at(page_state, path, read)
     opening.opened = _ready(page, opening)
     try:
+        STOPS.end()  # the server handles signals itself
         with log_to_stderr():
             serve(page_state, opening, until=over.is_set)
     except KeyboardInterrupt:

@@ -35,8 +35,8 @@ from springmass.session.options import RunLimits, RunListeners
 from springmass.session.output import default_name, demand_new
 from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, Trigger
 from springmass.session.simulated_bench import REST_M, Release, bench_position
-from springmass.session.stops import EndReason, Stops
 from springmass.session.trigger import Disarmed
+from springmass.stops import STOPS, EndReason
 from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import END_WORDS, ProgressLine
@@ -74,7 +74,7 @@ def run(options: RecordOptions, page_options: PageOptions) -> int:
         ask_about(scene, source)
     log = out.with_suffix(".wire")
     bench = Release(SystemClock())
-    with Stops() as stops, _sensors(options, scene, bench) as (sensors, kind), contextlib.ExitStack() as beside:
+    with _sensors(options, scene, bench) as (sensors, kind), contextlib.ExitStack() as beside:
         rate = sum(sensor.rate_hz or sensor.family.rate_hz for sensor in sensors)
         check_disk(out, int(BYTES_PER_READ * rate * (options.seconds or UNLIMITED_S)) + 1_000_000)
         clock = SystemClock()
@@ -84,14 +84,16 @@ def run(options: RecordOptions, page_options: PageOptions) -> int:
             kind=kind,
             scene=None if scene is None else scene.to_mapping(),
             title=options.title,
-            stops=stops,
+            stops=STOPS,
         )
+        STOPS.last_words = lambda: _stopped(session, log)
         console = beside.enter_context(Console(lambda error: session.failures.note("stderr", error)))
         try:
             page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
             ended = _Bench(session, options, log, console, bench, page).record()
             session.stop()
             code, run_file = _built(ended, out, session, console)
+            session.recorder = None
             if page is not None and run_file is not None and ended.by is EndReason.PAGE:
                 page.tell("built", run=str(run_file))
                 page.attend()
@@ -102,15 +104,7 @@ def run(options: RecordOptions, page_options: PageOptions) -> int:
         except KeyboardInterrupt:
             if not os.path.lexists(log):
                 raise
-            # The log is intact up to the last data written to the disk; none of it is removed.
-            lost = ""
-            if session.given_up is not None:
-                reads, size = session.given_up
-                lost = f"; the disk did not take {reads} reads ({size} bytes)"
-            console.line(
-                f"springmass: stopped immediately by {END_WORDS[stops.by or EndReason.CTRL_C]}{lost}; "
-                f"{_what_to_do(log)}"
-            )
+            console.line(f"springmass: {_stopped(session, log)}")
             return INTERRUPTED
         finally:
             session.stop()
@@ -173,6 +167,15 @@ def _usable(channel: int, report: RecoverReport, session: Session) -> bool:
 
 def _what_to_do(log: Path) -> str:
     return f"the log stays: {log}; `springmass recover {shlex.quote(str(log))}` makes the run file"
+
+
+def _stopped(session: Session, log: Path) -> str:
+    """Return what is said if a signal ends the program before the run file is built; the log stays as it is."""
+    if session.recorder is None:
+        return "stopped immediately"
+    reads, size = session.recorder.unwritten()
+    lost = f"; the disk did not take {reads} reads ({size} bytes)" if reads else ""
+    return f"stopped immediately{lost}; {_what_to_do(log)}"
 
 
 def _fill_standard_streams() -> None:

@@ -9,6 +9,7 @@ from acquisition.errors import CalibrationError
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.options import RecoverOptions
 from springmass.runs.analysing import made_now
+from springmass.stops import STOPS
 from storage.recovery.recover import recover
 
 __all__ = ["run"]
@@ -16,6 +17,7 @@ __all__ = ["run"]
 
 def run(log: str | Path, options: RecoverOptions) -> int:
     """Rebuild the run; the log stays."""
+    STOPS.last_words = lambda: f"stopped immediately; the log stays: {log}"
     try:
         report = recover(
             log,

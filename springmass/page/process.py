@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from springmass.session.failures import Failures
-from springmass.session.stops import EndReason, Stops
+from springmass.stops import EndReason, Stops
 
 __all__ = ["PageProcess"]
 

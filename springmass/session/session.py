@@ -32,8 +32,8 @@ from springmass.session.identity import meeting
 from springmass.session.options import RunLimits, RunListeners
 from springmass.session.reads import Tee
 from springmass.session.sensors import ANSWERED, Sensor
-from springmass.session.stops import EndReason, Stops
 from springmass.session.trigger import Disarmed, Trigger, Watch
+from springmass.stops import EndReason, Stops
 from storage.errors import StorageError, WriteFailed
 from storage.recorder import Recorder, RecorderStatus
 from storage.wire_log.records import LogHeader
@@ -88,8 +88,8 @@ class Session:
     ----------
     failures : Failures
         Failures during the recording that did not end it.
-    given_up : (int, int) or None
-        Number of reads that the disk has not taken, and their bytes, if the user did not wait for it.
+    recorder : Recorder or None
+        Recorder of the run, once it has begun.
     shown : LiveState or None
         State derived from the samples shown so far.
     """
@@ -117,7 +117,7 @@ class Session:
         self.stops = stops or Stops()
         self._marks: list[tuple[int, str]] = []
         self.shown: LiveState | None = None
-        self.given_up: tuple[int, int] | None = None
+        self.recorder: Recorder | None = None
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
         """Start reading, and wait until every sensor has been heard.
@@ -235,16 +235,14 @@ class Session:
             If the log cannot be created.
         storage.errors.NotALog
             If the log cannot be read at the end.
-        KeyboardInterrupt
-            If the user did not wait until all queued data were written; the log is kept, without its end.
         """
         trigger, rest = limits.trigger, limits.rest
         moment_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, listeners)
         since_ns = moment_ns if trigger is None else moment_ns - int(trigger.keep_s * 1e9)
         # New chains make indices and times count from the run's first byte, as in recovery.
         self._chains = [sensor.chain() for sensor in self.sensors]
-        recorder = Recorder(log, self._header(), self._clock)
         with self.stops.counted():
+            recorder = self.recorder = Recorder(log, self._header(), self._clock)
             display = self._display(listeners.progress)
             start_ns = self._clock.now_ns()
             self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
@@ -265,13 +263,8 @@ class Session:
                 self.failures.tell = None
             counts = self.failures.counts
             recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
-        # From this point on, the user may interrupt the wait for the disk.
-        try:
             with contextlib.suppress(WriteFailed):  # the status states the error
                 recorder.close()
-        except KeyboardInterrupt:
-            self.given_up = recorder.unwritten()
-            raise
         status = recorder.status
         return Ended(EndReason.DISK if status.error else by, status, recorder.contents(), self._tee.absent(end_ns))
 

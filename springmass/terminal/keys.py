@@ -10,6 +10,8 @@ import sys
 import threading
 from collections.abc import Iterator
 
+from springmass.stops import STOPS
+
 try:
     import termios
     import tty
@@ -46,6 +48,7 @@ def marks_by_keys(*, watched: bool) -> Iterator[Marks | None]:
         yield marks
         return
     before = termios.tcgetattr(descriptor)
+    STOPS.leaving.append(lambda: termios.tcsetattr(descriptor, termios.TCSANOW, before))
     wake, end = os.pipe()
     thread = threading.Thread(target=_keys, args=(descriptor, wake, marks), name="springmass-marks", daemon=True)
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pipeline.streaming import LiveMotion, NotYet
 from springmass.session.display.progress import Progress, Trouble, TroubleKind
-from springmass.session.stops import EndReason
+from springmass.stops import EndReason
 from springmass.terminal.console import Console
 from springmass.terminal.quantities import concise
 from springmass.terminal.style import PLAIN, TerminalStyle

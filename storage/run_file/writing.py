@@ -160,6 +160,8 @@ class RunWriter:
                 problem = f"expected {size} bytes of {name}, got {at - start}: it has changed meanwhile"
                 raise WriteFailed(self.path, problem, "try again")
             self._originals += (FileEntry(name, size, digest.hexdigest()),)
+        with writing_h5(self.path):
+            del array  # HDF5 writes the rest
 
     def finish(self, info: SourceInfo, *, traps: Sequence[Trap] = (), **header: Any) -> None:
         """Write the remaining samples and the header.
