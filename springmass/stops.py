@@ -11,6 +11,7 @@ import signal
 import socket
 import sys
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from types import FrameType
 
@@ -156,10 +157,17 @@ class Stops:
             os._exit(INTERRUPTED)
 
 
+_OF_CALLBACKS = (weakref.__file__, weakref.WeakSet.__init__.__code__.co_filename)
+"""The modules that Python calls when an object is gone."""
+
+
 def _swallows(frame: FrameType | None) -> bool:
-    """Return whether Python is in an import or a destructor, which drop or convert what a handler raises."""
+    """Return whether Python drops or converts what a handler raises: in an import, a destructor or its callbacks."""
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib") or frame.f_code.co_name == "__del__":
+        code = frame.f_code
+        if code.co_filename.startswith("<frozen importlib") or code.co_filename in _OF_CALLBACKS:
+            return True
+        if code.co_name == "__del__":
             return True
         frame = frame.f_back
     return False
