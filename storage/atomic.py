@@ -89,11 +89,15 @@ def lock_new(path: Path, opened: Callable[[Path], int]) -> int | None:
         if sys.platform == "win32":
             os.close(descriptor)
             return None
-        with contextlib.suppress(OSError):  # a file system without locks
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-        with contextlib.suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
-                return descriptor
+        try:
+            with contextlib.suppress(OSError):  # a file system without locks
+                fcntl.flock(descriptor, fcntl.LOCK_EX)
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(descriptor), os.lstat(path)):
+                    return descriptor
+        except BaseException:  # a Ctrl-C: the next writer of this process must not wait for this lock
+            os.close(descriptor)
+            raise
         os.close(descriptor)  # the writer that held the lock has moved or removed the file
 
 
