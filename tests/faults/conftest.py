@@ -28,6 +28,7 @@ STEP_S = 0.01
 FIRST_US, STEP_US = 1000.0, 0.25
 SPEED_M_PER_S = 344.0
 LIMIT_S = 180.0
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def line_of(number: int, *, heard: bool = True) -> bytes:
@@ -35,6 +36,12 @@ def line_of(number: int, *, heard: bool = True) -> bytes:
     echo = f"{FIRST_US + STEP_US * number:.2f}" if heard else ""
     body = f"R1,{number},{number * 10_000},{echo},2000,{'E' if heard else 'N'}".encode("ascii")
     return b"$%s*%04X\n" % (body, binascii.crc_hqx(body, 0xFFFF))
+
+
+def usual_signals() -> None:
+    """Give the signals their usual effect: a child inherits what the caller of the tests ignores."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_DFL)
 
 
 class Feeder:

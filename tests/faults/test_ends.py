@@ -23,6 +23,7 @@ import pytest
 
 from springmass.cli import main
 from storage.run_file.reading import open_run
+from tests.faults.conftest import usual_signals
 
 ENDS = int(os.environ.get("SPRINGMASS_ENDS", "8"))
 ANSWER_S = 100.0
@@ -119,12 +120,6 @@ ENDINGS: dict[str, tuple[tuple[str, ...], Callable[[Any], None], int]] = {
     "kill": ((), end_by_signal(signal.SIGTERM, 2), 130),
     "a closed terminal": ((), end_by_signal(signal.SIGHUP), 130),
 }
-
-
-def usual_signals() -> None:
-    """Undo what whoever started the tests may ignore, for children inherit that."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
 
 
 def play(bench: Any, folder: Path, display: str, end: str) -> None:

@@ -22,11 +22,10 @@ from springmass.cli import main
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
-from tests.faults.conftest import line_of
+from tests.faults.conftest import SIGNALS, line_of, usual_signals
 from tests.wire import append
 
 TRIALS = 200 if os.environ.get("SPRINGMASS_TRIALS") else 8
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 LIMIT_S = 600.0
 ANSWER_S = 60.0
 """The program leaves within two seconds, where the machine is not thirty times as busy."""
@@ -205,12 +204,6 @@ def started(words: list[str], before: str) -> subprocess.Popen[str]:
     assert program.stdout is not None
     assert program.stdout.readline() == "begins\n"
     return program
-
-
-def usual_signals() -> None:
-    """Undo what whoever started the tests may ignore, for children inherit that."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_DFL)
 
 
 if __name__ == "__main__":

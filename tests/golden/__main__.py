@@ -3,7 +3,7 @@
     python -m tests.golden                  # every command line and every damaged log; exit code 1 if anything changed
     python -m tests.golden --every 20       # every twentieth of them
     python -m tests.golden --add            # freeze the cases of `further` that the file lacks; it never overwrites one
-    VALUES=0.02 US=0.02 python -m tests.golden   # a value may move by 0.02 u and a u by 2 %, for 0.1 u and a quarter
+    VALUES=0.1 US=0.25 python -m tests.golden    # a value may move by 0.1 u, and a u by a quarter
 
 `--only TEXT` takes the command lines that contain a text; `--first` ends at the first difference.
 """

@@ -1,8 +1,8 @@
 """What a command line says, as a flat table, and its comparison with what 0.2.0 (commit 1096557) said.
 
 Only the command line is called, so nothing here holds a module, a class or a stage in place. A golden is a table of
-path -> [value, tolerance]. A value may move by a tenth of its uncertainty u, and u by a quarter of itself (``VALUES``
-and ``US`` in the environment); counts, codes of findings, laws and exit codes are exact. Goldens are never regenerated,
+path -> [value, tolerance]. A value may move by ``TOLERANCE`` of its uncertainty u, and u by ``TOLERANCE`` of itself;
+counts, codes of findings, laws and exit codes are exact. Goldens are never regenerated,
 so that small moves do not add up. A change on purpose is a line of the ``.allow`` file: a pattern of ``command line |
 path``, ``#`` and the reason; it names one code or one kind of recording. Where an option or a JSON name changes, one
 table in ``run`` or ``outcome`` translates the old into the new.
@@ -36,9 +36,9 @@ ROOT = HERE.parents[1]
 RECORDINGS = ROOT.parent / "shared" / "recordings"
 FROZEN, ALLOWED = HERE / "golden-0.2.0.json", HERE / "golden-0.2.0.allow"
 TOLERANCE, EXACT = 0.02, 1e-9
-GROW = float(os.environ.get("VALUES", "0.1")) / TOLERANCE
-GROW_U = float(os.environ.get("US", "0.25")) / TOLERANCE
-"""A simpler pipeline may move a value by a tenth of its u and a u by a quarter; storage and reading move nothing."""
+GROW = float(os.environ.get("VALUES", TOLERANCE)) / TOLERANCE
+GROW_U = float(os.environ.get("US", TOLERANCE)) / TOLERANCE
+"""By VALUES=0.1 US=0.25 a simpler estimation may move a value by a tenth of its u and a u by a quarter of itself."""
 KEPT = ("quality", "estimates", "spring", "joint_damping", "comparison", "classic", "equation", "method", "amplitude_m")
 STANDARDISED = ("pull", "chi2", "excess_chi2")
 """Numbers in units of a standard uncertainty, or squares of such: ten thousandths of it are rounding."""

@@ -59,7 +59,7 @@ def test_what_means_nothing_is_refused_and_the_page_goes_on(start: Callable[...,
 
 
 def test_many_idle_connections_disturb_nobody(start: Callable[..., Any]) -> None:
-    """With 400 idle connections whoever was there before goes on seeing, and few lines are written."""
+    """With 400 idle connections the earlier viewers still see new samples, and few lines are written."""
     program = start("page", str(OLD_RUN))
     client = Client(program.address)
     with contextlib.ExitStack() as stack:

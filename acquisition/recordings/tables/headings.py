@@ -1,4 +1,4 @@
-"""Headings of columns: their words for time and uncertainty, their units, and names that can be told apart."""
+"""Headings of columns: their words for time and uncertainty, their units, and distinct names."""
 
 from __future__ import annotations
 

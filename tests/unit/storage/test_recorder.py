@@ -265,7 +265,7 @@ def test_a_read_that_is_larger_than_the_queue_is_an_overflow_at_once() -> None:
 
 
 def test_reads_that_a_hanging_disk_has_not_taken_are_counted() -> None:
-    """Those of the write that hangs and those that wait, but no marks: a user who waits no longer is told."""
+    """The count has the write that hangs and those that wait, but no marks; the user sees it when leaving."""
     disk = Disk()
     recording = recorder(disk)
     disk.writes_pass.clear()

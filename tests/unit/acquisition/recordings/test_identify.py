@@ -41,7 +41,7 @@ def test_a_format_may_be_named(run: Path) -> None:
     ("head", "title"), [(b"\x89HDF\r\n\x1a\n" + bytes(99), "HDF5"), (b"\0\0\0\x20ftypisom" + bytes(99), "video")]
 )
 def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, head: bytes, title: str) -> None:
-    """HDF5 and video are told by content, whatever the file is called."""
+    """HDF5 and video are recognised by content, whatever the file is called."""
     path = tmp_path / "run.csv"
     path.write_bytes(head)
     with pytest.raises(UnknownFormat) as caught:
