@@ -81,6 +81,7 @@ MEASURES = {
     for unit, power in units.items()
 }
 """The measure of each unit that a channel may have."""
+NUMBER = MEASURES["1"]
 
 
 def unit_words(unit: str) -> str:

@@ -19,8 +19,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import clock_s, parse_number
-from acquisition.recordings.tables.dialect import Header, text_format
+from acquisition.recordings.tables.dialect import text_format
 from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading
 from acquisition.recordings.tables.layout import (
     Layout,
@@ -31,7 +32,7 @@ from acquisition.recordings.tables.layout import (
     times_by_name,
     times_by_steps,
 )
-from acquisition.recordings.tables.table import Formula
+from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text, decode
 from acquisition.recordings.units import measure_of, time_power
 

@@ -10,10 +10,11 @@ import msgspec
 
 from acquisition.errors import AcquisitionError
 from acquisition.recordings.base import dialect_folder
-from acquisition.recordings.tables.dialect import Header, text_format
+from acquisition.recordings.sampling.timing import Formula
+from acquisition.recordings.tables.dialect import text_format
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import Heading
-from acquisition.recordings.tables.table import Formula
+from acquisition.recordings.tables.table import Header
 from acquisition.recordings.units import TIMES, time_power
 from acquisition.regular_file import open_regular_text
 

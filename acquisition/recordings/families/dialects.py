@@ -23,7 +23,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from acquisition.recordings.tables.cells import parse_number
-from acquisition.recordings.tables.dialect import Header, text_format
+from acquisition.recordings.tables.dialect import text_format
 from acquisition.recordings.tables.headings import (
     Heading,
     guess_delimiter,
@@ -32,6 +32,7 @@ from acquisition.recordings.tables.headings import (
     split_heading,
     words,
 )
+from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Line, Text
 
 _CAPSTONE = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+|Run \d+)")

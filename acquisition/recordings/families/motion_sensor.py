@@ -30,8 +30,8 @@ from acquisition.recordings.sampling.nominal import median, time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS, value_traps
 from acquisition.recordings.sampling.velocity import find_quantum, find_tick, integrate, outer_join
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, parse_number, scaled
+from acquisition.recordings.tables.channel import Samples, read_channel
 from acquisition.recordings.tables.choose import Answers
-from acquisition.recordings.tables.format import Reading, read_channel
 from acquisition.recordings.tables.headings import guess_delimiter, is_time, name_and_unit, split_cells
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Table
@@ -75,7 +75,7 @@ class File(NamedTuple):
 
     path: str
     data: bytes
-    reading: Reading
+    reading: Samples
     quantum: float
     error_m: float | None
     found: tuple[Trap, ...]
@@ -92,12 +92,12 @@ class File(NamedTuple):
 
     def step(self) -> float:
         """Return the change of position in one sample (m) of which all velocities are multiples."""
-        samples, tick = self.reading.samples, self.tick()
+        samples, tick = self.reading, self.tick()
         return (find_quantum(samples.value, tick) if tick else samples.resolution) / samples.timing.rate_hz
 
     def tick(self) -> float | None:
         """Return the step (m or m/s) of which all values are multiples; None if there is no evident step."""
-        return find_tick(self.reading.value, self.reading.samples.resolution)
+        return find_tick(self.reading.value, self.reading.resolution)
 
     def recording(self, block: Block, quantum_m: float, more: Iterable[Trap] = ()) -> Recording:
         """Return the recording of a block."""
@@ -133,8 +133,8 @@ class MotionSensor:
             file = _read(path, data, Answers())
         except NeedsAnswer:
             return ()
-        column, samples = file.reading.column, file.reading.samples
-        traps = (*file.reading.traps, *samples.traps, *file.found)
+        column, samples = file.reading.column, file.reading
+        traps = (*file.reading.traps, *file.found)
         return (Survey("", column.name, column.unit, samples.t.size, samples.timing.rate_hz, traps),)
 
     def read(
@@ -153,7 +153,7 @@ class MotionSensor:
         file = _read(path, data, Answers(channel, rate_hz, unit, run, time, time_unit))
         if file.quantity == "velocity":
             return _velocity_alone(file)
-        samples = file.reading.samples
+        samples = file.reading
         return file.recording(Block(0, samples.t, file.reading.value, samples.flags), file.quantum)
 
     def read_pair(
@@ -184,7 +184,9 @@ def _read(path: str, data: bytes, answers: Answers) -> File:
     layout = _find_layout(path, [line.text for line in head], answers.channel, answers.unit)
     first, below = head[layout.lines], [line.text for line in head[layout.lines :] if line.text.strip()]
     delimiter = guess_delimiter(next(filter(_is_row, below), below[0]))
-    read, lines, traps = read_rows(path, text, first, delimiter)
+    table = read_rows(path, text, first, delimiter)
+    read, lines, traps = table.columns, table.lines, table.traps
+    assert lines
     if len(read) < layout.columns:
         raise _no_rows(path, first.number, f"rows of {layout.columns} numbers")
     columns = [each.of_size(lines.rows) for each in read]
@@ -202,7 +204,7 @@ def _read(path: str, data: bytes, answers: Answers) -> File:
     reading = read_channel(path, [table], replace(answers, channel=None, unit=None), difference=velocity)
     found, error_m = [], None
     if layout.columns == 3:
-        errors = scaled(columns[2].values, columns[2].decimals, reading.measured.power)[reading.samples.sound]
+        errors = scaled(columns[2].values, columns[2].decimals, reading.measured.power)[reading.sound]
         errors = errors[np.isfinite(errors)]
         error_m = median(errors) if errors.size else None
         if error_m is not None and np.mean(errors == error_m) >= _CONSTANT:
@@ -211,9 +213,9 @@ def _read(path: str, data: bytes, answers: Answers) -> File:
             found.append(Trap("stated_error_is_not_noise", message))
         elif error_m is not None and layout.assumed:
             raise _no_column_line(path, "three columns that all vary", first.number)
-    quantum = resolution = reading.samples.resolution
+    quantum = resolution = reading.resolution
     if not velocity:
-        quantum, seen = value_traps(reading.value, reading.samples.flags, resolution, reading.samples.line)
+        quantum, seen = value_traps(reading.value, reading.flags, resolution, reading.line)
         found.extend(seen)
     return File(path, data, reading, quantum, error_m, tuple(found))
 
@@ -330,7 +332,7 @@ def _shape(lines: Sequence[str]) -> Layout | None:
 
 def _velocity_alone(file: File) -> Recording:
     """Integrate velocity to position; the first sample is at zero, because the file does not contain the offset."""
-    samples, value = file.reading.samples, file.reading.value
+    samples, value = file.reading, file.reading.value
     rate_hz, flags = samples.timing.rate_hz, samples.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
     index = np.rint(samples.t[regular] * rate_hz).astype(np.int64)
@@ -350,7 +352,7 @@ def _velocity_alone(file: File) -> Recording:
 
 
 def _join(position: File, velocity: File) -> Recording:
-    p, v = position.reading.samples, velocity.reading.samples
+    p, v = position.reading, velocity.reading
     rate_hz = p.timing.rate_hz
     if abs(v.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
         problem = f"expected {rate_hz:g} Hz as in {position.name}, got {v.timing.rate_hz:g} Hz"
@@ -372,15 +374,15 @@ def _join(position: File, velocity: File) -> Recording:
     joined = position.recording(block, quantum_m, _join_traps(position, velocity, from_p, from_v))
     return replace(
         joined,
-        malformed_rows=p.malformed_rows + v.malformed_rows,
+        malformed_rows=int(np.count_nonzero(~p.sound)) + int(np.count_nonzero(~v.sound)),
         originals=tuple(Original(each.name, each.data) for each in (position, velocity)),
     )
 
 
 def _join_traps(position: File, velocity: File, from_p: I8, from_v: I8) -> Iterable[Trap]:
     """Yield the remarks on the velocity file, except those that apply to both files, and on the two together."""
-    p, v = position.reading.samples, velocity.reading.samples
-    for trap in (*velocity.reading.traps, *v.traps, *velocity.found):
+    p, v = position.reading, velocity.reading
+    for trap in (*velocity.reading.traps, *velocity.found):
         if trap.code not in ("nominal_clock", "rate_assumed", "rate_given"):
             yield replace(trap, message=f"in {velocity.name}: {trap.message}")
     alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))

@@ -24,6 +24,15 @@ _REGULAR_INTERVALS = 0.9  # minimum share of intervals that differ from the medi
 _SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; two rows may be two sensors
 
 
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """Times ``start_s + i * step_s`` as stated in a header, and the number of samples, if the header states it."""
+
+    start_s: float
+    step_s: float
+    samples: int | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
     """The rows of one channel, before they become samples; every array has one element for each row.
@@ -137,25 +146,21 @@ def _jitter(printed: F8) -> tuple[float, float] | None:
     return (low, high) if high - low <= _SHARE_OF_JITTER * middle else None
 
 
-def find_timing(
-    path: str, rows: Rows, formula: tuple[float, float, int | None] | None, rate_hz: float | None
-) -> tuple[Timing, list[Trap]]:
+def find_timing(path: str, rows: Rows, formula: Formula | None, rate_hz: float | None) -> tuple[Timing, list[Trap]]:
     """Return the rate and the grid of the times: those of the header if no column contradicts it, or of the column.
 
-    A formula is the start and the step of the times, s, and the number of samples, as a header states them. Without
-    any times the user must give the rate.
+    Without any times the user must give the rate.
     """
     traps: list[Trap] = []
     timing = None
     if formula is not None:
-        start_s, step_s, samples = formula
-        count = int(np.count_nonzero(~rows.remark))
+        samples, count = formula.samples, int(np.count_nonzero(~rows.remark))
         if samples is not None and samples != count:
             message = f"the header declares {samples} samples, but there are {count} rows; all are kept"
             traps.append(Trap("stale_header", message, abs(samples - count)))
-        timing = _by_formula(path, start_s, step_s, rows, rate_hz)
+        timing = _by_formula(path, formula, rows, rate_hz)
         if timing is None:
-            stated = f"the header states the times {start_s:g} s + i * {step_s:g} s"
+            stated = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
             what = "which are impossible" if rows.printed is None else "but the column of times differs and is used"
             size = 1 if rows.printed is None else rows.printed.size
             traps.append(Trap("stale_header", f"{stated}, {what}", size))
@@ -169,8 +174,9 @@ def find_timing(
     return timing, traps
 
 
-def _by_formula(path: str, start_s: float, step_s: float, rows: Rows, rate_hz: float | None) -> Timing | None:
+def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) -> Timing | None:
     """Return the times of a header; None if they are impossible or the column of times differs beyond its rounding."""
+    start_s, step_s = formula.start_s, formula.step_s
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
     if rows.printed is not None and rows.tolerance is not None:

@@ -3,60 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 
 from acquisition.errors import FormatError
-from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.format import ColumnFormat
-from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.rows import Sheet, read_rows
-from acquisition.recordings.tables.table import Formula, Table, side_by_side
+from acquisition.recordings.tables.table import Header, Table, side_by_side
 from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
 
 _HEAD_LINES = 300
 _MOST_RUNS = 5000
-
-
-@dataclass(frozen=True, slots=True)
-class Header:
-    """What the lines above the rows of a text say.
-
-    Parameters
-    ----------
-    why : str
-        A few words on why the text belongs to its family.
-    lines : int
-        Number of lines above the rows.
-    delimiter : str
-        The separator of cells; empty for runs of white space.
-    headings : sequence of Heading
-        One for each column.
-    formula : Formula or None
-        The times, if no column contains them.
-    run, title, start_time : str
-    ragged : bool
-        Whether a channel may end before its times, because longer channels share them.
-    traps : tuple of Trap
-        Remarks on the file as a whole.
-    clock : int or None
-        A column of times of day.
-    brackets : bool
-        Whether rows are a matrix of MATLAB, in brackets and with semicolons at their ends.
-    """
-
-    why: str
-    lines: int
-    delimiter: str
-    headings: Sequence[Heading]
-    formula: Formula | None = None
-    run: str = ""
-    title: str = ""
-    start_time: str = ""
-    ragged: bool = False
-    traps: tuple[Trap, ...] = ()
-    clock: int | None = None
-    brackets: bool = False
 
 
 def text_format(
@@ -136,19 +93,16 @@ def _tables(path: str, text: Text | Sheet, begin: Line, header: Header, stop: in
     else:
         end = Line(begin.number + header.lines, text.stop, text.stop, "")
         first = next(islice(text.lines(begin.start, begin.number), header.lines, None), end)
-    columns, rows, traps = read_rows(
-        path, text, first, header.delimiter, stop=stop, clock=header.clock, brackets=header.brackets
-    )
-    common = Table(
-        (),
+    read = read_rows(path, text, first, header.delimiter, stop=stop, clock=header.clock, brackets=header.brackets)
+    common = replace(
+        read,
         formula=header.formula,
         title=header.title,
         start_time=header.start_time,
         ragged=header.ragged,
-        traps=(*header.traps, *traps),
-        lines=rows,
+        traps=(*header.traps, *read.traps),
     )
-    tables = side_by_side(columns, header.headings, common, header.run)
+    tables = side_by_side(common, header.headings, header.run)
     if not tables:
         raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
     return tables

@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from acquisition.recordings.tables.cells import (
     read_cells,
     split_page,
 )
-from acquisition.recordings.tables.table import Column, Lines
+from acquisition.recordings.tables.table import Column, Lines, Table
 from acquisition.recordings.tables.text import Line, Text
 
 _MOST_EMPTY = 4_000_000
@@ -37,14 +36,6 @@ _THOUSANDS = re.compile(
     + rb"(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:,\d{3}){2,}|(?:\.\d{3}){2,}"
     + rb"|(?:(?: |'|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)\d{3})+(?:[.,]\d*)?)(?:[eE][-+]?\d+)?"
 )
-
-
-class Rows(NamedTuple):
-    """Columns without names, each as long as its last cell, where the rows stand, and remarks on all of them."""
-
-    columns: list[Column]
-    lines: Lines
-    traps: tuple[Trap, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,8 +63,8 @@ def read_rows(
     stop: int | None = None,
     clock: int | None = None,
     brackets: bool = False,
-) -> Rows:
-    """Read the rows from line ``first`` on; blank lines are no rows.
+) -> Table:
+    """Read the rows from line ``first`` on, as columns without names; blank lines are no rows.
 
     The cells of column ``clock`` are times of day. With brackets, ``[``, ``]`` and ``;`` are blanks.
     """
@@ -126,7 +117,7 @@ def read_rows(
     words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
     last_cell = last[0].decode("latin-1").replace(",", ".") if last else ""
     lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, last_cell, text.zeros)
-    return Rows(columns, lines, traps)
+    return Table(tuple(columns), lines=lines, traps=traps)
 
 
 def _count_from_first(column: Column) -> None:
@@ -139,7 +130,7 @@ def _count_from_first(column: Column) -> None:
         column.values[known] = [round(each, decimals) for each, decimals in zip(since, places, strict=True)]
 
 
-def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Rows:
+def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Table:
     columns = []
     for at, cells in enumerate(sheet.columns):
         below = cells[first - 1 :]
@@ -159,7 +150,7 @@ def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Rows:
         _count_from_first(columns[clock])
     skipped = np.cumsum(filled)[~filled].astype(np.int64)
     lines = Lines(first, int(filled.sum()), skipped, columns[0].forms == UNREAD)
-    return Rows(columns, lines)
+    return Table(tuple(columns), lines=lines)
 
 
 class _Marks:

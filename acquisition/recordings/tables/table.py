@@ -11,6 +11,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import EMPTY, I1
 from acquisition.recordings.tables.headings import Heading, numbered_apart, role_of
 from acquisition.recordings.units import Measure, measure_of
@@ -79,15 +80,6 @@ class Column:
         return replace(self, values=np.concatenate((self.values, np.full(more, np.nan))), decimals=decimals)
 
 
-@dataclass(frozen=True, slots=True)
-class Formula:
-    """Times ``start_s + i * step_s`` as stated in a header, and the number of samples, if the header states it."""
-
-    start_s: float
-    step_s: float
-    samples: int | None = None
-
-
 class Lines(NamedTuple):
     """Where rows stand in a text.
 
@@ -109,6 +101,47 @@ class Lines(NamedTuple):
     def line(self, row: int) -> int:
         """Return the one-based line number of a row."""
         return self.first + int(row) + int(np.searchsorted(self.skipped, row, side="right"))
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What the lines above the rows of a text say.
+
+    Parameters
+    ----------
+    why : str
+        A few words on why the text belongs to its family.
+    lines : int
+        Number of lines above the rows.
+    delimiter : str
+        The separator of cells; empty for runs of white space.
+    headings : sequence of Heading
+        One for each column.
+    formula : Formula or None
+        The times, if no column contains them.
+    run, title, start_time : str
+    ragged : bool
+        Whether a channel may end before its times, because longer channels share them.
+    traps : tuple of Trap
+        Remarks on the file as a whole.
+    clock : int or None
+        A column of times of day.
+    brackets : bool
+        Whether rows are a matrix of MATLAB, in brackets and with semicolons at their ends.
+    """
+
+    why: str
+    lines: int
+    delimiter: str
+    headings: Sequence[Heading]
+    formula: Formula | None = None
+    run: str = ""
+    title: str = ""
+    start_time: str = ""
+    ragged: bool = False
+    traps: tuple[Trap, ...] = ()
+    clock: int | None = None
+    brackets: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,39 +187,35 @@ class Table:
         return self.times is not None or self.formula is not None
 
 
-def side_by_side(
-    columns: Sequence[Column], headings: Sequence[Heading], common: Table = Table(()), run: str = ""
-) -> list[Table]:
-    """Return the tables of columns: each column has the times to its left, or else the first times of its run.
+def side_by_side(table: Table, headings: Sequence[Heading], run: str = "") -> list[Table]:
+    """Return the tables of a table's columns: each column has the times to its left, or else the first of its run.
 
-    If any heading names a run, columns without a heading are ignored. ``common`` states everything else.
+    If any heading names a run, columns without a heading are ignored.
     """
-    roles = [role_of(each) for each in headings]
     none = Column("", "", np.empty(0), np.empty(0, np.int8))  # a heading without cells
-    columns = [*columns, *[none] * (len(headings) - len(columns))]
-    runs = any(each.run for each in headings)
-    columns = [
+    read = [*table.columns, *[none] * (len(headings) - len(table.columns))]
+    roles, runs = [role_of(each) for each in headings], any(each.run for each in headings)
+    columns = tuple(
         replace(column, name=each.name or f"column {number}", unit=each.unit, aside=role == "aside")
-        for number, (column, each, role) in enumerate(zip(columns, headings, roles, strict=False), 1)
+        for number, (column, each, role) in enumerate(zip(read, headings, roles, strict=False), 1)
+    )
+    times = {headings[at].run: at for at in reversed(range(len(headings))) if roles[at] == "time"}
+    channels: dict[tuple[str, int | None], list[Column]] = {}
+    for at, (each, role) in enumerate(zip(headings, roles, strict=True)):
+        if role == "time":
+            times[each.run] = at
+        elif role != "ignored" and (each.name or each.run or not runs):
+            channels.setdefault((each.run, times.get(each.run)), []).append(columns[at])
+    return [
+        replace(
+            table,
+            columns=tuple(own),
+            times=None if time is None else columns[time],
+            run=own_run or run,
+            beside=columns,
+        )
+        for (own_run, time), own in channels.items()
     ]
-    channels = [
-        at
-        for at, each in enumerate(headings)
-        if roles[at] in ("channel", "aside") and (each.name or each.run or not runs)
-    ]
-    tables = []
-    for own_run in dict.fromkeys(headings[at].run for at in channels):
-        times = [at for at in range(len(columns)) if roles[at] == "time" and headings[at].run == own_run]
-        groups: dict[int | None, list[Column]] = {}
-        for at in channels:
-            if headings[at].run == own_run:
-                time = max((each for each in times if each < at), default=times[0] if times else None)
-                groups.setdefault(time, []).append(columns[at])
-        for time, own in groups.items():
-            time_column = None if time is None else columns[time]
-            table = replace(common, columns=tuple(own), times=time_column, run=own_run or run, beside=tuple(columns))
-            tables.append(table)
-    return tables
 
 
 def names_apart(tables: Sequence[Table]) -> list[Table]:
