@@ -26,7 +26,6 @@ from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.dialect import text_format
 from acquisition.recordings.tables.headings import (
     Heading,
-    guess_delimiter,
     is_time,
     name_and_unit,
     split_heading,
@@ -128,7 +127,7 @@ def tracker(lines: Sequence[str]) -> Header | None:
             return None
         mass = " ".join(above)
         why = f'line {at + 1} is "{" ".join(cells)}"' + (f' below "{mass}"' if at else "")
-        return Header(why, at + 1, mark or guess_delimiter(row), headings, title=mass)
+        return Header(why, at + 1, mark, headings, title=mass)
     return None
 
 

@@ -123,21 +123,6 @@ def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
     return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells], mark
 
 
-def guess_delimiter(line: str) -> str:
-    """Return the separator of the cells of a row; an empty string means runs of white space.
-
-    A comma is the separator only if there is no other separator, because it may be a decimal mark.
-    """
-    for mark in "\t;":
-        if mark in line:
-            return mark
-    if "," not in line:
-        return ""
-    # "0,43 16,5" is separated by blanks; "0.43, 16.5" by commas.
-    by_blanks = any(cell and cell[-1] != "," for cell in line.strip(" ").split(" ")[:-1])
-    return "" if by_blanks and ", " not in line else ","
-
-
 def split_cells(line: str, delimiter: str) -> list[str]:
     """Split a row into cells without blanks; separators at the end of the row are ignored."""
     if not delimiter:

@@ -100,7 +100,7 @@ def test_a_single_time_that_shoots_ahead_is_the_wrong_one() -> None:
     ("data", "line"),
     [
         (TITLE, 1),
-        (f"{TITLE}\n{POSITION}\n", 2),
+        (f"{TITLE}\n{POSITION}\n", 3),
         (f"{POSITION}\n0.000\t20.000\t0.239", None),
         (f"{POSITION}\n0.000\tNaN\t0.239\n0.010\tNaN\t0.239\n", 2),
         (f"{POSITION}\n0.000\t20.000\n0.010\t20.000\n", 2),
