@@ -37,11 +37,10 @@ class Formula:
 class Rows:
     """The rows of one channel, before they become samples; every array has one element for each row.
 
-    ``printed`` are the times as printed, s, or None; ``value`` the values in SI or a power of ten of it, NaN if unread
-    or absent. ``remark`` marks rows of text between samples, which are not samples. ``time_resolution`` (s) and
-    ``resolution`` are the last printed digits, the latter 0 for binary values. ``tolerance`` is half the last digit of
-    each time, if the times are compared with a formula in the header. ``cut`` says that the last row is incomplete,
-    ``last_cell`` is its first cell, and ``decimals`` the number of printed decimals of a time.
+    ``printed`` are the times as printed, s, or None; ``value`` the values in SI, NaN if unread or absent. ``remark``
+    marks rows of text between samples, which are not samples. ``time_resolution`` (s) and ``resolution`` are the last
+    printed digits, the latter 0 for binary values. ``cut`` says that the last row is incomplete, ``last_cell`` is its
+    first cell, and ``decimals`` the number of printed decimals of a time.
     """
 
     printed: F8 | None
@@ -51,7 +50,6 @@ class Rows:
     line: Callable[[int], int]
     time_resolution: float
     resolution: float
-    tolerance: F8 | None = None
     cut: bool = False
     last_cell: str = ""
     decimals: int = 0
@@ -179,9 +177,9 @@ def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) 
     start_s, step_s = formula.start_s, formula.step_s
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
-    if rows.printed is not None and rows.tolerance is not None:
+    if rows.printed is not None:
         expected = start_s + step_s * rows.numbers
-        slack = rows.tolerance * 1.0001 + 1e-9 * np.maximum(np.abs(expected), step_s)
+        slack = 0.5001 * rows.time_resolution + 1e-9 * np.maximum(np.abs(expected), step_s)
         if ((np.abs(rows.printed - expected) > slack) & ~rows.unread).any():  # the comparison is false for a NaN
             return None
     rate = 1.0 / step_s

@@ -13,7 +13,7 @@ from acquisition.errors import FormatError
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps
 from acquisition.recordings.sampling.timing import Rows, Timing, check_rate, clock_traps, find_timing
-from acquisition.recordings.tables.cells import EMPTY, EXPONENT, I1, UNREAD, scaled, usual_decimals
+from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
 from acquisition.recordings.tables.text import says_simulated
@@ -163,12 +163,10 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
         raise _no_numbers(path, column, 0, lines.first)
     chosen = _rows_in(keep)
     remark, unknown = remark[chosen], (unread | remark)[chosen]
-    printed, tolerance, time_digit, decimals = None, None, 0.0, 0
+    printed, time_digit, decimals = None, 0.0, 0
     if time is not None:
         printed = scaled(time.values, time.forms, to_seconds)[chosen]
         time_digit, decimals = last_digit(printed, time.forms, to_seconds), usual_decimals(time.forms)[0]
-        if table.formula is not None:
-            tolerance = _tolerance(printed, time.forms[chosen], to_seconds)
         printed, time_digit = printed * time_factor(time.unit), time_digit * time_factor(time.unit)
         beyond = ~(np.abs(printed) < _LONGEST_S)  # true for a NaN
         printed[beyond] = np.nan
@@ -191,7 +189,6 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
         line=line,
         time_resolution=time_digit,
         resolution=resolution,
-        tolerance=tolerance,
         cut=lines.cut and bool(unknown[-1]) and bool(keep[-1]),
         last_cell=lines.last_cell,
         decimals=decimals,
@@ -219,12 +216,3 @@ def last_digit(values: F8, decimals: I1, power: int) -> float:
         largest = float(np.fmax.reduce(np.abs(values), initial=0.0))
         power = int(np.floor(np.log10(largest))) if largest > 0 else power
     return float(f"1e{power - usual}")
-
-
-def _tolerance(printed: F8, decimals: I1, power: int) -> F8:
-    """Return half the last printed digit of each time, s; with an exponent, an estimate from the size of the time.
-
-    The estimate is not too small if the mantissa is at least 1.
-    """
-    places = np.where(decimals < 0, 0.0, decimals % EXPONENT)
-    return 0.5 * 10.0**-places * np.where(decimals >= EXPONENT, np.abs(printed), 10.0**power)

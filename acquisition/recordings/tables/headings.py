@@ -123,16 +123,6 @@ def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
     return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells], mark
 
 
-def split_cells(line: str, delimiter: str) -> list[str]:
-    """Split a row into cells without blanks; separators at the end of the row are ignored."""
-    if not delimiter:
-        return [cell for cell in line.replace("\t", " ").split(" ") if cell]
-    cells = [cell.strip(" ") for cell in line.split(delimiter)]
-    while cells and not cells[-1]:
-        cells.pop()
-    return cells
-
-
 def numbered_apart(names: Sequence[str]) -> list[str]:
     """Return unique names: repetitions of a name get a number."""
     seen: dict[str, int] = {}

@@ -16,7 +16,6 @@ from acquisition.recordings.tables.headings import (
     heading_of,
     is_time,
     is_uncertainty,
-    split_cells,
     split_heading,
 )
 from acquisition.recordings.units import measure_of, time_power
@@ -105,9 +104,14 @@ def _split_by(lines: Sequence[str], mark: str) -> Layout | None:
 
 
 def _cells(line: str, mark: str, brackets: bool) -> list[str]:
-    if '"' in line and mark and not brackets:
+    """Split a row into cells; separators at its end are ignored."""
+    if mark and '"' in line:
         return split_heading(line, mark)[0]
-    cells = split_cells(_BRACKETS.sub(" ", line) if brackets else line, mark)
+    line = _BRACKETS.sub(" ", line) if brackets else line
+    if mark:
+        cells = [cell.strip(" ") for cell in line.rstrip(mark + " ").split(mark)]
+    else:
+        cells = [cell for cell in line.replace("\t", " ").split(" ") if cell]
     return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells]
 
 
