@@ -39,8 +39,7 @@ class Rows:
 
     ``printed`` are the times as printed, s, or None; ``value`` the values in SI, NaN if unread or absent. ``remark``
     marks rows of text between samples, which are not samples. ``time_resolution`` (s) and ``resolution`` are the last
-    printed digits, the latter 0 for binary values. ``cut`` says that the last row is incomplete, ``last_cell`` is its
-    first cell, and ``decimals`` the number of printed decimals of a time.
+    printed digits, the latter 0 for binary values. ``cut`` says that the last row is incomplete.
     """
 
     printed: F8 | None
@@ -51,8 +50,6 @@ class Rows:
     time_resolution: float
     resolution: float
     cut: bool = False
-    last_cell: str = ""
-    decimals: int = 0
 
     @property
     def numbers(self) -> I8:

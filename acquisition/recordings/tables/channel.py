@@ -163,10 +163,10 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
         raise _no_numbers(path, column, 0, lines.first)
     chosen = _rows_in(keep)
     remark, unknown = remark[chosen], (unread | remark)[chosen]
-    printed, time_digit, decimals = None, 0.0, 0
+    printed, time_digit = None, 0.0
     if time is not None:
         printed = scaled(time.values, time.forms, to_seconds)[chosen]
-        time_digit, decimals = last_digit(printed, time.forms, to_seconds), usual_decimals(time.forms)[0]
+        time_digit = last_digit(printed, time.forms, to_seconds)
         printed, time_digit = printed * time_factor(time.unit), time_digit * time_factor(time.unit)
         beyond = ~(np.abs(printed) < _LONGEST_S)  # true for a NaN
         printed[beyond] = np.nan
@@ -190,8 +190,6 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
         time_resolution=time_digit,
         resolution=resolution,
         cut=lines.cut and bool(unknown[-1]) and bool(keep[-1]),
-        last_cell=lines.last_cell,
-        decimals=decimals,
     )
 
 

@@ -115,8 +115,7 @@ def read_rows(
     if clock is not None and clock < len(columns):
         _count_from_first(columns[clock])
     words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
-    last_cell = last[0].decode("latin-1").replace(",", ".") if last else ""
-    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, last_cell, text.zeros)
+    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, text.zeros)
     return Table(tuple(columns), lines=lines, traps=traps)
 
 
