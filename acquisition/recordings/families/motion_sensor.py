@@ -26,7 +26,7 @@ from acquisition.recordings.base import Survey
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.nominal import median, time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS, value_traps
-from acquisition.recordings.sampling.velocity import find_quantum, find_tick, integrate, outer_join
+from acquisition.recordings.sampling.velocity import integrate, outer_join
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
 from acquisition.recordings.tables.channel import Samples, read_channel
 from acquisition.recordings.tables.choose import Answers
@@ -123,16 +123,7 @@ class File(NamedTuple):
         """What the file holds."""
         return self.samples.column.name
 
-    def step(self) -> float:
-        """Return the change of position in one sample (m) of which all velocities are multiples."""
-        samples, tick = self.samples, self.tick()
-        return (find_quantum(samples.value, tick) if tick else samples.resolution) / samples.timing.rate_hz
-
-    def tick(self) -> float | None:
-        """Return the step (m or m/s) of which all values are multiples; None if there is no evident step."""
-        return find_tick(self.samples.value, self.samples.resolution)
-
-    def recording(self, block: Block, quantum_m: float, more: Sequence[Trap] = ()) -> Recording:
+    def recording(self, block: Block, quantum_m: float | None, more: Sequence[Trap] = ()) -> Recording:
         """Return the recording of a block."""
         return self.samples.recording(FORMAT.name, self.path, self.data, block, quantum_m, more, self.error_m)
 
@@ -199,7 +190,7 @@ def _velocity_alone(file: File) -> Recording:
     rate_hz, flags = samples.timing.rate_hz, samples.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
     index = np.rint(samples.t[regular] * rate_hz).astype(np.int64)
-    position, bridged = integrate(value[regular], index, rate_hz, file.tick(), samples.resolution / 2)
+    position, bridged = integrate(value[regular], index, rate_hz)
     distance = np.full(samples.t.size, np.nan)
     distance[regular] = position
     flags[regular[bridged]] |= Flag.GAP_BEFORE.value
@@ -211,7 +202,7 @@ def _velocity_alone(file: File) -> Recording:
         gaps = f"{holes} gap{'s' if holes > 1 else ''}, the first before t = {first:g} s"
         message = f"the velocity has {gaps}: the integrated position may jump there"
         traps.append(Trap("offset_unknown_after_gap", message, holes))
-    return file.recording(Block(0, samples.t, distance, flags, None, value), file.step(), traps)
+    return file.recording(Block(0, samples.t, distance, flags, None, value), None, traps)
 
 
 def _join(position: File, velocity: File) -> Recording:
@@ -232,9 +223,8 @@ def _join(position: File, velocity: File) -> Recording:
     flags = time_flags(t, 1.0 / rate_hz)
     flags |= np.where(in_p, p.flags[from_p], v.flags[from_v]) & UNREAD_FLAGS
     flags[~in_p] |= Flag.MISSING.value
-    quantum_m = velocity.step() if velocity.tick() else position.quantum_m
     block = Block(0, t, distance, flags, None, speed)
-    joined = position.recording(block, quantum_m, tuple(_join_traps(position, velocity, from_p, from_v)))
+    joined = position.recording(block, position.quantum_m, tuple(_join_traps(position, velocity, from_p, from_v)))
     return replace(
         joined,
         malformed_rows=int(np.count_nonzero(~p.sound)) + int(np.count_nonzero(~v.sound)),
