@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from acquisition.recordings.questions import Missing, MissingItem, Question
     from acquisition.recordings.recording import Original, Recording, Trap
     from acquisition.recordings.sampling.timing import Formula
-    from acquisition.recordings.tables.dialect import text_format
-    from acquisition.recordings.tables.format import ColumnFormat
+    from acquisition.recordings.tables.format import ColumnFormat, text_format
     from acquisition.recordings.tables.headings import Heading
     from acquisition.recordings.tables.table import Column, Header, Table
     from acquisition.source import SourceInfo
@@ -103,8 +102,7 @@ _WHERE = {
     "acquisition.recordings.questions": ("Missing", "MissingItem", "Question"),
     "acquisition.recordings.recording": ("Original", "Recording", "Trap"),
     "acquisition.recordings.sampling.timing": ("Formula",),
-    "acquisition.recordings.tables.dialect": ("text_format",),
-    "acquisition.recordings.tables.format": ("ColumnFormat",),
+    "acquisition.recordings.tables.format": ("ColumnFormat", "text_format"),
     "acquisition.recordings.tables.headings": ("Heading",),
     "acquisition.recordings.tables.table": ("Column", "Header", "Table"),
     "acquisition.source": ("SourceInfo",),

@@ -21,7 +21,7 @@ from dataclasses import replace
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import clock_s, parse_number
-from acquisition.recordings.tables.dialect import text_format
+from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading
 from acquisition.recordings.tables.layout import (
     Layout,

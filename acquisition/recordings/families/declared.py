@@ -11,8 +11,7 @@ import msgspec
 from acquisition.errors import AcquisitionError
 from acquisition.recordings.base import dialect_folder
 from acquisition.recordings.sampling.timing import Formula
-from acquisition.recordings.tables.dialect import text_format
-from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.units import TIMES, time_power

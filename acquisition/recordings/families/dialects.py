@@ -23,7 +23,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from acquisition.recordings.tables.cells import parse_number
-from acquisition.recordings.tables.dialect import text_format
+from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import (
     Heading,
     is_time,

@@ -13,10 +13,9 @@ the column line may have been edited or deleted; then the shape of the rows deci
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import PurePath
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,13 +24,12 @@ from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.base import Survey
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.nominal import median, time_flags
-from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS, value_traps
+from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.recordings.sampling.velocity import integrate, outer_join
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
-from acquisition.recordings.tables.channel import Samples, read_channel
+from acquisition.recordings.tables.channel import Samples, check_values, read_channel
 from acquisition.recordings.tables.choose import Answers
-from acquisition.recordings.tables.dialect import text_format
-from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.layout import columns_of, find_table, runs_forward
 from acquisition.recordings.tables.table import Header, Table
@@ -56,7 +54,7 @@ def header(lines: Sequence[str]) -> Header | None:
             quantity, unit = ("distance", match[2]) if match["distance"] else ("velocity", match[4])
             why = why or f"line {at} is the column line of {quantity} in {unit}"
             headings = _headings(quantity, unit, bool(match["error"]))
-            return Header(why, at, "\t", headings, title=_joined(lines[: at - 1]))
+            return Header(why, at, "\t", headings, title=_above(lines[: at - 1]))
     table = find_table(tuple(lines[title:_ROWS_OF_SHAPE]))
     columns = columns_of(table.rows) if table and not table.named else []
     shape = _shape(columns)
@@ -65,7 +63,7 @@ def header(lines: Sequence[str]) -> Header | None:
     at, quantity = title + table.at, "distance" if len(columns) == 3 else "velocity"
     trap = Trap("unit_assumed", f"no column line: read as time (s) and {shape}, in cm")
     headings, why = _headings(quantity, "cm", len(columns) == 3), why or f"the rows have the shape of {shape}"
-    return Header(why, at, table.mark, headings, title=_joined(lines[:at]), traps=(trap,))
+    return Header(why, at, table.mark, headings, title=_above(lines[:at]), traps=(trap,))
 
 
 def _shape(columns: Sequence[F8]) -> str:
@@ -80,7 +78,7 @@ def _shape(columns: Sequence[F8]) -> str:
     return "velocity, because the first value is NaN" if np.isnan(last[0]) and np.isfinite(last[1]) else ""
 
 
-def _joined(lines: Sequence[str]) -> str:
+def _above(lines: Sequence[str]) -> str:
     return " / ".join(line.strip() for line in lines if line.strip())
 
 
@@ -104,30 +102,6 @@ def _tables(path: str, data: bytes) -> list[Table]:
     return [replace(table, columns=(value,), lines=lines)]
 
 
-class File(NamedTuple):
-    """One file that was read: ``quantum_m`` is the step of which all distances are multiples, if it has distances."""
-
-    path: str
-    data: bytes
-    samples: Samples
-    quantum_m: float
-    error_m: float | None
-
-    @property
-    def name(self) -> str:
-        """The file's name without its folder."""
-        return PurePath(self.path).name
-
-    @property
-    def quantity(self) -> str:
-        """What the file holds."""
-        return self.samples.column.name
-
-    def recording(self, block: Block, quantum_m: float | None, more: Sequence[Trap] = ()) -> Recording:
-        """Return the recording of a block."""
-        return self.samples.recording(FORMAT.name, self.path, self.data, block, quantum_m, more, self.error_m)
-
-
 @dataclass(frozen=True, slots=True)
 class MotionSensor(ColumnFormat):
     """The MotionSensor.vi family: a velocity is summed up to a position, and two files are joined by time."""
@@ -135,7 +109,7 @@ class MotionSensor(ColumnFormat):
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Return the only channel of a file; an empty tuple if the user must state the rate."""
         try:
-            samples = self._file(path, data, Answers()).samples
+            samples = self._samples(path, data, Answers())
         except NeedsAnswer:
             return ()
         column, rate_hz = samples.column, samples.timing.rate_hz
@@ -143,51 +117,49 @@ class MotionSensor(ColumnFormat):
 
     def read(self, path: str, data: bytes, **answers: Any) -> Recording:
         """Read one file, either of position or of velocity; see :class:`springmass.extend.Format`."""
-        file = self._file(path, data, Answers(**answers))
-        if file.quantity == "velocity":
-            return _velocity_alone(file)
-        samples = file.samples
-        return file.recording(Block(0, samples.t, samples.value, samples.flags), file.quantum_m)
+        samples = self._samples(path, data, Answers(**answers))
+        if samples.column.name == "velocity":
+            return samples.recording(self.name, data, *_summed_up(samples))
+        return samples.recording(self.name, data, Block(0, samples.t, samples.value, samples.flags))
 
     def read_pair(
         self, position: tuple[str, bytes], velocity: tuple[str, bytes], *, rate_hz: float | None = None
     ) -> Recording:
         """Join a position file and a velocity file by time; they may be given in either order."""
-        a, b = (self._file(*each, Answers(rate_hz=rate_hz)) for each in (position, velocity))
-        if a.quantity == b.quantity:
-            problem = f"expected a position and a velocity file, got {a.quantity} in both ({a.name} too)"
-            raise FormatError(b.path, problem, "name the other file of the pair")
-        return _join(a, b) if a.quantity == "distance" else _join(b, a)
+        files = [(self._samples(*each, Answers(rate_hz=rate_hz)), each[1]) for each in (position, velocity)]
+        (p, own), (v, others) = sorted(files, key=lambda file: file[0].column.name)
+        if p.column.name == v.column.name:
+            problem = f"expected a position and a velocity file, got {p.column.name} in both ({p.name} too)"
+            raise FormatError(v.path, problem, "name the other file of the pair")
+        joined = p.recording(self.name, own, *_joined(p, v))
+        unread = joined.malformed_rows + int(np.count_nonzero(~v.sound))
+        return replace(joined, malformed_rows=unread, originals=(*joined.originals, Original(v.name, others)))
 
-    def _file(self, path: str, data: bytes, answers: Answers) -> File:
+    def _samples(self, path: str, data: bytes, answers: Answers) -> Samples:
+        """Read the samples of a file, m or m/s, with the error that it states."""
         tables = self.tables(path, data)
         velocity = tables[0].columns[0].name == "velocity"
         samples = read_channel(path, tables, answers, difference=velocity)
-        found: list[Trap] = []
-        error_m, power = None, samples.measured.power
         for column in samples.table.beside[2:-1]:
-            errors = scaled(column.values, column.decimals, power)
+            errors = scaled(column.values, column.decimals, samples.measured.power)
             errors = errors[np.isfinite(errors)]
             error_m = median(errors) if errors.size else None
+            samples = replace(samples, error_m=error_m)
             if error_m is not None and np.mean(errors == error_m) >= _CONSTANT:
-                size = f"{error_m / 10.0**power:g} {column.unit}"
+                size = f"{error_m / 10.0**samples.measured.power:g} {column.unit}"
                 message = f"the error column is a constant {size}: a stated value, not the noise"
-                found.append(Trap("stated_error_is_not_noise", message))
-        quantum = samples.resolution
-        if not velocity:
-            quantum, seen = value_traps(samples.value, samples.flags, quantum, samples.line)
-            found.extend(seen)
-        return File(path, data, replace(samples, traps=(*samples.traps, *found)), quantum, error_m)
+                trap = Trap("stated_error_is_not_noise", message)
+                samples = replace(samples, traps=(*samples.traps, trap))
+        return samples if velocity else check_values(samples, length=True)
 
 
 _TEXT = text_format("motion-sensor", "MotionSensor.vi text: position, velocity, or one of each", header)
 FORMAT = MotionSensor(_TEXT.name, _TEXT.title, _TEXT.evidence, _tables)
 
 
-def _velocity_alone(file: File) -> Recording:
+def _summed_up(samples: Samples) -> tuple[Block, Iterable[Trap]]:
     """Integrate velocity to position; the first sample is at zero, because the file does not contain the offset."""
-    samples, value = file.samples, file.samples.value
-    rate_hz, flags = samples.timing.rate_hz, samples.flags.copy()
+    value, rate_hz, flags = samples.value, samples.timing.rate_hz, samples.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
     index = np.rint(samples.t[regular] * rate_hz).astype(np.int64)
     position, bridged = integrate(value[regular], index, rate_hz)
@@ -202,42 +174,35 @@ def _velocity_alone(file: File) -> Recording:
         gaps = f"{holes} gap{'s' if holes > 1 else ''}, the first before t = {first:g} s"
         message = f"the velocity has {gaps}: the integrated position may jump there"
         traps.append(Trap("offset_unknown_after_gap", message, holes))
-    return file.recording(Block(0, samples.t, distance, flags, None, value), None, traps)
+    return Block(0, samples.t, distance, flags, None, value), traps
 
 
-def _join(position: File, velocity: File) -> Recording:
-    p, v = position.samples, velocity.samples
+def _joined(p: Samples, v: Samples) -> tuple[Block, Iterable[Trap]]:
+    """Join positions and velocities by their times."""
     rate_hz = p.timing.rate_hz
     if abs(v.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
-        problem = f"expected {rate_hz:g} Hz as in {position.name}, got {v.timing.rate_hz:g} Hz"
-        raise FormatError(velocity.path, problem, "name the velocity file of the same run")
+        problem = f"expected {rate_hz:g} Hz as in {p.name}, got {v.timing.rate_hz:g} Hz"
+        raise FormatError(v.path, problem, "name the velocity file of the same run")
     resolution = min(p.timing.resolution_s, v.timing.resolution_s)
     keys = [np.rint(t / resolution).astype(np.int64) for t in (p.t, v.t)]
     from_p, from_v = outer_join(keys[0], keys[1], (p.flags & IRREGULAR) == 0)
     in_p, in_v = from_p >= 0, from_v >= 0
     if not (in_p & in_v).any():
-        problem = f"expected times in common with {position.name}, got none"
-        raise FormatError(velocity.path, problem, "name the velocity file of the same run")
+        problem = f"expected times in common with {p.name}, got none"
+        raise FormatError(v.path, problem, "name the velocity file of the same run")
     t = np.where(in_p, p.t[from_p], v.t[from_v])
     distance, speed = np.where(in_p, p.value[from_p], np.nan), np.where(in_v, v.value[from_v], np.nan)
     flags = time_flags(t, 1.0 / rate_hz)
     flags |= np.where(in_p, p.flags[from_p], v.flags[from_v]) & UNREAD_FLAGS
     flags[~in_p] |= Flag.MISSING.value
-    block = Block(0, t, distance, flags, None, speed)
-    joined = position.recording(block, position.quantum_m, tuple(_join_traps(position, velocity, from_p, from_v)))
-    return replace(
-        joined,
-        malformed_rows=int(np.count_nonzero(~p.sound)) + int(np.count_nonzero(~v.sound)),
-        originals=tuple(Original(each.name, each.data) for each in (position, velocity)),
-    )
+    return Block(0, t, distance, flags, None, speed), _join_traps(p, v, from_p, from_v)
 
 
-def _join_traps(position: File, velocity: File, from_p: I8, from_v: I8) -> Iterator[Trap]:
+def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[Trap]:
     """Yield the remarks on the velocity file, except those that apply to both files, and on the two together."""
-    p, v = position.samples, velocity.samples
-    for trap in velocity.samples.traps:
+    for trap in v.traps:
         if trap.code not in ("nominal_clock", "rate_assumed", "rate_given"):
-            yield replace(trap, message=f"in {velocity.name}: {trap.message}")
+            yield replace(trap, message=f"in {v.name}: {trap.message}")
     alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
     if alone_v:
         message = f"{alone_v} times are only in the velocity file, so they have no distance"

@@ -29,8 +29,7 @@ from acquisition.block import F8
 from acquisition.errors import FormatError
 from acquisition.recordings.families.dialects import logger_pro, phyphox, tracker
 from acquisition.recordings.tables.cells import parse_number
-from acquisition.recordings.tables.dialect import text_format
-from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading, Role, is_time, name_and_unit, numbered_apart
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Table, side_by_side

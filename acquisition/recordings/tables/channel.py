@@ -11,7 +11,7 @@ import numpy as np
 from acquisition.block import B1, F8, I8, U8, Block, Flag
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Original, Recording, Trap
-from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps
+from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps, value_traps
 from acquisition.recordings.sampling.timing import Rows, Timing, check_rate, clock_traps, find_timing
 from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
@@ -29,9 +29,11 @@ class Samples:
     """The samples of a chosen channel in SI units, and the remarks on them and on the file.
 
     ``resolution`` is the size of the last printed digit of a value. ``line`` returns the line number of a sample; None
-    for a binary file. ``sound`` marks the rows of the table that could be read.
+    for a binary file. ``sound`` marks the rows of the table that could be read. ``quantum`` is the step of which all
+    values are multiples, and ``error_m`` the usual error that the file states.
     """
 
+    path: str
     table: Table
     column: Column
     measured: Measure
@@ -43,28 +45,26 @@ class Samples:
     traps: tuple[Trap, ...]
     line: Callable[[int], int | None]
     sound: B1
+    quantum: float | None = None
+    error_m: float | None = None
 
-    def recording(
-        self,
-        family: str,
-        path: str,
-        data: bytes,
-        block: Block,
-        quantum_m: float | None,
-        found: Iterable[Trap],
-        error_m: float | None = None,
-    ) -> Recording:
-        """Return the recording of a block, with what was found in its values."""
-        table, column, name = self.table, self.column, PurePath(path).name
+    @property
+    def name(self) -> str:
+        """The file's name without its folder."""
+        return PurePath(self.path).name
+
+    def recording(self, family: str, data: bytes, block: Block, more: Iterable[Trap] = ()) -> Recording:
+        """Return the recording of a block, which is made of these samples."""
+        table, column, name = self.table, self.column, self.name
         kind: Kind = "simulated" if says_simulated(f"{table.title} {table.run} {column.name} {name}") else "replay"
         clock: ClockKind = "device" if self.timing.grid is None else "nominal"
         return Recording(
             format=family,
-            path=path,
-            info=SourceInfo(kind, name, self.timing.rate_hz, None, quantum_m, clock, error_m),
+            path=self.path,
+            info=SourceInfo(kind, name, self.timing.rate_hz, None, self.quantum, clock, self.error_m),
             channel=column.name,
             samples=block,
-            traps=(*self.traps, *found),
+            traps=(*self.traps, *more),
             malformed_rows=int(np.count_nonzero(~self.sound)),
             originals=(Original(name, data),),
             title=table.title,
@@ -117,7 +117,13 @@ def read_samples(
         flags[0] &= ~np.uint8(Flag.MISSING)
     zeros = table.lines.zeros if table.lines else 0
     found += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line)]
-    return Samples(table, column, measured, t, value, flags, timing, rows.resolution, tuple(found), line, ~unread)
+    return Samples(path, table, column, measured, t, value, flags, timing, rows.resolution, tuple(found), line, ~unread)
+
+
+def check_values(samples: Samples, *, length: bool) -> Samples:
+    """Return samples with their quantum and with what is peculiar in their values; see :func:`value_traps`."""
+    quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.line, length=length)
+    return replace(samples, quantum=quantum or None, traps=(*samples.traps, *found))
 
 
 def rows_of(path: str, table: Table, column: Column, measured: Measure) -> Rows:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.base import Survey
 from acquisition.recordings.recording import Recording, Trap
-from acquisition.recordings.sampling.samples import value_traps
-from acquisition.recordings.tables.channel import read_channel, read_samples, rows_of
+from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.choose import Answers
-from acquisition.recordings.tables.table import Column, Header, Table, names_apart
+from acquisition.recordings.tables.rows import Sheet, read_rows
+from acquisition.recordings.tables.table import Column, Header, Table, names_apart, side_by_side
+from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
 from acquisition.recordings.units import NUMBER
+
+_HEAD_LINES = 300
+_MOST_RUNS = 5000
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +53,9 @@ class ColumnFormat:
         """Read one channel of one run; see :class:`springmass.extend.Format`."""
         samples = read_channel(path, self.tables(path, data), Answers(**answers))
         length = samples.measured.quantity == "length" and (samples.column.is_length or not samples.column.unit)
-        quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.line, length=length)
-        measured = samples.measured
+        samples, measured = check_values(samples, length=length), samples.measured
         block = Block(0, samples.t, samples.value, samples.flags, quantity=measured.quantity, unit=measured.si)
-        return samples.recording(self.name, path, data, block, quantum or None, found)
+        return samples.recording(self.name, data, block)
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Return the description of every channel, as far as the file states it."""
@@ -75,3 +79,95 @@ def _survey(path: str, table: Table, column: Column) -> Survey:
         return Survey(table.run, column.name, column.unit, 0, None, (none,))
     span_s = float(samples.t.max() - samples.t.min())
     return Survey(table.run, column.name, column.unit, samples.t.size, samples.timing.rate_hz, samples.traps, span_s)
+
+
+def text_format(
+    name: str,
+    title: str,
+    header: Callable[[Sequence[str]], Header | None],
+    *,
+    expected: str = "other lines above the rows",
+    prepare: Callable[[Text], Text] | None = None,
+    blocks: Callable[[Text, Header], Iterator[tuple[Line, Header]]] | None = None,
+) -> ColumnFormat:
+    """Return a format of text whose rows follow below some lines that identify it.
+
+    Parameters
+    ----------
+    name, title : str
+        Name in the registry and on the command line, and one line for the user.
+    header : callable
+        Takes the first lines of a text; returns what they say, or None for lines of another family. It never raises.
+    expected : str, optional
+        What the lines above the rows should be, for an error message.
+    prepare : callable, optional
+        Takes the text and returns it without what precedes its rows.
+    blocks : callable, optional
+        Takes the text and its first header; yields the first line and the header of each further run below.
+
+    Returns
+    -------
+    ColumnFormat
+    """
+
+    def evidence(head: bytes) -> str:
+        lines = head_lines(head)
+        if prepare is not None and lines != [""]:
+            lines = [line.text for line in prepare(Text.of(head)).head(_HEAD_LINES)]
+        found = header(lines[:_HEAD_LINES])
+        return found.why if found else ""
+
+    def tables(path: str, data: bytes) -> list[Table]:
+        text = text_of(path, data)
+        return tables_of_text(path, prepare(text) if prepare else text, header, expected, blocks)
+
+    return ColumnFormat(name, title, evidence, tables, header)
+
+
+def tables_of_text(
+    path: str,
+    text: Text | Sheet,
+    header: Callable[[Sequence[str]], Header | None],
+    expected: str,
+    blocks: Callable[[Text, Header], Iterator[tuple[Line, Header]]] | None = None,
+) -> list[Table]:
+    """Read a text or a sheet: its header, the rows below it, and further runs with their headers."""
+    head = text.head(_HEAD_LINES)
+    found = header([line.text for line in head] or [""])
+    if found is None or not head:
+        raise FormatError(path, f"expected {expected}", "export the run again", line=1)
+    begins = [(head[0], found)]
+    if blocks is not None and isinstance(text, Text):
+        begins += islice(blocks(text, found), _MOST_RUNS)
+    if len(begins) > _MOST_RUNS:
+        raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
+    if len(begins) == 1:
+        return _tables(path, text, head[0], replace(found, run=""), None)
+    title = " / ".join([each.title for _, each in begins if each.title][:4])
+    tables: list[Table] = []
+    for (begin, own), (end, _) in zip(begins, [*begins[1:], (None, found)], strict=True):
+        stop = None if end is None else end.start
+        tables += _tables(path, text, begin, replace(own, title=title), stop)
+    return tables
+
+
+def _tables(path: str, text: Text | Sheet, begin: Line, header: Header, stop: int | None) -> list[Table]:
+    """Read the rows below a header that begins at a line."""
+    if isinstance(text, Sheet):
+        first = Line(begin.number + header.lines, 0, 0, "")
+    else:
+        end = Line(begin.number + header.lines, text.stop, text.stop, "")
+        first = next(islice(text.lines(begin.start, begin.number), header.lines, None), end)
+    read = read_rows(path, text, first, header.delimiter, stop=stop, clock=header.clock, brackets=header.brackets)
+    common = replace(
+        read,
+        formula=header.formula,
+        title=header.title,
+        start_time=header.start_time,
+        ragged=header.ragged,
+        traps=(*header.traps, *read.traps),
+    )
+    tables = side_by_side(common, header.headings, header.run)
+    if not tables:
+        raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
+    return tables
