@@ -149,16 +149,10 @@ def _plain(name: str) -> str:
 def _timed_by(path: str, table: Table, column: Column, time: str) -> Table:
     """Return the table with another column as its times, named with or without its unit, or by its number."""
     beside = table.beside or table.columns
-    plain = " ".join(name_and_unit(time)[0].lower().split())
-    number = re.fullmatch(r"column (\d{1,4})", plain)
-    at = next((at for at, each in enumerate(beside) if plain == " ".join(each.name.lower().split())), None)
-    if at is None and number and 0 < int(number[1]) <= len(beside):
-        at = int(number[1]) - 1
-    if at is None:
-        others = [each for each in table.columns if each.values is not column.values] or [column]
-        times = others[_index_of_name(path, others, time, Missing.TIME)]
-    else:
-        times = beside[at]
+    number = re.fullmatch(r"column (\d{1,4})", name_and_unit(time)[0].strip().lower())
+    at = int(number[1]) - 1 if number else -1
+    others = [each for each in beside if each.values is not column.values] or [column]
+    times = beside[at] if 0 <= at < len(beside) else others[_index_of_name(path, others, time, Missing.TIME)]
     if table.times is not None and times.values is table.times.values:
         return table
     if times.values is column.values:

@@ -30,12 +30,7 @@ _MOST_EMPTY = 4_000_000
 """Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
 _DIGITS, _MOST_DECIMALS = 15, 12  # the significant digits that spreadsheet programs show; more decimals: an exponent
 _REMEDY = "export the numbers without thousands separators"
-_GROUP = rb"[-+]?[1-9]\d{0,2}"
-_THOUSANDS = re.compile(
-    _GROUP
-    + rb"(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:,\d{3}){2,}|(?:\.\d{3}){2,}"
-    + rb"|(?:(?: |'|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)\d{3})+(?:[.,]\d*)?)(?:[eE][-+]?\d+)?"
-)
+_THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}((?:[,. ']|\xc2?\xa0|\xe2\x80[\xaf\x99])\d{3})+([.,]\d*)?")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
