@@ -19,13 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.block import F8, I8, Block, Flag
+from acquisition.block import B1, F8, I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.base import Survey
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.nominal import median, time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
-from acquisition.recordings.sampling.velocity import integrate, outer_join
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
 from acquisition.recordings.tables.channel import Samples, check_values, read_channel
 from acquisition.recordings.tables.choose import Answers
@@ -162,7 +161,7 @@ def _summed_up(samples: Samples) -> tuple[Block, Iterable[Trap]]:
     value, rate_hz, flags = samples.value, samples.timing.rate_hz, samples.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
     index = np.rint(samples.t[regular] * rate_hz).astype(np.int64)
-    position, bridged = integrate(value[regular], index, rate_hz)
+    position, bridged = _integrate(value[regular], index, rate_hz)
     distance = np.full(samples.t.size, np.nan)
     distance[regular] = position
     flags[regular[bridged]] |= Flag.GAP_BEFORE.value
@@ -185,7 +184,7 @@ def _joined(p: Samples, v: Samples) -> tuple[Block, Iterable[Trap]]:
         raise FormatError(v.path, problem, "name the velocity file of the same run")
     resolution = min(p.timing.resolution_s, v.timing.resolution_s)
     keys = [np.rint(t / resolution).astype(np.int64) for t in (p.t, v.t)]
-    from_p, from_v = outer_join(keys[0], keys[1], (p.flags & IRREGULAR) == 0)
+    from_p, from_v = _outer_join(keys[0], keys[1], (p.flags & IRREGULAR) == 0)
     in_p, in_v = from_p >= 0, from_v >= 0
     if not (in_p & in_v).any():
         problem = f"expected times in common with {p.name}, got none"
@@ -219,3 +218,59 @@ def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[Trap
     if wrong > 0.5 * apart.size:
         message = f"{wrong} of {apart.size} velocities contradict the positions; the two files may be of different runs"
         yield Trap("pair_mismatch", message, wrong)
+
+
+def _integrate(velocity: F8, index: I8, rate_hz: float) -> tuple[F8, B1]:
+    """Sum backward differences ``(x[i] - x[i-1]) * rate_hz`` to a position, m: zero at first, NaN if unknown.
+
+    ``index`` are sample numbers, increasing; a jump is a gap, in which the velocity is interpolated linearly. The
+    resulting offset is only an estimate, so the mask returned marks the first sample after each gap.
+    """
+    known = np.isfinite(velocity)
+    start = velocity.size > 0 and not known[0]
+    rows = np.flatnonzero(known)
+    position = np.full(velocity.size, np.nan)
+    bridged = np.zeros(velocity.size, bool)
+    if start:
+        position[0] = 0.0
+    if rows.size == 0:
+        return position, bridged
+    # A first sample without a velocity is at position zero, and the second one is relative to it.
+    previous = np.concatenate(([index[0] if start else index[rows[0]] - 1], index[rows[:-1]]))
+    v_before = np.concatenate(([velocity[rows[0]]], velocity[rows[:-1]]))
+    lost = index[rows] - previous - 1
+    moved = velocity[rows] + lost * (velocity[rows] + v_before) / 2
+    position[rows] = np.cumsum(moved) / rate_hz
+    if not start:
+        position[rows] -= position[rows[0]]
+    bridged[rows] = lost > 0
+    return position, bridged
+
+
+def _outer_join(left: I8, right: I8, regular: B1 | None = None) -> tuple[I8, I8]:
+    """Pair the rows of two recordings by their sample numbers.
+
+    If a number repeats, its n-th row on the left pairs with its n-th row on the right. ``regular`` marks the rows of
+    ``left`` whose numbers are in order. Return the row of each joined sample in ``left`` and in ``right``, -1 if there
+    is none. Rows of ``left`` keep their order, and rows that exist only in ``right`` are inserted according to their
+    numbers.
+    """
+    rows_of = {key: row for row, key in enumerate(_with_turn(right))}
+    partner = np.array([rows_of.pop(key, -1) for key in _with_turn(left)], np.int64)
+    alone = np.array(sorted(rows_of.values()), np.int64)
+    standing = left if regular is None else np.where(regular, left, np.iinfo(np.int64).min)
+    where = np.searchsorted(np.maximum.accumulate(standing), right[alone], side="right")
+    from_left = np.insert(np.arange(left.size), where, -1)
+    from_right = np.insert(partner, where, alone)
+    return from_left, from_right
+
+
+def _with_turn(numbers: I8) -> list[tuple[int, int]]:
+    if np.all(np.diff(numbers) > 0):
+        return [(number, 0) for number in numbers.tolist()]
+    seen: dict[int, int] = {}
+    keys = []
+    for number in numbers.tolist():
+        keys.append((number, seen.get(number, 0)))
+        seen[number] = seen.get(number, 0) + 1
+    return keys

@@ -12,7 +12,6 @@ from acquisition.block import B1, F8, I8, U8, Flag
 _USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
 _SHARE_ON_GRID = 0.5
 _PROBE = 2048
-_BLOCK = 16384
 
 
 class Grid(NamedTuple):
@@ -116,19 +115,14 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     return step, relative_u
 
 
-def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F8, B1]:
+def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, B1]:
     """Replace each time by the nearest grid point if the two agree within the rounding of the printed time.
 
-    Return the times and a mask of those that agree. ``out`` may receive the times; it may be ``t`` itself.
+    Return the times and a mask of those that agree.
     """
-    snapped = np.empty(t.size) if out is None else out
-    agrees = np.empty(t.size, bool)
-    for start in range(0, t.size, _BLOCK):  # blocks that fit into the cache are much faster
-        rows = slice(start, start + _BLOCK)
-        exact = grid.time(grid.nearest(t[rows]))
-        agrees[rows] = np.abs(exact - t[rows]) <= resolution * 0.5001
-        snapped[rows] = exact if agrees[rows].all() else np.where(agrees[rows], exact, t[rows])
-    return snapped, agrees
+    exact = grid.time(grid.nearest(t))
+    agrees = np.abs(exact - t) <= resolution * 0.5001
+    return np.where(agrees, exact, t), agrees
 
 
 def place_unread(t: F8, unread: B1, grid: Grid | None) -> F8:
@@ -154,15 +148,6 @@ def place_unread(t: F8, unread: B1, grid: Grid | None) -> F8:
     return out
 
 
-def _even(t: F8, longest: float) -> bool:
-    """Return whether every step is positive and at most ``longest``."""
-    for start in range(0, t.size - 1, _BLOCK):
-        steps = np.diff(t[start : start + _BLOCK + 1])
-        if not (steps.min() > 0 and steps.max() <= longest):
-            return False
-    return True
-
-
 def time_flags(t: F8, step: float) -> U8:
     """Flag repeated times, backward times and gaps, given the nominal time between samples (s).
 
@@ -170,7 +155,8 @@ def time_flags(t: F8, step: float) -> U8:
     ahead of its neighbours, only that time is flagged, and not all the times after it.
     """
     flags = np.zeros(t.size, np.uint8)
-    if t.size == 0 or _even(t, 1.5 * step):
+    steps = np.diff(t)
+    if not steps.size or (steps.min() > 0 and steps.max() <= 1.5 * step):
         return flags
     spike = np.zeros(t.size, bool)
     spike[:-1] = (t[:-1] > t[1:]) & (np.concatenate(([-np.inf], t[:-2])) < t[1:])

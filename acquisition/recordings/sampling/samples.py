@@ -36,7 +36,7 @@ def place(rows: Rows, timing: Timing) -> F8:
     if t is None:
         raise ValueError("without times only a grid has times of rows")
     if not unread.any():
-        return t if grid is None else snap(t, grid, timing.resolution_s, out=t)[0]
+        return t if grid is None else snap(t, grid, timing.resolution_s)[0]
     if grid is not None:
         t[~unread] = snap(t[~unread], grid, timing.resolution_s)[0]
     return place_unread(t, unread, grid)
