@@ -93,7 +93,7 @@ def header(lines: Sequence[str]) -> Header | None:
         table.at,
         table.mark,
         [marked(at, each) for at, each in enumerate(headings)],
-        formula,
+        formula=formula,
         title=table.preamble[0] if table.preamble else "",
         ragged=len(values) > 1,
         traps=tuple(traps),

@@ -83,6 +83,6 @@ def dialect(path: str, text: str) -> ColumnFormat:
         why = f'line 1 begins with "{declared.begins}", as {name}.toml says'
         mark = {"tab": "\t", "blank": ""}.get(declared.separator, declared.separator)
         title = lines[0].strip() if declared.heading else ""
-        return Header(why, declared.heading, mark, headings, formula, title=title)
+        return Header(why, declared.heading, mark, headings, formula=formula, title=title)
 
     return text_format(name, declared.title or f"declared in {Path(path).name}", header)

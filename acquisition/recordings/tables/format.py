@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import islice
 from typing import Any
 
@@ -14,7 +14,7 @@ from acquisition.recordings.recording import Recording, Trap
 from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.rows import Sheet, read_rows
-from acquisition.recordings.tables.table import Column, Header, Table, names_apart, side_by_side
+from acquisition.recordings.tables.table import Column, Header, Stated, Table, names_apart, side_by_side
 from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
 from acquisition.recordings.units import NUMBER
 
@@ -141,13 +141,11 @@ def tables_of_text(
         begins += islice(blocks(text, found), _MOST_RUNS)
     if len(begins) > _MOST_RUNS:
         raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
-    if len(begins) == 1:
-        return _tables(path, text, head[0], replace(found, run=""), None)
-    title = " / ".join([each.title for _, each in begins if each.title][:4])
+    title, several = " / ".join([each.title for _, each in begins if each.title][:4]), len(begins) > 1
+    ends = [*(begin.start for begin, _ in begins[1:]), None]
     tables: list[Table] = []
-    for (begin, own), (end, _) in zip(begins, [*begins[1:], (None, found)], strict=True):
-        stop = None if end is None else end.start
-        tables += _tables(path, text, begin, replace(own, title=title), stop)
+    for (begin, own), end in zip(begins, ends, strict=True):
+        tables += _tables(path, text, begin, replace(own, title=title, run=own.run if several else ""), end)
     return tables
 
 
@@ -159,14 +157,8 @@ def _tables(path: str, text: Text | Sheet, begin: Line, header: Header, stop: in
         end = Line(begin.number + header.lines, text.stop, text.stop, "")
         first = next(islice(text.lines(begin.start, begin.number), header.lines, None), end)
     read = read_rows(path, text, first, header.delimiter, stop=stop, clock=header.clock, brackets=header.brackets)
-    common = replace(
-        read,
-        formula=header.formula,
-        title=header.title,
-        start_time=header.start_time,
-        ragged=header.ragged,
-        traps=(*header.traps, *read.traps),
-    )
+    stated = {each.name: getattr(header, each.name) for each in fields(Stated)}
+    common = replace(read, **{**stated, "traps": (*header.traps, *read.traps)})
     tables = side_by_side(common, header.headings, header.run)
     if not tables:
         raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")

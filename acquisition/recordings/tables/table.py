@@ -102,9 +102,33 @@ class Lines(NamedTuple):
         return self.first + int(row) + int(np.searchsorted(self.skipped, row, side="right"))
 
 
-@dataclass(frozen=True, slots=True)
-class Header:
-    """What the lines above the rows of a text say.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Stated:
+    """What the lines above the rows may say of all channels, and a :class:`Header` and a :class:`Table` share.
+
+    Parameters
+    ----------
+    formula : Formula or None
+        The times. If there is a column of times too, the column decides where the two differ.
+    run, title, start_time : str
+        Name of the run, title of the file, start time in ISO 8601; empty if the file does not state them.
+    ragged : bool
+        Whether a channel may end before its times, because longer channels share them.
+    traps : tuple of Trap
+        Remarks on the file as a whole.
+    """
+
+    formula: Formula | None = None
+    run: str = ""
+    title: str = ""
+    start_time: str = ""
+    ragged: bool = False
+    traps: tuple[Trap, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Header(Stated):
+    """What the lines above the rows of a text say; further keywords are those of :class:`Stated`.
 
     Parameters
     ----------
@@ -116,13 +140,6 @@ class Header:
         The separator of cells; empty for runs of white space.
     headings : sequence of Heading
         One for each column.
-    formula : Formula or None
-        The times, if no column contains them.
-    run, title, start_time : str
-    ragged : bool
-        Whether a channel may end before its times, because longer channels share them.
-    traps : tuple of Trap
-        Remarks on the file as a whole.
     clock : int or None
         A column of times of day.
     brackets : bool
@@ -133,19 +150,13 @@ class Header:
     lines: int
     delimiter: str
     headings: Sequence[Heading]
-    formula: Formula | None = None
-    run: str = ""
-    title: str = ""
-    start_time: str = ""
-    ragged: bool = False
-    traps: tuple[Trap, ...] = ()
     clock: int | None = None
     brackets: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
-    """Columns of one run that share their times.
+class Table(Stated):
+    """Columns of one run that share their times; further keywords are those of :class:`Stated`.
 
     Parameters
     ----------
@@ -153,16 +164,6 @@ class Table:
         The columns that may be read as channels.
     times : Column or None
         The column of their times. Without one, the formula gives the times, or else the user must give the rate.
-    formula : Formula or None
-        Times that the header states. If there is a column too, the column decides where the two differ.
-    run : str
-        Name of the run; empty for a single run without a name.
-    title, start_time : str
-        Title of the file, and start time in ISO 8601; empty if the file does not state them.
-    ragged : bool
-        Whether a channel may end before its times, because longer channels share them.
-    traps : tuple of Trap
-        Remarks on the file as a whole.
     lines : Lines or None
         Where the rows stand; None for a file that is not text.
     beside : tuple of Column
@@ -171,12 +172,6 @@ class Table:
 
     columns: tuple[Column, ...]
     times: Column | None = None
-    formula: Formula | None = None
-    run: str = ""
-    title: str = ""
-    start_time: str = ""
-    ragged: bool = False
-    traps: tuple[Trap, ...] = ()
     lines: Lines | None = None
     beside: tuple[Column, ...] = ()
 
