@@ -22,7 +22,7 @@ from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import clock_s, parse_number
 from acquisition.recordings.tables.format import text_format
-from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading
+from acquisition.recordings.tables.headings import Heading, headings_of, is_time, split_heading
 from acquisition.recordings.tables.layout import (
     Layout,
     are_row_numbers,
@@ -105,7 +105,7 @@ def header(lines: Sequence[str]) -> Header | None:
 def _headed(lines: Sequence[str]) -> Header | None:
     """Read headings with units in line 1, times first: these need no rows to be certain."""
     cells, mark = split_heading(lines[0])
-    headings = [Heading(*name_and_unit(cell)) for cell in cells]
+    headings = headings_of(cells)
     if len(headings) < 2 or not is_time(headings[0].name) or not all(each.unit for each in headings):
         return None
     cell = lines[1].split(mark)[0].strip(' "') if len(lines) > 1 else ""

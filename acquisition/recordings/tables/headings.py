@@ -79,6 +79,11 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     return match["name"].strip(), match["unit"].strip()
 
 
+def headings_of(cells: Sequence[str]) -> list[Heading]:
+    """Return the headings in cells, each with its unit in brackets."""
+    return [Heading(*name_and_unit(cell)) for cell in cells]
+
+
 def heading_of(cell: str) -> tuple[str, str]:
     """Split a heading into name and unit: the unit is in brackets, after a slash, or after a last underscore."""
     name, unit = name_and_unit(cell)
