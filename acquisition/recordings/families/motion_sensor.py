@@ -46,7 +46,8 @@ _CONSTANT = 0.95
 
 def header(lines: Sequence[str]) -> Header | None:
     """Read the column line, or infer the columns from the rows."""
-    title = next((at for at, line in enumerate(lines[:_HEADER_LINES], 1) if line.lower().startswith(_TITLE)), 0)
+    above = enumerate(lines[:_HEADER_LINES], 1)
+    title = next((at for at, line in above if line.lstrip().lower().startswith(_TITLE)), 0)
     why = f'line {title} is the title "{lines[title - 1].strip()}"' if title else ""
     for at, line in enumerate(lines[:_HEADER_LINES], 1):
         if match := _COLUMNS.fullmatch("\t".join(cell.strip() for cell in line.rstrip().split("\t")).lower()):

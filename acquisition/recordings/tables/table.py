@@ -85,8 +85,7 @@ class Lines(NamedTuple):
 
     ``first`` is the number of the first row's line, and ``skipped`` holds, for each line that is no row, the number of
     rows before it. ``words`` marks rows that begin with text. ``ended`` says that the last row has a line end, ``cut``
-    that it is incomplete. ``zeros`` is the number of zero bytes that were left out at
-    the end of the file.
+    that it is incomplete. ``zeros`` is the number of zero bytes that were left out at the end of the file.
     """
 
     first: int

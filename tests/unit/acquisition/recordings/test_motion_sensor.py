@@ -115,6 +115,12 @@ def test_files_without_a_run_are_refused(data: str, line: int | None) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_two_columns_that_nothing_names_are_any_table() -> None:
+    """Below the title alone they may be position or velocity, so another family asks what they are."""
+    rows = [f"{i / 100:.3f}\t{20 + i / 8:.3f}" for i in range(40)]
+    assert not FORMAT.recognises("\n".join([TITLE, *rows]).encode())
+
+
 # Velocity alone ---------------------------------------------------------------------------------------------
 
 
