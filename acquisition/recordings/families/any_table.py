@@ -34,7 +34,7 @@ from acquisition.recordings.tables.layout import (
 )
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text, decode
-from acquisition.recordings.units import measure_of, time_power
+from acquisition.recordings.units import measure_of, time_unit
 
 _MONITOR = re.compile(
     r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",
@@ -119,7 +119,7 @@ def _units_beside(table: Layout) -> tuple[list[Heading], set[int]]:
     """Return the headings, with units taken from columns of units to the right of the numbers, and these columns."""
     headings, words = list(table.headings), set()
     for column, cells in enumerate(zip(*table.rows, strict=True)):
-        known = measure_of(cells[0]) is not None or time_power(cells[0]) is not None
+        known = measure_of(cells[0]) is not None or time_unit(cells[0]) is not None
         if column and known and parse_number(cells[0]) is None and len(set(cells)) == 1 and not headings[column].name:
             headings[column - 1] = replace(headings[column - 1], unit=headings[column - 1].unit or cells[0])
             words.add(column)

@@ -14,7 +14,7 @@ from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.table import Header
-from acquisition.recordings.units import TIMES, time_power
+from acquisition.recordings.units import TIMES, time_unit
 from acquisition.regular_file import open_regular_text
 
 
@@ -25,7 +25,7 @@ class _Column(msgspec.Struct, forbid_unknown_fields=True):
     aside: bool = False
 
     def __post_init__(self) -> None:
-        if self.time and self.unit and time_power(self.unit) is None:
+        if self.time and self.unit and time_unit(self.unit) is None:
             raise ValueError(f'unit of a time must be one of {", ".join(TIMES)}, got "{self.unit}"')
 
 

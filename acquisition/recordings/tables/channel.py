@@ -17,7 +17,7 @@ from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
 from acquisition.recordings.tables.text import says_simulated
-from acquisition.recordings.units import TIMES, Measure, time_factor, time_power
+from acquisition.recordings.units import TIMES, Measure, time_unit
 from acquisition.source import ClockKind, Kind, SourceInfo
 
 _LONGEST_S = 1e10
@@ -129,28 +129,28 @@ def check_values(samples: Samples, *, length: bool) -> Samples:
 def rows_of(path: str, table: Table, column: Column, measured: Measure) -> Rows:
     """Return the rows of a channel, including those that could not be read; raise an error if there are no numbers."""
     unit = table.times.unit if table.times else ""
-    to_seconds = time_power(unit) if unit else 0
-    if to_seconds is None:
+    seconds = time_unit(unit or "s")
+    if seconds is None:
         problem = f'expected times in one of {", ".join(TIMES)}, got "{unit}"'
         raise FormatError(path, problem, "export the times in seconds")
     if table.lines is None:
-        return _binary_rows(table.times, column, measured, to_seconds)
-    return _text_rows(path, table, table.lines, column, measured, to_seconds)
+        return _binary_rows(table.times, column, measured, seconds)
+    return _text_rows(path, table, table.lines, column, measured, seconds)
 
 
-def _binary_rows(times: Column | None, column: Column, measured: Measure, to_seconds: int) -> Rows:
+def _binary_rows(times: Column | None, column: Column, measured: Measure, seconds: Measure) -> Rows:
     size = max(column.values.size, times.values.size if times else 0)
     value, t, unread = scaled(column.of_size(size).values, None, measured.power), None, np.zeros(size, bool)
     value *= measured.factor
     if times is not None:
-        t = scaled(times.of_size(size).values * time_factor(times.unit), None, to_seconds)
+        t = scaled(times.of_size(size).values * seconds.factor, None, seconds.power)
         unread = ~np.isfinite(t)
     value[unread] = np.nan
     largest = 0.0 if t is None else float(np.fmax.reduce(np.abs(t), initial=0.0))
     return Rows(t, value, unread, np.zeros(size, bool), lambda _: 0, max(float(np.spacing(largest)), 1e-12), 0.0)
 
 
-def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: Measure, to_seconds: int) -> Rows:
+def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: Measure, seconds: Measure) -> Rows:
     own, time = column.of_size(lines.rows), table.times and table.times.of_size(lines.rows)
     form = own.forms
     # A row of words without a value is a remark between rows; a row of a longer channel is none of this channel's.
@@ -171,9 +171,9 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
     remark, unknown = remark[chosen], (unread | remark)[chosen]
     printed, time_digit = None, 0.0
     if time is not None:
-        printed = scaled(time.values, time.forms, to_seconds)[chosen]
-        time_digit = last_digit(printed, time.forms, to_seconds)
-        printed, time_digit = printed * time_factor(time.unit), time_digit * time_factor(time.unit)
+        printed = scaled(time.values, time.forms, seconds.power)[chosen]
+        time_digit = last_digit(printed, time.forms, seconds.power)
+        printed, time_digit = printed * seconds.factor, time_digit * seconds.factor
         beyond = ~(np.abs(printed) < _LONGEST_S)  # true for a NaN
         printed[beyond] = np.nan
         unknown |= beyond

@@ -16,7 +16,7 @@ from acquisition.recordings.sampling.nominal import median
 from acquisition.recordings.sampling.timing import rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
-from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_power, unit_words
+from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
 
 _SLOW_S = 0.999
 """Time steps of a second or more without a unit may be milliseconds, so their unit must be stated."""
@@ -159,17 +159,17 @@ def _timed_by(path: str, table: Table, column: Column, time: str) -> Table:
         raise FormatError(path, f'"{time}" cannot be both channel and time', "name another column for one of them")
     if table.lines is None and times.values.size != column.values.size:
         raise FormatError(path, f'"{time}" and "{column.name}" differ in length', "name another column of times")
-    unit = times.unit if time_power(times.unit) is not None else ""
+    unit = times.unit if time_unit(times.unit) is not None else ""
     return replace(table, times=replace(times, unit=unit), formula=None)
 
 
 def _with_time_unit(path: str, table: Table, unit: str) -> Table:
-    if time_power(unit) is None:
+    if time_unit(unit) is None:
         raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
     if table.times is None:
         raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
     stated = unit_words(table.times.unit)
-    if time_power(stated) is not None and stated != unit_words(unit):
+    if time_unit(stated) is not None and stated != unit_words(unit):
         raise FormatError(path, f'time unit must be {stated} as stated by the file, got "{unit}"', "leave it out")
     return replace(table, times=replace(table.times, unit=unit))
 
@@ -180,7 +180,7 @@ def _missing_times(columns: Sequence[Column], table: Table, column: Column, answ
             return []
         others = tuple(each.name for each in columns if each.name != column.name)
         return [rate_needed(MissingItem(Missing.TIME, others, others[0]) if others else None)]
-    if table.times is None or table.formula is not None or time_power(table.times.unit) is not None:
+    if table.times is None or table.formula is not None or time_unit(table.times.unit) is not None:
         return []
     first = _first_numbers(table.times)
     if table.times.unit or (first.size > 1 and float(median(np.diff(first))) >= _SLOW_S):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from acquisition.recordings.units import measure_of, time_power
+from acquisition.recordings.units import measure_of, time_unit
 
 
 def words(text: str) -> frozenset[str]:
@@ -100,7 +100,7 @@ def _ends(name: str, unit: str) -> bool:
     """Return whether the end of a name is its unit; h is a unit only for a time."""
     if unit in _NO_TAIL or (unit == "h" and not is_time(name)):
         return False
-    return measure_of(unit) is not None or time_power(unit) is not None
+    return measure_of(unit) is not None or time_unit(unit) is not None
 
 
 def is_time(name: str) -> bool:

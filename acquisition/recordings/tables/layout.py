@@ -18,7 +18,7 @@ from acquisition.recordings.tables.headings import (
     is_uncertainty,
     split_heading,
 )
-from acquisition.recordings.units import measure_of, time_power
+from acquisition.recordings.units import measure_of, time_unit
 
 _MARKS = ("\t", ";", ",", "")
 _PROBE, _FEWEST, _SOUND = 20, 3, 0.8
@@ -206,7 +206,7 @@ def _are_units(cells: Sequence[str]) -> bool:
     """Return whether a line contains units: at least half of its words are units or bracketed, and none means time."""
     filled = [cell for cell in cells if cell]
     known = [
-        measure_of(plain) is not None or time_power(plain) is not None or bool(_BRACKETED.fullmatch(cell))
+        measure_of(plain) is not None or time_unit(plain) is not None or bool(_BRACKETED.fullmatch(cell))
         for cell in filled
         if parse_number(cell) is None
         for plain in (cell.strip(" ()[]"),)
@@ -253,8 +253,8 @@ def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[in
     named = [
         column
         for column, each in enumerate(headings)
-        if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_power(each.unit) is None))
-        or (column == 0 and time_power(each.unit) is not None and not _SPAN.search(each.name) and _is_even(columns[0]))
+        if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_unit(each.unit) is None))
+        or (column == 0 and time_unit(each.unit) is not None and not _SPAN.search(each.name) and _is_even(columns[0]))
     ]
     return [column for column in named if runs_forward(columns[column])]
 
@@ -269,7 +269,7 @@ def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | 
     fit = [
         column
         for column, each in enumerate(headings)
-        if _NEUTRAL.fullmatch(each.name) and (not each.unit or time_power(each.unit) is not None)
+        if _NEUTRAL.fullmatch(each.name) and (not each.unit or time_unit(each.unit) is not None)
         if runs_forward(columns[column]) and not are_row_numbers(columns[column])
     ]
     even = [column for column in fit if _is_even(columns[column])]
