@@ -69,7 +69,7 @@ MOST_PARTS = 4  # maximum number of times that a freely moving part is sought wi
 # the difference if one mode is a third of the other.
 BEATING = 0.3
 LEAST_HALVED = 128  # minimum number of samples of which the later half may show a motion
-CLEAR = 0.05  # maximum noise over the amplitude for a motion that only the later half shows
+CLEAR = 0.1  # maximum noise over the largest amplitude of a motion that only the later half shows
 
 
 @one_thread
@@ -172,11 +172,11 @@ def _free_part(samples: Conditioned, options: Options) -> _FreePart | NoOscillat
         half_s = float(np.median(t))
         later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
         trial = condition(later.flagged(samples.track))
-        trimmed, stopped = _cycles(trial, options, options.early)
+        trimmed, stopped = _cycles(trial, options, options.late)
         if isinstance(trimmed, NoOscillation):
             return cycles
         windows = demodulate(trial, trimmed)
-        if windows.noise_m > CLEAR * median(windows.amplitude) or check_sinusoid(trial, windows) is not None:
+        if windows.noise_m > CLEAR * float(np.max(windows.amplitude)) or check_sinusoid(trial, windows) is not None:
             return cycles
         samples, segments = trial, later.within(segments)
         cycles = trimmed
