@@ -20,7 +20,7 @@ from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.harmonics import find_harmonics
 from pipeline.checks.misfit import Misfit
 from pipeline.checks.model import check_model
-from pipeline.checks.oscillation import check_sinusoid, typical_miss
+from pipeline.checks.oscillation import check_coherence, check_sinusoid, typical_miss
 from pipeline.checks.plausibility import check_plausibility
 from pipeline.checks.residuals import residuals_of
 from pipeline.checks.sensor import find_smoothing, held, held_count
@@ -133,9 +133,13 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         fitted = fit_by_windows(windows, disturbances, damping)
         if options.rows == "samples":
             fitted = fit_waveform(fitted, samples)
-        two = find_two_modes(samples) if typical_miss(fitted) > BEATING else None
+        missed = typical_miss(fitted)
+        incoherent = check_coherence(fitted, missed)
+        two = find_two_modes(samples) if incoherent is not None or missed > BEATING else None
         if two is not None:
             return _two_modes(samples, two, scene, options)
+        if incoherent is not None:
+            return _still(samples, incoherent, scene, options)
     return _oscillation(samples, part, fitted, solved, scene, options)
 
 

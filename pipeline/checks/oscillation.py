@@ -18,6 +18,7 @@ FOLDED = 32  # phase bins per period
 ALIKE = 0.25  # maximum share of the residual's variance by which similar periods may differ
 WANDERING = 0.3  # maximum residual beyond white noise, over the amplitude
 MANY = 8  # number of windows from which a motion with residuals below MOST_BENT is judged by its coherence instead
+FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
 
 
 def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
@@ -59,6 +60,20 @@ def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
     bins = ((turns - np.floor(turns)) * FOLDED).astype(np.int64) % FOLDED
     means = np.bincount(bins, left, FOLDED) / np.maximum(np.bincount(bins, minlength=FOLDED), 1)
     return demodulated.t.size >= 4 and float(np.var(left - means[bins])) < ALIKE * float(np.var(left))
+
+
+def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
+    """Return why a motion is no oscillation, although single periods look like one; None if it is one.
+
+    Amplitude and phase of a window form a phasor, which the damping law and the fit of the phase predict. Random
+    phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
+    differ from it by less, ``typical``.
+    """
+    if typical < ASTRAY or fitted.demodulated.t.size < FEWEST:
+        return None
+    return NoOscillation(
+        f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"
+    )
 
 
 def typical_miss(fitted: Fitted) -> float:

@@ -236,7 +236,10 @@ def _described(samples: Samples, cleaned: Cleaned, law: Drag, damping: Damping, 
     residual = conditioned.track.y - position
     rms = math.sqrt(float(np.mean(residual[cleaned.used] ** 2)))
     flags = conditioned.flags.copy()
-    flags[samples.within & ~cleaned.used] |= np.uint8(Quality.FALSE_ECHO)
+    dropped = samples.within & ~cleaned.used
+    plateau = dropped & conditioned.near_plateau(position, cleaned.noise_m)
+    flags[plateau] |= np.uint8(Quality.CLIPPED)
+    flags[dropped & ~plateau] |= np.uint8(Quality.FALSE_ECHO)
     count = len(STATE)
     state = Joint(STATE, fit.values[:count], fit.covariance[:count, :count] * cleaned.correlation, STATE_UNITS)
     ratio = damping.best.rate_at_start() / state["angular_frequency"].value

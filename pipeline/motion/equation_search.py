@@ -235,7 +235,7 @@ def without_echoes(samples: Samples, law: Drag, start: F8, clip_sigmas: float, r
         theta = full(law, samples.fit(law, theta, used, samples.expected_m).values)
         whole = samples.model().position(theta)
         residual = y - whole
-        candidates = samples.within
+        candidates = samples.within & ~samples.conditioned.near_plateau(whole, samples.expected_m)
         spread = max(mad_sigma(residual[candidates]), samples.expected_m)
         kept = candidates & (np.abs(residual) <= clip_sigmas * spread)
         if np.count_nonzero(kept) <= COUNT:

@@ -180,7 +180,7 @@ def fit_record(
         _refined_phase(phase, damping, demodulated, solved.state, covariance),
         _refined_rest(solved, rest, phase.middle, covariance),
         _refined_waveform(solved, conditioned.track),
-        _flags(conditioned, solved),
+        _flags(conditioned, chooser, solved),
         solved.noise_m,
         dict(zip(solved.state.names, factors.tolist(), strict=True)),
     )
@@ -305,11 +305,13 @@ def _with_joint(fit: LawFit, solved: _Solved, covariance: F8) -> LawFit:
     return replace(fit, joint=joint, converged=True)
 
 
-def _flags(conditioned: Conditioned, solved: _Solved) -> NDArray[np.uint8]:
-    """Return the flags, with the samples excluded from the fit flagged as false echoes."""
+def _flags(conditioned: Conditioned, chooser: Chooser, solved: _Solved) -> NDArray[np.uint8]:
+    """Return the flags, with the samples excluded from the fit flagged as clipped or false echoes."""
     flags = conditioned.flags.copy()
     out = ((flags & UNUSABLE) == 0) & ~solved.rows
-    flags[out] |= np.uint8(Quality.FALSE_ECHO)
+    crest = out & chooser.on_plateau(solved.position)
+    flags[crest] |= np.uint8(Quality.CLIPPED)
+    flags[out & ~crest] |= np.uint8(Quality.FALSE_ECHO)
     return flags
 
 

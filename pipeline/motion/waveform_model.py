@@ -304,8 +304,12 @@ class Chooser:
     def near(self, left: F8, rows: Rows) -> Rows:
         """Return the samples within the noise of a model with residuals ``left`` (n,) in m."""
         spread = mad_sigma(left[self._candidates])
-        near = self._candidates
+        near = self._candidates & ~self.on_plateau(self._record.y - left)
         if spread > 1.5 * self._noise_m:
             # The residuals contain more than noise, so that samples excluded so far remain excluded.
             return np.asarray(near & rows)
         return np.asarray(near & (np.abs(left) <= self._clip_sigmas * max(spread, self._least_m)))
+
+    def on_plateau(self, position: F8) -> Rows:
+        """Return where a model (n,), in m minus the record's level, is too close to a clipping level."""
+        return self._conditioned.near_plateau(position + self._record.level, self._noise_m)

@@ -257,6 +257,10 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     inside = windows.placed & good[:, None]
     echoes = inside & (windows.usable > 0) & (weights == 0)
     flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
+    crests = inside & (windows.usable == 0)
+    if crests.any():
+        crests &= flags[windows.rows] == 0
+        flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
     residual = np.full(len(conditioned.track), np.nan)
     residual[windows.rows[inside]] = solution.residual[inside]
     return Demodulated(
