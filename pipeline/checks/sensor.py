@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,8 @@ from pipeline.track import F8
 ALIKE = 0.4  # correlation of neighbouring residuals that shows a filter: a running mean over two samples gives 0.5
 STEADY = 2.0  # maximum ratio of the covariances in the halves: noise is constant, residuals of the motion decay
 EQUAL = 0.4  # share of neighbours with the same value above which readings are held: over two samples it is a half
-LINES = 3.6  # twice the samples per bend above which readings are joined by lines: noise bends nearly every sample
+LINES = 1.8  # samples per bend, over those of white noise, above which readings are joined by lines
+STEPS = 2.4  # maximum bend by rounding, over the noise, up to which bends by noise show
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +55,13 @@ def held(conditioned: Conditioned, residuals: Residuals) -> Misfit | None:
     if count == 1.0:
         y = conditioned.track.y[conditioned.used]
         rounding = max(2.02 * (conditioned.quantum_m or 0.0), 1e-12 * float(np.ptp(y)))
-        # A reading between two samples bends the line at both.
-        count, late = 2.0 / max(float(np.mean(np.abs(np.diff(y, 2)) > rounding)), 1e-3), 0.0
-        if count < LINES or rounding > 1.1 * residuals.noise_m:
+        # White noise of deviation s bends the line by more than x at a share erfc(x/(sqrt(12) s)) of the samples.
+        white = math.erfc(rounding / (math.sqrt(12.0) * max(residuals.noise_m, 1e-300)))
+        share = max(float(np.mean(np.abs(np.diff(y, 2)) > rounding)), 1e-3)
+        if rounding > STEPS * residuals.noise_m or share > white / LINES:
             return None
+        # A reading between two samples bends the line at both.
+        count, late = 2.0 * white / share, 0.0
     loss = min((2.0 - late) * (count * turn) ** 2 / 24.0, 1.0)
     amplitude_m, phase_rad = residuals.amplitude_m * loss, late * 0.5 * (count - 1.0) * turn
     return Misfit(name="held_samples", amplitude_m=amplitude_m, phase_rad=phase_rad)
