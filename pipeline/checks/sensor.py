@@ -16,7 +16,6 @@ from pipeline.track import F8
 
 ALIKE = 0.4  # correlation of neighbouring residuals that shows a filter: a running mean over two samples gives 0.5
 STEADY = 2.0  # maximum ratio of the covariances in the halves: noise is constant, residuals of the motion decay
-EQUAL = 0.4  # share of neighbours with the same value above which readings are held: over two samples it is a half
 LINES = 1.8  # samples per bend, over those of white noise, above which readings are joined by lines
 STEPS = 2.4  # maximum bend by rounding, over the noise, up to which bends by noise show
 
@@ -35,15 +34,18 @@ class Smoothing:
 def held_count(conditioned: Conditioned) -> int:
     """Return the number of samples over which each reading is held; 1 if every sample is new.
 
-    Readings in coarse steps repeat too, but new ones have values that occurred before. Readings at rest repeat for
-    longer than others.
+    Readings in coarse steps are repeated too, but they change at any row. Held ones change only at every k-th row.
     """
     y = conditioned.track.y[conditioned.used]
     changes = np.flatnonzero(np.diff(y))
-    if not 8 <= changes.size <= (1.0 - EQUAL) * y.size or np.unique(y).size < 0.5 * changes.size:
+    if not 8 <= changes.size <= 0.6 * y.size:
         return 1
-    runs = np.diff(changes)
-    return round(y.size / changes.size) if np.quantile(runs, 0.95) <= np.median(runs) + 1.0 else 1
+    for k in range(min(y.size // 8, 200), 1, -1):
+        most = int(np.bincount(changes % k).max())
+        # By chance, each row of a cycle has a k-th of the changes; with the correct k, one row has nearly all of them.
+        if most > 0.9 * changes.size and most > 2.5 * changes.size / k:
+            return k
+    return 1
 
 
 def held(conditioned: Conditioned, residuals: Residuals) -> Misfit | None:
