@@ -34,7 +34,7 @@ from pipeline.numerics.quantity import amount
 from pipeline.samples.condition import Conditioned
 from pipeline.samples.stopping import stop_row
 from pipeline.track import F8, U8, Quality
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated
 
 STATE_UNITS = ("m", "m", "m/s", "rad/s")
 MOST_PERIODS = 250  # maximum number of periods for the fit of a weakly damped motion that stops within the record
@@ -44,8 +44,6 @@ LEAST_DAMPING = 0.01
 ALWAYS = 0.05
 # Maximum root mean square of the residual of the law with most parameters, in units of the record's noise.
 MISFIT = 1.25
-# Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
-CLIP_SIGMAS = 4.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,11 +23,9 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length, solve_weighted
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality, Track
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated
 
 FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law
-# Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
-CLIP_SIGMAS = 4.0
 ROUNDS = 5  # maximum number of rounds of clipping and refitting
 # Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
 # with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.

@@ -17,15 +17,15 @@ from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
 QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
 TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
-CREST_SIGMAS = 3.5
+CREST_SIGMAS = 3.5  # distance from a plateau within which noise decides whether a sample is clipped
 BLOCK = 256  # samples over which a local curvature is estimated
 LARGEST = 1e100  # magnitude of a measured value; anything beyond is a missing sample
 ROUNDING = 1e-9  # fraction of the largest value; smaller differences are rounding errors of one value
 # Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in standard
 # deviations of the noise.
 SPIKE_SIGMAS = 8.0
-# Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an unclipped crest
-# the ratio is 1 / (sqrt 2 - 1) = 2.4.
+# Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an unclipped
+# crest the ratio is 1 / (sqrt 2 - 1) = 2.4.
 CONTRAST = 5.0
 
 

@@ -8,10 +8,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.options import TIERS, options_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError, SceneError, TrackError
+from pipeline.options import TIERS, options_for
 from pipeline.track import Track
 
 F8 = np.ndarray
