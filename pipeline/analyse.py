@@ -57,8 +57,10 @@ from pipeline.samples.stopping import moving_part
 from pipeline.track import Quality, Track
 from pipeline.windows.clipping import find_cuts
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
-from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated, demodulate, model_error
+from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated, demodulate, follow, model_error
 from pipeline.windows.disturbances import separate
+from pipeline.windows.gaps import longest_part
+from pipeline.windows.lost_rows import LostRows, find_lost_rows
 from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part, long_after_stop
 
 __all__ = ["Analysis", "Oscillation", "Overdamped", "Still", "analyse"]
@@ -113,6 +115,9 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
 
     samples, cycles = part.samples, part.cycles
     windows = demodulate(samples, cycles)
+    followed = follow(cycles, windows, samples.track.t)
+    if followed is not cycles:
+        cycles, windows = followed, demodulate(samples, followed)
     if (cut := find_cuts(samples, cycles, windows)) is not None:
         samples, windows = cut, demodulate(cut, cycles)
     if (why := check_sinusoid(samples, windows)) is not None:
@@ -148,13 +153,15 @@ class _FreePart:
     """The part of a recording that oscillates freely.
 
     ``samples`` contains the whole recording, in which samples outside the part are flagged. ``segments`` describes the
-    part (None for the whole recording), and ``stopped`` says whether friction stopped the bob in it.
+    part (None for the whole recording), and ``stopped`` says whether friction stopped the bob in it. The times of the
+    samples count rows that were ``lost``.
     """
 
     samples: Conditioned
     segments: Segments | None
     cycles: Cycles
     stopped: bool
+    lost: LostRows | None = None
 
 
 def _free_part(samples: Conditioned, options: Options) -> _FreePart | NoOscillation:
@@ -167,6 +174,8 @@ def _free_part(samples: Conditioned, options: Options) -> _FreePart | NoOscillat
     for outside in (before_trigger(samples), long_after_stop(samples, options.early)):
         if outside is not None:
             samples, segments = condition(outside.flagged(samples.track)), outside.within(segments)
+    if (part := longest_part(samples)) is not None:
+        samples, segments = condition(part.flagged(samples.track)), part.within(segments)
     cycles, stopped = _cycles(samples, options, options.early)
     if isinstance(cycles, NoOscillation):
         # A long time in the hand hides the motion after it, which the later half may show.
@@ -184,17 +193,27 @@ def _free_part(samples: Conditioned, options: Options) -> _FreePart | NoOscillat
             return cycles
         samples, segments = trial, later.within(segments)
         cycles = trimmed
+    if (lost := find_lost_rows(samples, demodulate(samples, cycles))) is not None:
+        samples = lost.samples
+        cycles, stopped = _cycles(samples, options, options.early)
+        if isinstance(cycles, NoOscillation):
+            return cycles
     for _ in range(MOST_PARTS):
         windows = demodulate(samples, cycles)
         outside = find_free_part(samples, windows)
         if outside is None:
+            break
+        # Windows of equal length are no whole periods of a wide pendulum, which would look like handling.
+        followed = follow(cycles, windows, samples.track.t)
+        if followed is not cycles and find_free_part(samples, demodulate(samples, followed)) is None:
+            cycles = followed
             break
         shorter = condition(outside.flagged(samples.track))
         trimmed, stops = _cycles(shorter, options, options.early)
         if isinstance(trimmed, NoOscillation):
             break
         samples, segments, cycles, stopped = shorter, outside.within(segments), trimmed, stops
-    return _FreePart(samples, segments, cycles, stopped)
+    return _FreePart(samples, segments, cycles, stopped, lost)
 
 
 def _cycles(samples: Conditioned, options: Options, share: float) -> tuple[Cycles | NoOscillation, bool]:
@@ -246,6 +265,9 @@ def _oscillation(
 
     misfits: list[Misfit] = []
     found: list[Found] = []
+    if part.lost is not None:
+        misfits.append(Misfit(name="lost_rows", clock=part.lost.share))
+        found.append(Found("lost_rows", {"places": part.lost.places, "share": part.lost.share}))
     plausible = check_plausibility(samples, windows, phase)
     misfits += plausible.misfits
     found += plausibility_findings(plausible)

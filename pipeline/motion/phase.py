@@ -56,6 +56,8 @@ class PhaseFit:
     squared_rate : float or None
         Decrease of the squared angular frequency that drag causes, 1/s^2. None stands for the mean over the windows,
         weighted by their squared amplitudes (:meth:`pipeline.damping.select.Damping.squared_rate`).
+    small_swings : Estimate or None
+        Angular frequency of very small swings, :math:`\\omega_0` of the backbone, rad/s; None without one.
     """
 
     t0: float
@@ -70,6 +72,7 @@ class PhaseFit:
     damping: Damping
     lag: tuple[F8, F8] | None = None
     squared_rate: float | None = None
+    small_swings: Estimate | None = None
 
     def total(self, t: F8) -> F8:
         """Return the model's total phase in rad at times t (n,) in s."""
@@ -150,6 +153,7 @@ def fit_phase(demodulated: Demodulated, damping: Damping) -> PhaseFit:
         middle,
         damping,
         lag,
+        small_swings=None if bent is None else _small_swings(bent, spread, free),
     )
 
 
@@ -241,6 +245,11 @@ def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
 def _backbone(bent: Line, spread: Scatter, free: int) -> Estimate:
     widened = spread.correlation * max(1.0, bent.chi2 / free)
     return Estimate(float(bent.values[2]), math.sqrt(bent.covariance[2, 2] * widened), BACKBONE.of("m"))
+
+
+def _small_swings(bent: Line, spread: Scatter, free: int) -> Estimate:
+    widened = spread.correlation * max(1.0, bent.chi2 / free)
+    return Estimate(float(bent.values[1]), math.sqrt(bent.covariance[1, 1] * widened), "rad/s")
 
 
 def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFit:

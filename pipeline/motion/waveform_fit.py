@@ -322,10 +322,11 @@ def _refined_phase(
     before = np.array([phase.t0 - phase.middle])
     gradient = np.array([1.0, before[0], 0.0])[: state.turning.size]
     omega = Estimate(float(state.turning[1]), math.sqrt(covariance[1, 1]), "rad/s")
-    backbone = None
+    backbone = small = None
     if state.area is not None:
         gradient[2] = float(np.interp(before, *state.area)[0])
         backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), "rad/(s m^2)")
+        small = Estimate(float(state.turning[1]), math.sqrt(covariance[1, 1]), "rad/s")
         tau = demodulated.t - phase.middle
         u = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
         line = solve_weighted(np.stack([np.ones(tau.size), tau], axis=1), state.steady_angle(tau), u)
@@ -336,6 +337,7 @@ def _refined_phase(
         angular_frequency=omega,
         phase=Estimate(wrapped(float(state.angle(before)[0])), u_start, "rad"),
         backbone=backbone,
+        small_swings=small,
         coefficients=state.turning,
         damping=damping,
     )

@@ -134,7 +134,10 @@ def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
     off = np.min([np.abs(here - each) for each in expected], axis=0)
     usual = np.maximum(math.sqrt(1.5) * u[:, 2:-2], [[mad_sigma(each)] for each in off])
     far = math.sqrt(2.0 * math.log(y.shape[1] / false_alarm))
-    return np.concatenate([[False, False], np.any(off > far * usual, axis=0), [False, False]])
+    found = np.concatenate([[False, False], np.any(off > far * usual, axis=0), [False, False]])
+    # Several in succession are no outliers, but a curve.
+    beside = np.convolve(found, [1.0, 0.0, 1.0], "same") > 0.0
+    return found & ~beside
 
 
 def _starts(size: int, length: int) -> I8:
