@@ -239,8 +239,9 @@ def _make(
 
 def _report_code_sha256() -> str:
     """Return the digest of the code for page and reports, which is separate from the code for rows."""
-    folder = Path(__file__).resolve().parent.parent / "report"
-    files = sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".j2", ".css"))
+    home = Path(__file__).resolve().parent.parent
+    every = [file for name in ("report", "charts", "page/static") for file in (home / name).rglob("*")]
+    files = sorted(file for file in every if file.suffix in (".py", ".j2", ".css", ".js"))
     return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
@@ -14,8 +16,6 @@ from springmass.report.advice import by_harm, lab_report_line
 from springmass.report.budgets import budgets_of
 from springmass.report.tables import table_rows
 from springmass.runs.analysing import Analysed
-
-__all__ = ["budget_tex", "lab_report_tex", "table_tex"]
 
 _SIUNITX = {
     "s": r"\second",
@@ -51,13 +51,7 @@ _TEX_SPECIAL = {
 
 
 def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return Table 1 as a LaTeX table of siunitx quantities; it needs booktabs and siunitx version 3.
-
-    Parameters
-    ----------
-    names : sequence of str
-    analyses : sequence of Analysis
-    """
+    """Return Table 1 as a LaTeX table of siunitx quantities; it needs booktabs and siunitx version 3."""
     body = [
         " & ".join(
             [f"{row.quantity[:1].upper()}{row.quantity[1:]} & ${row.tex_symbol}$", *map(_tex_quantity, row.estimates)]
@@ -70,13 +64,7 @@ def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
 
 
 def budget_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return one LaTeX table of the uncertainty budget per run; it needs booktabs, longtable and siunitx version 3.
-
-    Parameters
-    ----------
-    names : sequence of str
-    analyses : sequence of Analysis
-    """
+    """Return one LaTeX table of the uncertainty budget per run; it needs booktabs, longtable and siunitx version 3."""
     return "\n".join(_budget_table(name, analysis) for name, analysis in zip(names, analyses, strict=True))
 
 
@@ -134,15 +122,6 @@ def lab_report_tex(
     """Return a lab report to complete: it contains Table 1, figures, captions, uncertainty, and questions for the rest.
 
     Compile it in the folder of the report, which contains its figures: ``pdflatex lab-report.tex``.
-
-    Parameters
-    ----------
-    run : Analysed
-    figures : mapping of str to str
-        Path of each figure's file without extension, by the figure's name.
-    captions : mapping of str to str
-    sentences : sequence of str
-        Sentences about the measured values and the damping.
     """
     warnings = [line for finding in by_harm(run.result.get("findings", ())) if (line := lab_report_line(finding))]
     budget = {row.name: row for row in budgets_of(run.analysis)}
@@ -170,84 +149,24 @@ def lab_report_tex(
         )
         for name, path in figures.items()
     ]
-    method = [
-        "What did you measure, and how does the sensor measure it?",
-        "How was the spring hung, and what moved with it?",
-        "How did you measure the masses, and how uncertain are they?",
-        "How did you release the bob?",
-    ]
-    discussion = [
-        "Does the spring constant agree with that from a static measurement, within the uncertainties?",
-        "Which damping law fits, and is that what you expect for this bob and disc?",
-        "Do the residuals show structure? What could cause it?",
-        "Which contribution would you reduce first, and how?",
-    ]
-    return "\n".join(
-        [
-            r"\documentclass[11pt,a4paper]{article}",
-            r"\usepackage[utf8]{inputenc}",
-            r"\usepackage[T1]{fontenc}",
-            r"\usepackage[margin=25mm]{geometry}",
-            r"\usepackage{amsmath,textcomp,booktabs,longtable,graphicx,siunitx}",
-            r"\title{Oscillation of a mass on a spring}",
-            r"\author{Your name}",
-            r"\begin{document}",
-            r"\maketitle",
-            "",
-            r"\section{Method}",
-            *(f"% {question}" for question in method),
-            "",
-            r"\section{Results}",
-            " ".join(_tex_words(sentence) for sentence in sentences),
-            r"Table~\ref{tab:springmass} lists the results.",
-            "",
-            table_tex([run.name], [run.analysis]),
-            *pictures,
-            r"\section{Uncertainty}",
-            r"Uncertainties are standard uncertainties (coverage factor 1) unless stated otherwise.",
-            *stated,
-            *(_tex_words(warning) for warning in warnings),
-            "",
-            r"\section{Discussion}",
-            *(f"% {question}" for question in discussion),
-            "",
-            r"\end{document}",
-            "",
-        ]
-    )
+    parts = {
+        "SENTENCES": " ".join(_tex_words(sentence) for sentence in sentences),
+        "TABLE": table_tex([run.name], [run.analysis]),
+        "FIGURES": "\n".join(pictures),
+        "UNCERTAINTY": "\n".join([*stated, *(_tex_words(warning) for warning in warnings)]),
+    }
+    text = Path(__file__).with_name("templates").joinpath("lab-report.tex").read_text("utf-8")
+    return re.sub("@([A-Z]+)@", lambda found: parts[found[1]], text)
 
 
 _TEX_MATH = {
+    **dict(zip("±−×·≤≥≈∞", (r"\pm", "-", r"\times", r"\cdot", r"\leq", r"\geq", r"\approx", r"\infty"), strict=True)),
     "χ²": r"\chi^2",
-    "α": r"\alpha",
-    "β": r"\beta",
-    "γ": r"\gamma",
-    "δ": r"\delta",
-    "ζ": r"\zeta",
-    "η": r"\eta",
-    "θ": r"\theta",
-    "κ": r"\kappa",
-    "λ": r"\lambda",
-    "μ": r"\mu",
-    "ν": r"\nu",
-    "π": r"\pi",
-    "ρ": r"\rho",
-    "σ": r"\sigma",
-    "τ": r"\tau",
     "φ": r"\varphi",
-    "ψ": r"\psi",
-    "ω": r"\omega",
-    "Δ": r"\Delta",
-    "Ω": r"\Omega",
-    "±": r"\pm",
-    "−": "-",
-    "×": r"\times",
-    "·": r"\cdot",
+    "λ": r"\lambda",  # LAMDA in Unicode
+    **{letter: "\\" + unicodedata.name(letter).split()[-1].lower() for letter in "αβγδζηθκμνπρστψω"},
+    **{letter: "\\" + unicodedata.name(letter).split()[-1].capitalize() for letter in "ΔΩ"},
     **{lowered: f"_{digit}" for digit, lowered in enumerate("₀₁₂₃₄₅₆₇₈₉")},
-    "≤": r"\leq",
-    "≥": r"\geq",
-    "≈": r"\approx",
-    "∞": r"\infty",
 }
 _SUPERSCRIPTS = {raised: plain for plain, raised in zip("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True)}
 

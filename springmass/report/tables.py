@@ -17,22 +17,6 @@ from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
 from pipeline.registry.quantities import QUANTITIES
 
-__all__ = [
-    "TableKey",
-    "TableRow",
-    "cell",
-    "every_number",
-    "law_status",
-    "page_unit",
-    "prefixed",
-    "pretty",
-    "pretty_number",
-    "raised",
-    "results_csv",
-    "table_estimates",
-    "table_rows",
-]
-
 _PAGE_UNITS = {"1": "", "degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
 _SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
 _POWER = re.compile(r"\^\(?([\dn-]+)\)?")
@@ -42,15 +26,8 @@ NOTHING = "-"
 class TableKey(NamedTuple):
     """The identity of a line of Table 1.
 
-    Parameters
-    ----------
-    name : str
-        Name as in ``Analysis.estimates``, or name of a coefficient.
-    law : str or None
-        The law that the value assumes, "" for an average over laws; None if the table names no law.
-    certain : bool
-        Whether all results assume this law, because the user states it or the recording supports no other. Otherwise
-        the line is valid only if the law is.
+    ``law`` is the law that the value assumes, "" for an average over laws, None if the table names none; ``certain``
+    says whether all results assume it, because the user states it or the recording supports no other.
     """
 
     name: str
@@ -71,21 +48,7 @@ class TableKey(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """One line of Table 1.
-
-    Parameters
-    ----------
-    name : str
-        Name as in ``Analysis.estimates``, or name of a coefficient.
-    quantity : str
-        The quantity in words, with the law if the value depends on it.
-    symbol, page_symbol, tex_symbol : str
-        The symbol in ASCII, in Unicode (an index follows a space) and in LaTeX, without the ``$``.
-    estimates : tuple of Estimate or None
-        One estimate per run; None if the run does not give it.
-    note : str
-        Why no run gives the quantity, and what to do; empty for a row with values.
-    """
+    """One line of Table 1: an estimate for each run that gives it, or why none does; an index follows a space."""
 
     name: str
     quantity: str
@@ -139,11 +102,7 @@ def table_rows(
 ) -> tuple[TableRow, ...]:
     """Return Table 1: every quantity that at least one run gives, with one column per run.
 
-    Parameters
-    ----------
-    runs : sequence of Analysis, or of what :func:`table_estimates` kept of one
-    missing : bool
-        Whether to add a row that states what the spring constant requires, if no run gives it.
+    With ``missing``, a row says what the spring constant requires, if no run gives it.
     """
     columns = [table_estimates(run) if isinstance(run, Analysis) else run for run in runs]
     rows = []
@@ -195,11 +154,6 @@ def results_csv(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Est
     """Return every number of every run as CSV with the columns run, name, value, u, unit.
 
     Numbers keep all their digits: the file is for programs.
-
-    Parameters
-    ----------
-    names : sequence of str
-    runs : sequence of Analysis, or of what :func:`every_number` kept of one
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -302,13 +256,7 @@ def page_unit(unit: str) -> str:
 
 
 def law_status(damping: Damping, name: str) -> str:
-    """Return the status of a law in a few words.
-
-    Parameters
-    ----------
-    damping : Damping
-    name : str
-    """
+    """Return the status of a law in a few words."""
     if name == damping.selected:
         if damping.by_statement:
             return "stated, and rejected" if damping.fits[name].rejected else "stated"
