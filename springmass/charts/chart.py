@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -69,14 +70,14 @@ class Chart:
 
 
 def thinned(series: Series, most: int = MOST_POINTS) -> Series:
-    """Keep each bin's least and greatest value of a series with more points than that."""
+    """Keep each bin's least and greatest value of a series with more points than that; of points, also every n-th."""
     if series.x.size <= most:
         return series
     y = np.where(np.isfinite(series.y), series.y, np.nanmedian(series.y) if np.isfinite(series.y).any() else 0.0)
-    edges = np.linspace(0, y.size, max(most // 2, 1) + 1).astype(np.intp)[:-1]
-    parts = [np.argmin, np.argmax]
-    ends = np.append(edges[1:], y.size)
-    rows = np.unique([at + f(y[at:to]) for at, to in zip(edges, ends, strict=True) for f in parts])
+    bins = most // (2 if series.line else 4)
+    edges = np.linspace(0, y.size, bins + 1).astype(np.intp)
+    ends = [at + f(y[at:to]) for at, to in itertools.pairwise(edges) for f in (np.argmin, np.argmax)]
+    rows = np.unique(ends if series.line else np.append(ends, np.arange(0, y.size, -(-y.size // (most // 2)))))
     why = None if series.why is None else tuple(series.why[row] for row in rows)
     u = None if series.u is None else series.u[rows]
     return replace(series, x=series.x[rows], y=series.y[rows], u=u, why=why)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Kind = Literal["svg", "pdf", "png"]
 STYLE = Path(__file__).with_name("figures.mplstyle")
 WIDTH = 7.2  # inches, the width of the text on A4
-MOST_POINTS, RASTER_POINTS = 3000, 300  # of a drawn series; more markers than the latter are pixels, in fewer bytes
+MOST_POINTS, RASTER_POINTS = 3000, 300  # of a line; more markers than the latter are pixels, which are fewer bytes
 LONG_LABEL = 30  # characters; three columns of such labels fill the width of a page
 
 
@@ -89,20 +89,25 @@ def figure_of(chart: Chart) -> Figure:
     if chart.detail is not None:
         again = [panel for panel in chart.panels if panel.x_label == chart.panels[0].x_label]
         parts += [(panel, chart.detail) for panel in again]
-    heights = [max(1.1, 0.8 * panel.height) for panel, _ in parts]
-    equal = any(panel.equal for panel in chart.panels)
-    figure = Figure(figsize=(5.6 if equal else WIDTH, sum(heights) + 0.3), layout="constrained")
+    heights = [panel.height * 1.15 if panel.equal else max(1.3, 0.8 * panel.height) for panel, _ in parts]
+    width = 5.6 if any(panel.equal for panel in chart.panels) else WIDTH
+    figure = Figure(figsize=(width, sum(heights) + 0.3), layout="constrained")
     axes = list(figure.subplots(len(parts), 1, squeeze=False, height_ratios=heights).ravel())
     figure.align_ylabels(axes)
+    spans = {panel.x_label: _span(chart, panel.x_label) for panel in chart.panels}
     named: set[str] = set()
     for i, ((panel, end), ax) in enumerate(zip(parts, axes, strict=True)):
         draw(_until(panel, end), ax)
-        after = parts[i + 1] if i + 1 < len(parts) else None
-        if after is not None and (after[0].x_label, after[1]) == (panel.x_label, end):
+        if i + 1 < len(parts) and (parts[i + 1][0].x_label, parts[i + 1][1], False) == (
+            panel.x_label,
+            end,
+            panel.equal,
+        ):
             ax.set_xlabel("")
-        x = np.concatenate([each.x[np.isfinite(each.x)] for each in panel.series] or [np.zeros(1)])
-        if not panel.equal and not panel.names and x.size and np.min(x) < np.max(x):
-            ax.set_xlim(float(np.min(x)), float(np.max(x)) if end is None else end)
+            ax.tick_params(labelbottom=False)
+        low, high = spans[panel.x_label]
+        if not panel.equal and not panel.names and low < high:
+            ax.set_xlim(low, high if end is None else end)
         labels = {label for label in ax.get_legend_handles_labels()[1] if label not in named}
         if len(ax.get_legend_handles_labels()[1]) > 1 and labels:
             legend(ax)
@@ -110,6 +115,12 @@ def figure_of(chart: Chart) -> Figure:
         if end is not None and panel is chart.panels[0]:
             ax.set_title("the first periods", fontsize=8.5, loc="right")
     return figure
+
+
+def _span(chart: Chart, x_label: str) -> tuple[float, float]:
+    """Return the range of x of all panels with this label."""
+    x = np.concatenate([s.x[np.isfinite(s.x)] for p in chart.panels if p.x_label == x_label for s in p.series])
+    return (float(np.min(x)), float(np.max(x))) if x.size else (0.0, 0.0)
 
 
 def _until(panel: Panel, end: float | None) -> Panel:
@@ -137,7 +148,7 @@ def draw(panel: Panel, ax: Axes) -> Axes:
     others = count()
     numbers = {one.label: next(others) for one in {s.label: s for s in panel.series if s.role == "other"}.values()}
     named: set[str] = set()
-    for i, series in enumerate(thinned(each, MOST_POINTS) for each in panel.series):
+    for i, series in enumerate(thinned(each, MOST_POINTS) if each.line else thinned(each) for each in panel.series):
         label = "_" if series.label in named else series.label.replace("$", r"\$")
         named.add(series.label)
         _draw(ax, series, label, numbers.get(series.label, 0), (low, high), 1.5 + 0.01 * i)

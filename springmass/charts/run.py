@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped
+from pipeline.errors import AnalysisError
+from pipeline.motion.smoother import Smoothed
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.results.classic import CYCLES, Classic
@@ -148,7 +151,7 @@ def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:
     grid = np.linspace(float(windows.t.min()), float(windows.t.max()), 400)
     curve = Series("rest position, fitted", grid, (rest.at(grid) - rest.mean.value) * factor, "law", line=True)
     points = Series("rest of one window", windows.t, own * factor, u=np.sqrt(windows.covariance[:, 2, 2]) * factor)
-    return Panel(value_label("rest − mean", a.track.unit), (curve, points), 1.2)
+    return Panel(value_label("rest", a.track.unit), (curve, points), 1.2)
 
 
 def amplitude(a: Analysis, laws: Sequence[str] | None = None) -> Chart | None:
@@ -248,8 +251,8 @@ def spectrum(a: Analysis) -> Chart | None:
     panel = Panel(
         value_label("amplitude", a.track.unit),
         (
-            Series("recording", f, whole * factor, line=True),
             Series("residuals of the fit", f, left * factor, "other", line=True),
+            Series("recording", f, whole * factor, line=True),
             Series("peaks", f[best], whole[best] * factor, "mark", why=tuple(f"{f[i]:.3g} Hz" for i in best)),
         ),
         x_label="frequency / Hz",
@@ -295,7 +298,7 @@ def _with_band(curve: Curve, x: float, y: float, points: str, law: str) -> tuple
     )
 
 
-def energy(a: Analysis) -> Chart | None:
+def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     """Mechanical energy with its band, means of its two parts, and the deviation of single amplitudes from the law."""
     if not isinstance(a.motion, Oscillation):
         return None
@@ -303,7 +306,7 @@ def energy(a: Analysis) -> Chart | None:
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
     if curve is None:
         return None
-    parts = _energy_means(a, motion) if a.track.unit == "m" else ()
+    parts = _energy_means(motion, smoothed or _smoothed(a)) if a.track.unit == "m" else ()
     low, high = float(np.min(curve.y - curve.u)), float(np.max(curve.y_points))
     law = np.interp(curve.x_points, curve.x, curve.y)
     # Where friction has stopped the motion, the law predicts no energy for comparison.
@@ -331,12 +334,12 @@ def energy(a: Analysis) -> Chart | None:
     return Chart("energy", "Energy", caption, (above, below))
 
 
-def _energy_means(a: Analysis, motion: Oscillation) -> tuple[Series, ...]:
+def _energy_means(motion: Oscillation, smoothed: Smoothed | None) -> tuple[Series, ...]:
     """Means of kinetic and potential energy over whole periods: each is half of the energy."""
-    smoothed, stiffness = a.smoothed(), motion.derived.half_stiffness
-    rows = np.flatnonzero(np.isfinite(smoothed.position))
-    if stiffness is None or not rows.size:
+    stiffness = motion.derived.half_stiffness
+    if stiffness is None or smoothed is None:
         return ()
+    rows = np.flatnonzero(np.isfinite(smoothed.position))
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
     t, f = smoothed.t[rows], motion.cycles.frequency_hz
     together = max(1, int(np.ceil(motion.cycles.count / MOST_MEANS)))
@@ -354,14 +357,12 @@ def _energy_means(a: Analysis, motion: Oscillation) -> tuple[Series, ...]:
     return tuple(Series(name, times[i::2], y[i::2], "other") for i, (name, y) in enumerate(means.items()))
 
 
-def motion(a: Analysis) -> Chart | None:
+def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     """Velocity and acceleration, and the difference of the velocity from the fitted law in its band of u."""
-    if not isinstance(a.motion, Oscillation):
+    smoothed, unit = smoothed or _smoothed(a), a.track.unit
+    if smoothed is None or not isinstance(a.motion, Oscillation):
         return None
-    smoothed, unit = a.smoothed(), a.track.unit
     rows = np.flatnonzero(np.isfinite(smoothed.position))
-    if not rows.size:
-        return None
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
     rows = rows[:: max(1, int(a.track.rate_hz / a.motion.cycles.frequency_hz / PER_PERIOD))]
     t, velocity, u = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
@@ -398,7 +399,7 @@ def motion(a: Analysis) -> Chart | None:
     return Chart("motion", "Velocity and acceleration", caption, panels, end if end < t[-1] else None)
 
 
-def phase(a: Analysis) -> Chart | None:
+def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     """Velocity against displacement: turns of the fitted motion, and the values of samples."""
     if not isinstance(a.motion, Oscillation):
         return None
@@ -410,8 +411,9 @@ def phase(a: Analysis) -> Chart | None:
     inside = (a.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
     recorded = track.velocity is not None and np.isfinite(track.velocity).any()
-    moving = track.velocity if track.velocity is not None and recorded else a.smoothed().velocity
-    velocity = np.where(_used(a), moving, np.nan)
+    smoothed = smoothed or _smoothed(a)
+    moving = track.velocity if recorded else np.nan if smoothed is None else smoothed.velocity
+    velocity = np.where(_used(a), np.asarray(moving, np.float64), np.nan)
     words = "samples, velocity as recorded" if recorded else "samples, velocity from the motion around them"
     displacement, turn = track.y - motion.rest.at(track.t), np.floor((track.t - first) / period)
     seen = np.flatnonzero(np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, step) == 0))
@@ -477,6 +479,14 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     return Chart("classic", "The lab report's method", caption, (above, below))
 
 
+def _smoothed(a: Analysis) -> Smoothed | None:
+    """Return the motion at every sample, or None if the recording does not allow it."""
+    try:
+        return a.smoothed()
+    except AnalysisError:
+        return None
+
+
 CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
     "position": position,
     "amplitude": amplitude,
@@ -490,10 +500,22 @@ CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
 """The charts of a run by name, in the report's order; the classic method needs its own analysis."""
 
 
-def charts_of(a: Analysis, notes: Sequence[Note] = (), classic: Classic | None = None) -> dict[str, Chart]:
+def charts_of(
+    a: Analysis,
+    notes: Sequence[Note] = (),
+    classic: Classic | None = None,
+    smoothed: Smoothed | None = None,
+) -> dict[str, Chart]:
     """Return all charts that a run allows, in the report's order; only the position if nothing oscillates."""
-    charts = {name: make(a) for name, make in CHARTS.items()}
-    charts["position"] = position(a, notes)
+    smoothed = smoothed or _smoothed(a)
+    makers: dict[str, Callable[[Analysis], Chart | None]] = {
+        **CHARTS,
+        "position": partial(position, notes=notes),
+        "energy": partial(energy, smoothed=smoothed),
+        "motion": partial(motion, smoothed=smoothed),
+        "phase": partial(phase, smoothed=smoothed),
+    }
+    charts = {name: make(a) for name, make in makers.items()}
     if classic is not None:
         charts["classic"] = classic_method(a, classic)
     return {name: chart for name, chart in charts.items() if chart is not None}

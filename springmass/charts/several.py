@@ -43,12 +43,9 @@ def comparison(found: Comparison) -> Chart:
     x = np.arange(1.0, len(names) + 1.0)
     k, u = (np.array([getattr(each, of) for each in found.each]) for of in ("value", "u"))
     exchanged = np.array([name in found.exchanged for name in found.names])
-    series = [
-        Series("spring constant ± u", x[~exchanged], k[~exchanged], u=u[~exchanged], why=_some(names, ~exchanged))
-    ]
+    series = [Series("spring constant ± u", x[~exchanged], k[~exchanged], u=u[~exchanged])]
     if exchanged.any():
-        words = _some(names, exchanged)
-        series.append(Series("perhaps exchanged", x[exchanged], k[exchanged], "flagged", u=u[exchanged], why=words))
+        series.append(Series("perhaps exchanged", x[exchanged], k[exchanged], "flagged", u=u[exchanged]))
     if found.agree:  # constants that disagree have no meaningful mean
         mean, ends = found.spring_constant, np.array([0.5, len(names) + 0.5])
         series[:0] = [
@@ -68,13 +65,9 @@ def comparison(found: Comparison) -> Chart:
     return Chart("comparison", "Comparison", caption, panels)
 
 
-def _some(names: Sequence[str], rows: np.ndarray) -> tuple[str, ...]:
-    return tuple(name for name, there in zip(names, rows, strict=True) if there)
-
-
 def course(label: str, rows: Sequence[tuple[str, float, float]]) -> Chart:
     """One quantity of all runs of a course, each row a name with the value and its uncertainty."""
     names, y, u = zip(*rows, strict=True)
-    series = Series("value ± u", np.arange(1.0, len(rows) + 1.0), np.array(y), u=np.array(u), why=tuple(names))
-    panel = Panel(label, (series,), x_label="run, in the order of their names")
+    series = Series("value ± u", np.arange(1.0, len(rows) + 1.0), np.array(y), u=np.array(u))
+    panel = Panel(label, (series,), x_label="run", names=names)
     return Chart("course", "All runs", "Point at a run to read its name.", (panel,))

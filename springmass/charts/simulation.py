@@ -39,15 +39,16 @@ def simulation(found: Simulation, mass_kg: float | None) -> tuple[Chart, ...]:
     period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
     turns = max(2, int(TURNS * period / exact.spacing_s) + 1)
     end = PERIODS * period if exact.t[-1] > 2 * PERIODS * period else None
-    of_position = _both(runs, "displacement / mm", lambda of, n: (of.t[:n], of.y[:n] * 1e3))
-    of_velocity = _both(runs, "velocity / (m/s)", lambda of, n: (of.t[:n], of.v[:n]))
-    label = "energy / mJ" if mass_kg is not None else "energy per mass / (mJ/kg)"
+    of_position = _both(runs, "y / mm", lambda of, n: (of.t[:n], of.y[:n] * 1e3))
+    of_velocity = _both(runs, "v / (m/s)", lambda of, n: (of.t[:n], of.v[:n]))
+    label = "E / mJ" if mass_kg is not None else "E per mass / (mJ/kg)"
     of_energy = _both(runs, label, lambda of, n: _energy(of, n, mass_kg), log=True)
     of_phase = _both(
         runs,
-        "velocity / (m/s)",
+        "v / (m/s)",
         lambda of, n: (of.y[: min(n, turns)] * 1e3, of.v[: min(n, turns)]),
-        x_label="displacement / mm",
+        x_label="displacement y / mm",
+        equal=True,
     )
     return (
         Chart("position", "Position", "Each method beside the exact motion.", of_position, end),
@@ -91,6 +92,7 @@ def _both(
     *,
     x_label: str = "time / s",
     log: bool | None = None,
+    equal: bool = False,
 ) -> tuple[Panel, ...]:
     """Return a panel for each method; ``values`` takes a trajectory and the number of its rows."""
     panels = []
@@ -99,7 +101,8 @@ def _both(
         beside_x, beside_y = values(runs.exact, len(run.y))
         series = (Series(words, x, y, line=True), Series(runs.words, beside_x, beside_y, "law", line=True))
         grows = log and float(np.min(y)) > 0.0 and float(np.max(y)) > 20.0 * float(np.max(beside_y))
-        panels.append(Panel(f"{label}", series, x_label=x_label, log=log and bool(grows)))
+        name, height = f"{words}: {label}", 3.6 if equal else 2.4
+        panels.append(Panel(name, series, height, x_label, log=log and bool(grows), equal=equal))
     return tuple(panels)
 
 

@@ -9,7 +9,7 @@ from pipeline.track import F8, UNUSABLE
 
 SHOWN_MULTIPLES = 8.0  # range of the spectrum in multiples of the oscillation's frequency
 LEAST_ROWS = 8
-MOST_PEAKS = 5
+MOST_PEAKS, MOST_TRIED = 5, 200
 FALSE_ALARM = 1e-3  # probability that white noise has a labelled peak
 SURROUNDINGS = 101  # rows whose median is the noise level around a peak
 APART = 0.03  # of the range of frequencies; of two peaks that are nearer, the higher is labelled
@@ -48,16 +48,14 @@ def peaks_of(amplitude: F8) -> list[int]:
     The amplitudes of white noise have a Rayleigh distribution: with probability :math:`\\alpha`, the largest of n
     exceeds :math:`\\sqrt{\\ln(n/\\alpha)/\\ln 2}` times their median.
     """
-    from scipy.ndimage import median_filter
-
-    around = median_filter(amplitude, min(SURROUNDINGS, amplitude.size))
     limit = np.sqrt(np.log(amplitude.size / FALSE_ALARM) / np.log(2.0))
     inner = amplitude[1:-1]
-    # scipy.signal has a function for this, but takes half a second to import.
-    top = (inner > amplitude[:-2]) & (inner >= amplitude[2:]) & (inner > limit * np.maximum(around[1:-1], 1e-30))
-    rows = np.flatnonzero(top) + 1
+    # scipy has functions for both, but they take longer to import than all charts take to make.
+    tops = np.flatnonzero((inner > amplitude[:-2]) & (inner >= amplitude[2:])) + 1
     taken: list[int] = []
-    for row in rows[np.argsort(amplitude[rows])[::-1]].tolist():
-        if len(taken) < MOST_PEAKS and all(abs(row - other) > APART * amplitude.size for other in taken):
+    for row in tops[np.argsort(amplitude[tops])[::-1]][:MOST_TRIED].tolist():
+        noise = float(np.median(amplitude[max(row - SURROUNDINGS // 2, 0) : row + SURROUNDINGS // 2 + 1]))
+        alone = all(abs(row - other) > APART * amplitude.size for other in taken)
+        if len(taken) < MOST_PEAKS and alone and amplitude[row] > limit * max(noise, 1e-30):
             taken.append(row)
     return taken

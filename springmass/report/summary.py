@@ -14,10 +14,10 @@ from springmass.report.tables import prefixed
 from springmass.report.words import damping_sentence, is_about, kept, listed, typeset
 
 _TRUST = {
-    Harm.UNUSABLE: "Do not use the results that the first warning names",
-    Harm.SCALE: "{names} are right only if what the first warning says does no harm; check it first",
-    Harm.PART: "{names} can be trusted for the part of the recording that was analysed",
-    Harm.UNCERTAINTY: "{names} can be trusted within ±u, which includes what the warnings say",
+    Harm.UNUSABLE: "Do not use the results that this spoils: “{message}”",
+    Harm.SCALE: "{names} depend on an assumption, which you must check: “{message}”",
+    Harm.PART: "{names} can be trusted for the part that was analysed: “{message}”",
+    Harm.UNCERTAINTY: "{names} can be trusted within ±u, which includes this: “{message}”",
     Harm.IMPROVABLE: "{names} can be trusted within ±u",
     Harm.NOTE: "{names} can be trusted within ±u",
 }
@@ -62,7 +62,8 @@ def _values(analysis: Analysis, motion: Oscillation) -> str:
 def _trust(analysis: Analysis, warnings: Sequence[Finding], row: BudgetRow | None) -> str:
     harm = min((harm_of(f.code, f.severity) for f in warnings), default=Harm.NOTE)
     names = ["T", *(["k"] if "spring_constant" in analysis.estimates else []), "A₀"]
-    text = _TRUST[harm].format(names=listed(names))
+    message = typeset(warnings[0].message).rstrip(".") if warnings else ""
+    text = _TRUST[harm].format(names=listed(names), message=message)
     noise = "more than noise" if is_about(analysis, "residuals") else "only noise"
     text += f"; the fit leaves {noise} in the residuals"
     if row is not None:

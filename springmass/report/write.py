@@ -81,7 +81,11 @@ def _write(
     script: str,
 ) -> None:
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
-    charts = [charts_of(run.analysis, notes_of(run.recorded), run.classic) for run in runs]
+    motions = [smoothed_or_why(analysis) for analysis in analyses]
+    charts = [
+        charts_of(run.analysis, notes_of(run.recorded), run.classic, None if isinstance(each, str) else each)
+        for run, each in zip(runs, motions, strict=True)
+    ]
     several: dict[str, Chart] = {}
     if len(runs) > 1 and (over := overlay(names, analyses)) is not None:
         several["overlay"] = over
@@ -93,8 +97,7 @@ def _write(
         for stem, own in (("", several), *zip(stems, charts, strict=True)):
             drawn = save(list(own.values()), folder / "figures", kinds, stem)
             pictures |= {f"{stem}{name}": files["svg"] for name, files in drawn.items() if "svg" in files}
-    for stem, analysis in zip(stems, analyses, strict=True):
-        smoothed = smoothed_or_why(analysis)
+    for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
         if not isinstance(smoothed, str):
             write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))
     results = [run.result for run in runs]

@@ -14,7 +14,7 @@ const LOOKS = {
   "band": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
   "mark": {"light": ["#a03f78"], "dark": ["#e8a0c8"], "dash": [[4, 4]], "marker": "ring"}
 };
-const MANY = 2000, ZOOM = 0.5, PAN = 0.25, FONT = "system-ui, sans-serif";
+const RANK = { data: 0, law: 1, other: 2, rest: 3, flagged: 4, band: 5, mark: 6 }, MANY = 2000, ZOOM = 0.5, PAN = 0.25, FONT = "system-ui, sans-serif";
 
 // Light text means a dark background, whatever the page or the notebook takes its colours from.
 function isDark(box) {
@@ -44,7 +44,7 @@ const minus = (text) => text.replaceAll("-", "−");
 function written(v, digits = 5) {
   if (!known(v)) return "–";
   const size = Math.abs(v);
-  return minus(size !== 0 && (size < 1e-4 || size >= 1e6) ? v.toExponential(2).replace("e+", "e") : String(Number(v.toPrecision(digits))));
+  return minus(size !== 0 && (size < 1e-4 || size >= 1e6) ? Number(v.toPrecision(3)).toExponential().replace("e+", "e") : String(Number(v.toPrecision(digits))));
 }
 // Numbers on an axis; a logarithmic one has them at powers of ten, or also at 2 and 5 if it spans less than two.
 const ticks = (_, splits) => splits.map((v) => (v === null ? "" : written(v, 7)));
@@ -137,8 +137,9 @@ class Panel {
     const x = { ...axis(panel.x_label, panel.log_x), size: 30 * k, space: 60 * k };
     if (more.bare) Object.assign(x, { label: null, labelSize: 0, size: 8 * k, values: (_, splits) => splits.map(() => "") });
     if (panel.names && panel.names.length) {
-      const short = panel.names.every((name) => name.length * panel.names.length * 8 < this.size().width - 90);
-      Object.assign(x, { splits: () => panel.names.map((_, i) => i + 1), values: (_, at) => at.map((v) => (short ? panel.names[v - 1] : String(v))) });
+      const count = panel.names.length, room = this.size().width / k - 90, short = panel.names.every((name) => name.length * count * 8 < room);
+      const every = Math.ceil((40 * count) / room), shown = panel.names.map((_, i) => i + 1).filter((v) => (v - 1) % every === 0);
+      Object.assign(x, { splits: () => shown, values: (_, at) => at.map((v) => (short ? panel.names[v - 1] : String(v))) });
     }
     const log = this.log && { distr: 3 };
     this.plot = new uPlot({
@@ -162,7 +163,7 @@ class Panel {
   paint(plot) {
     const { ctx, bbox } = plot, px = devicePixelRatio * this.more.scale, dark = this.dark;
     const at = (v) => plot.valToPos(v, "x", true), to = (v) => plot.valToPos(v, "y", true);
-    const tools = { plot, ctx, bbox, px, at, to };
+    const tools = { plot, ctx, bbox, px, at, to, log: this.log };
     ctx.save();
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
@@ -192,15 +193,14 @@ class Panel {
     const bare = (text) => (text || "").replace(/^\((.*)\)$/, "$1");
     if (this.panel.equal) return `${name} ${written(x)} ${bare(unit)}, ${this.panel.label.split(" / ")[0]} ${written(this.plot.posToVal(top, "y"))} ${bare(own)}`;
     const said = new Set(), texts = [], out = [];
-    const rank = { data: 0, law: 1, other: 2, band: 3, rest: 4, flagged: 5, mark: 6 };
-    for (const s of [...this.visible()].sort((a, b) => rank[a.role] - rank[b.role])) {
+    for (const s of [...this.visible()].sort((a, b) => RANK[a.role] - RANK[b.role])) {
       const i = nearest(s.x, x), far = i < 0 || Math.abs(this.plot.valToPos(s.x[i], "x") - left) > 12;
       if (s.role === "flagged" || s.role === "mark") { if (!far && s.why && s.why[i]) out.push(s.role === "mark" ? s.why[i] : `left out: ${s.why[i]}`); continue; }
       if (i < 0 || !known(s.y[i]) || said.has(s.label) || s.role === "band" || texts.length > 3 || (far && !s.line)) continue;
       said.add(s.label);
-      texts.push(`${s.why && s.why[i] ? s.why[i] : s.label} ${written(s.y[i])}${s.u && s.u[i] ? ` ± ${written(s.u[i], 2)}` : ""} ${bare(own)}`.trim());
+      texts.push(`${this.panel.names ? this.panel.names[Math.round(s.x[i]) - 1] : s.label} ${written(s.y[i])}${s.u && s.u[i] ? ` ± ${written(s.u[i], 2)}` : ""} ${bare(own)}`.trim());
     }
-    const where = this.panel.names || this.panel.x_label.startsWith("run") ? "" : `${name} ${written(x)} ${bare(unit)}: `;
+    const where = this.panel.names ? "" : `${name} ${written(x)} ${bare(unit)}: `;
     return where + [...texts, ...out].join("; ");
   }
 }
@@ -215,7 +215,7 @@ function nearest(x, value) {
   return low > 0 && value - x[low - 1] < x[low] - value ? low - 1 : low;
 }
 
-function paintBand({ ctx, at, to }, s) {
+function paintBand({ ctx, at, to, log }, s) {
   ctx.save();
   ctx.globalAlpha = 0.25;
   for (let i = 0; i < s.x.length;) {
@@ -223,7 +223,7 @@ function paintBand({ ctx, at, to }, s) {
     const first = i;
     ctx.beginPath();
     for (; i < s.x.length && known(s.y[i]); i++) ctx.lineTo(at(s.x[i]), to(s.y[i] + s.u[i]));
-    for (let j = i - 1; j >= first; j--) ctx.lineTo(at(s.x[j]), to(Math.max(s.y[j] - s.u[j], s.y[j] > 0 ? 1e-6 * s.y[j] : -Infinity)));
+    for (let j = i - 1; j >= first; j--) ctx.lineTo(at(s.x[j]), to(log ? Math.max(s.y[j] - s.u[j], 1e-6 * s.y[j]) : s.y[j] - s.u[j]));
     ctx.fill();
   }
   ctx.restore();
@@ -329,10 +329,10 @@ function entriesOf(chart, dark) {
     if (new Set(panel.series.map((s) => s.label)).size < 2) continue;
     for (const s of panel.series) {
       if (entries.has(s.label)) continue;
-      entries.set(s.label, { label: s.label, look: lookOf(s.role, s.role === "other" ? others++ : 0, dark), line: s.line, band: s.role === "band" });
+      entries.set(s.label, { label: s.label, role: s.role, look: lookOf(s.role, s.role === "other" ? others++ : 0, dark), line: s.line, band: s.role === "band" });
     }
   }
-  return [...entries.values()];
+  return [...entries.values()].sort((a, b) => RANK[a.role] - RANK[b.role]);
 }
 function drawKey(ctx, entry, x, y, px) {
   ctx.strokeStyle = ctx.fillStyle = entry.look.colour;
@@ -348,7 +348,7 @@ function drawKey(ctx, entry, x, y, px) {
 }
 
 // The numbers of x stand below the last of neighbouring panels that share them.
-const isBare = (chart, i) => i + 1 < chart.panels.length && chart.panels[i + 1].x_label === chart.panels[i].x_label;
+const isBare = (chart, i) => i + 1 < chart.panels.length && chart.panels[i + 1].x_label === chart.panels[i].x_label && !chart.panels[i].equal;
 const heightOf = (chart, i) => Math.round(90 * chart.panels[i].height) + (isBare(chart, i) ? 12 : 50);
 
 // A whole chart with its buttons, its legend and what stands under the cursor.
@@ -450,7 +450,7 @@ class Chart {
   act(action) {
     for (const [name, span] of this.spans) {
       const all = this.panels.find(({ panel }) => panel.x_label === name);
-      if (all.panel.equal && action === "all") { all.more.range = null; all.show(all.panel); }
+      if (all.panel.equal && action === "all") { for (const panel of this.panels) { panel.more.range = null; panel.show(panel.panel); } }
       else this.show(name, shifted(action === "all" ? span : this.range(name), all.panel.equal ? all.ranges().x : span, action));
     }
   }

@@ -126,6 +126,8 @@ function name_series(chart) {
   $(`${chart.box.id}-names`).replaceChildren(...names);
 }
 
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (amplitude) name_series(amplitude); });
+
 // The highest peaks are at the low end of the spectrum; frequencies far above them are cut off.
 function show_spectrum({ f, value, peaks }) {
   const highest = Math.max(...peaks.map((peak) => peak.f), 0), end = Math.max(10, 4 * highest), k = scale();

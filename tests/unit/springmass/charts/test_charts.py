@@ -156,7 +156,7 @@ def test_several_runs(damped: sm.Analysis, motion: Oscillation) -> None:
     np.testing.assert_allclose(chart.xy("residual", 1)[1], found.pulls, atol=1e-6)
     many = Drawn(course("period / s", [("x", 0.8, 0.1), ("y", 0.9, 0.2)]))
     assert many.xy("value")[1] == pytest.approx([0.8, 0.9])
-    assert many.series("value")["words"] == ["x", "y"]
+    assert many.json["panels"][0]["names"] == ["x", "y"]
 
 
 def test_a_map_of_drag() -> None:
