@@ -57,6 +57,23 @@ class Panel:
     range: tuple[float, float] | None = None
     names: tuple[str, ...] = ()  # of x = 1, 2, ... in place of numbers
 
+    def reach(self) -> tuple[float, float]:
+        """Return the range of y: that of all series but those that may lie beyond the axis."""
+        if self.range is not None:
+            return self.range
+        points = any(s.role == "data" and not s.line and s.y.size for s in self.series)
+        beyond = ("flagged", "rest", "mark", *(("other",) if points else ()))
+        series = [s for s in self.series if s.role not in beyond] or self.series
+        us = [0.0 if s.u is None or self.log else np.nan_to_num(s.u) for s in series]
+        ends = np.concatenate([s.y + sign * u for s, u in zip(series, us, strict=True) for sign in (-1, 1)])
+        ends = ends[np.isfinite(ends) & ((ends > 0.0) | (not self.log))]
+        low, high = (float(np.min(ends)), float(np.max(ends))) if ends.size else (0.1, 1.0)
+        if self.log:
+            return 0.8 * low, 1.25 * high
+        most = 1.1 * max(abs(low), abs(high)) or 1.0
+        margin = 0.07 * (high - low) or 0.01 * abs(high) or 1.0
+        return (-most, most) if self.zero else (low - margin, high + margin)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chart:
@@ -97,13 +114,8 @@ def to_json(chart: Chart, most: int = MOST_POINTS) -> dict[str, Any]:
             x = _evenly(one.x) or coded(one.x, "<f8")
             if x not in xs:
                 xs.append(x)
-            found: dict[str, Any] = {
-                "label": one.label,
-                "role": one.role,
-                "line": one.line,
-                "x": xs.index(x),
-                "y": coded(one.y),
-            }
+            found: dict[str, Any] = {"label": one.label, "role": one.role, "line": one.line}
+            found |= {"x": xs.index(x), "y": coded(one.y)}
             if one.u is not None:
                 found["u"] = coded(one.u)
             if one.why is not None:
@@ -111,8 +123,8 @@ def to_json(chart: Chart, most: int = MOST_POINTS) -> dict[str, Any]:
                 found |= {"why": [words.index(each) for each in one.why], "words": words}
             series.append(found)
         axes = {"label": panel.label, "x_label": panel.x_label, "height": panel.height, "log": panel.log}
-        shown = {name: getattr(panel, name) for name in ("log_x", "equal", "zero", "range", "names")}
-        panels.append(axes | {name: value for name, value in shown.items() if value} | {"series": series})
+        shown = {name: getattr(panel, name) for name in ("log_x", "equal", "zero", "names") if getattr(panel, name)}
+        panels.append(axes | shown | {"range": panel.reach(), "series": series})
     return {"name": chart.name, "title": chart.title, "xs": xs, "panels": panels}
 
 

@@ -98,11 +98,8 @@ def figure_of(chart: Chart) -> Figure:
     named: set[str] = set()
     for i, ((panel, end), ax) in enumerate(zip(parts, axes, strict=True)):
         draw(_until(panel, end), ax)
-        if i + 1 < len(parts) and (parts[i + 1][0].x_label, parts[i + 1][1], False) == (
-            panel.x_label,
-            end,
-            panel.equal,
-        ):
+        after, its_end = parts[i + 1] if i + 1 < len(parts) else (None, None)
+        if after is not None and after.x_label == panel.x_label and its_end == end and not panel.equal:
             ax.set_xlabel("")
             ax.tick_params(labelbottom=False)
         low, high = spans[panel.x_label]
@@ -144,7 +141,7 @@ def legend(ax: Axes) -> None:
 
 def draw(panel: Panel, ax: Axes) -> Axes:
     """Draw a panel into axes, in their own style; text from outside is never set as mathematics."""
-    low, high = panel.range or _range(panel)
+    low, high = panel.reach()
     others = count()
     numbers = {one.label: next(others) for one in {s.label: s for s in panel.series if s.role == "other"}.values()}
     named: set[str] = set()
@@ -201,23 +198,3 @@ def _draw(ax: Axes, s: Series, label: str, number: int, ends: tuple[float, float
         shown = np.clip(s.y, *ends) if s.role == "flagged" else s.y
         hollow: dict[str, Any] = {"mfc": "none"} if found["marker"] == "ring" else {}
         ax.errorbar(s.x, shown, s.u, rasterized=flat, **style, **look, **hollow)
-
-
-def _range(panel: Panel) -> tuple[float, float]:
-    """Return the range of y as charts.js chooses it: of all series but those that may lie beyond the axis."""
-    points = any(s.role == "data" and not s.line and s.y.size for s in panel.series)
-    beyond = {"flagged", "rest", "mark"} | ({"other"} if points else set())
-    series = [s for s in panel.series if s.role not in beyond] or panel.series
-    us = [np.zeros(s.y.size) if s.u is None or panel.log else np.nan_to_num(s.u) for s in series]
-    ends = np.concatenate(
-        [s.y + sign * u for s, u in zip(series, us, strict=True) for sign in (-1, 1)] or [np.zeros(1)]
-    )
-    ends = ends[np.isfinite(ends) & ((ends > 0.0) | (not panel.log))]
-    low, high = (float(np.min(ends)), float(np.max(ends))) if ends.size else (0.0, 1.0)
-    if panel.zero:
-        most = 1.1 * max(abs(low), abs(high)) or 1.0
-        return -most, most
-    if panel.log:
-        return 0.8 * low, 1.25 * high
-    margin = 0.07 * (high - low) or 0.01 * abs(high) or 1.0
-    return low - margin, high + margin

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import functools
 import itertools
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -135,7 +134,6 @@ def template(name: str) -> Template:
         "unit": page_unit,
         "typeset": typeset,
         "breakable": _breakable,
-        "aligned": _aligned,
     }
     return environment.get_template(name)
 
@@ -148,24 +146,7 @@ def _tables(runs: Sequence[Analysed]) -> Iterator[dict[str, Any]]:
             replace(row, estimates=tuple(None if x is None else prefixed(x) for x in row.estimates))
             for row in table_rows([run.analysis for run in some], missing=True)
         ]
-        widths = [max((len(_split(row.estimates[i])[0]) for row in rows), default=1) for i in range(len(some))]
-        yield {"names": [run.name for run in some], "rows": rows, "widths": widths}
-
-
-def _split(estimate: Estimate | None) -> tuple[str, str]:
-    """Split a written estimate into the part before its decimal point and the rest."""
-    written = pretty(estimate)
-    found = re.match(r"\(?−?\d+", written)
-    end = found.end() if found else 0
-    return written[:end], written[end:]
-
-
-def _aligned(estimate: Estimate | None, width: int) -> Markup:
-    """Format an estimate so that decimal points are aligned."""
-    from markupsafe import Markup
-
-    before, after = _split(estimate)
-    return Markup('<span class="whole" style="min-width: {}ch">{}</span>{}').format(width, before, after)
+        yield {"names": [run.name for run in some], "rows": rows}
 
 
 def _part(index: int, run: Analysed, charts: Mapping[str, Chart], figures: Figures, stem: str) -> dict[str, Any]:

@@ -90,25 +90,9 @@ class Panel {
   size() { return this.more.size || { width: Math.max(this.box.clientWidth, 200), height: Math.max(this.box.clientHeight, 80) }; }
   visible() { return this.panel.series.filter((s) => !this.more.hidden.has(s.label)); }
 
-  // The range of y: that of all series but those that may lie beyond the axis.
   reach() {
-    if (this.panel.range) return this.panel.range;
-    const points = this.panel.series.some((s) => s.role === "data" && !s.line && s.y.length), ends = [Infinity, -Infinity];
-    const counts = (s) => !["flagged", "rest", "mark"].includes(s.role) && !(points && s.role === "other");
-    const series = this.panel.series.some(counts) ? this.panel.series.filter(counts) : this.panel.series;
-    for (const s of series) {
-      for (let i = 0; i < s.y.length; i++) {
-        const u = s.u && known(s.u[i]) ? s.u[i] : 0;
-        if (!known(s.y[i]) || (this.log && !(s.y[i] > 0))) continue;
-        ends[0] = Math.min(ends[0], this.log ? s.y[i] : s.y[i] - u);
-        ends[1] = Math.max(ends[1], s.y[i] + u);
-      }
-    }
-    if (!(ends[0] <= ends[1])) return this.log ? [0.1, 1] : [0, 1];
-    if (this.panel.zero) { const most = 1.1 * Math.max(Math.abs(ends[0]), Math.abs(ends[1])) || 1; return [-most, most]; }
-    if (this.log) return [0.8 * ends[0], 1.25 * ends[1]];
-    const margin = 0.07 * (ends[1] - ends[0]) || Math.abs(ends[0]) * 0.01 || 1;
-    return [ends[0] - margin, ends[1] + margin];
+    const [low, high] = this.panel.range || [0.1, 1];
+    return this.log && !(low > 0) ? [1e-3 * high, high] : [low, high];
   }
 
   // With equal axes, one unit of x is as long as that part of y which the motion reaches at the same time.

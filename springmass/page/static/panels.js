@@ -77,7 +77,7 @@ function show_motion() {
   if (message.amplitude) {
     const k = scale(), grown = (values) => values.map((x) => x * k), { t, value, u } = message.amplitude;
     const laws = message.laws.map((law) => ({ label: law.name === message.stated_law ? `${law.name} (stated)` : law.name, role: law.name === message.law ? "law" : "other", line: true, x: law.t, y: grown(law.value) }));
-    amplitude.show({ ...amplitude.panel, series: [...laws, { label: "amplitude", role: "data", x: t, y: grown(value), u: grown(u) }] });
+    amplitude.show({ ...amplitude.panel, range: around(grown(value)), series: [...laws, { label: "amplitude", role: "data", x: t, y: grown(value), u: grown(u) }] });
     name_series(amplitude);
   }
   if (message.spectrum && message.spectrum.f.length) show_spectrum(message.spectrum);
@@ -114,6 +114,13 @@ function stopping(stop, age_s) {
   return left > 0 ? `${interval} About ${seconds(left)} s more for ${wanted}.` : interval;
 }
 
+// The range of values, a little wider than they are.
+function around(values, log = false) {
+  const found = values.filter((v) => known(v) && (!log || v > 0)), low = Math.min(...found), high = Math.max(...found);
+  if (!found.length) return null;
+  return log ? [0.8 * low, 2 * high] : [low - (0.07 * (high - low) || 1), high + (0.07 * (high - low) || 1)];
+}
+
 // The names of a panel's series under it.
 function name_series(chart) {
   const names = entriesOf({ panels: [chart.panel] }, isDark(chart.box)).map((entry) => {
@@ -134,8 +141,9 @@ function show_spectrum({ f, value, peaks }) {
   const stop = f.findIndex((x) => x > end), upto = stop < 0 ? f.length : stop;
   const text = (peak) => `${peak.f.toFixed(Math.max(0, Math.ceil(-Math.log10(peak.step))))} Hz`;
   const ordered = [...peaks].sort((a, b) => b.value - a.value);
-  spectrum.show({ ...spectrum.panel, series: [
-    { label: "amplitude", role: "data", line: true, x: f.slice(1, upto), y: value.slice(1, upto).map((x) => x * k) },
+  const size = value.slice(1, upto).map((x) => x * k);
+  spectrum.show({ ...spectrum.panel, range: around(size, true), series: [
+    { label: "amplitude", role: "data", line: true, x: f.slice(1, upto), y: size },
     { label: "peaks", role: "mark", x: ordered.map((peak) => peak.f), y: ordered.map((peak) => peak.value * k), why: ordered.map(text) },
   ] });
 }
@@ -209,7 +217,7 @@ function draw() {
   const marks = ((state && state.marks) || []).filter(([at]) => ends.length && at >= ends[0] && at <= ends[1]);
   // Samples that are far enough apart are drawn as dots, so that the fit below is visible; denser ones as a line.
   const dense = t.length > 0.7 * $("position").clientWidth, { min, max } = position.plot.scales.y;
-  position.show({ ...position.panel, range: fixed && min != null ? [min, max] : null, series: [
+  position.show({ ...position.panel, range: fixed && min != null ? [min, max] : around(y.map(shown)), series: [
     { label: "rest", role: "rest", line: true, x: level === null ? [] : ends, y: ends.map(() => level) },
     { label: "samples", role: "data", line: dense, x: t, y: y.map(shown) },
     { label: "marks", role: "mark", x: marks.map(([at]) => at), y: marks.map(() => null), why: marks.map(([, text]) => text) },
