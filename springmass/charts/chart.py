@@ -17,7 +17,7 @@ from springmass.report.tables import page_unit
 Role = Literal["data", "law", "other", "rest", "flagged", "band", "mark"]
 """What a series is; its colours, dashes and marker stand in charts.js, and the drawer of files reads them there."""
 
-MOST_POINTS = 16_000
+MOST_POINTS = 12_500
 """Points of a series; of more, each bin's least and greatest are kept, which a screen cannot tell from all."""
 
 
@@ -103,15 +103,15 @@ def thinned(series: Series, most: int = MOST_POINTS) -> Series:
 def to_json(chart: Chart, most: int = MOST_POINTS) -> dict[str, Any]:
     """Return a chart for charts.js; ``xs`` holds each x once, and a series names its x by number.
 
-    Numbers are in base64, which takes two thirds of the bytes of their digits: y and u as 32-bit floats, whose error no
-    screen shows, and x as 64-bit floats, or as start, step and count if it is evenly spaced. NaN is a missing number.
+    Numbers are 32-bit floats in base64, which takes two thirds of the bytes of their digits; no screen shows their error.
+    x is start, step and count if it is evenly spaced, else a start with the differences from it. NaN is missing.
     """
-    xs: list[dict[str, float] | str] = []
+    xs: list[dict[str, Any]] = []
     panels = []
     for panel in chart.panels:
         series = []
         for one in (thinned(each, most) for each in panel.series):
-            x = _evenly(one.x) or coded(one.x, "<f8")
+            x = _evenly(one.x) or _from_start(one.x)
             if x not in xs:
                 xs.append(x)
             found: dict[str, Any] = {"label": one.label, "role": one.role, "line": one.line}
@@ -137,14 +137,19 @@ def _evenly(x: F8) -> dict[str, float] | None:
     return None
 
 
-def coded(values: F8, kind: Literal["<f4", "<f8"] = "<f4") -> str:
+def _from_start(x: F8) -> dict[str, Any]:
+    start = float(x[np.isfinite(x)][0]) if np.isfinite(x).any() else 0.0
+    return {"start": start, "after": coded(x - start)}
+
+
+def coded(values: F8) -> str:
     """Return numbers in base64."""
-    return base64.b64encode(values.astype(kind).tobytes()).decode()
+    return base64.b64encode(values.astype("<f4").tobytes()).decode()
 
 
-def decoded(text: str, kind: Literal["<f4", "<f8"] = "<f4") -> F8:
+def decoded(text: str) -> F8:
     """Return the numbers of a chart's JSON."""
-    return np.frombuffer(base64.b64decode(text), kind).astype(np.float64)
+    return np.frombuffer(base64.b64decode(text), "<f4").astype(np.float64)
 
 
 def value_label(what: str, unit: str) -> str:
@@ -172,6 +177,16 @@ def rate_label(what: str, order: int, unit: str) -> str:
 def _over(what: str, unit: str) -> str:
     shown = page_unit(unit)
     return f"{what} / ({shown})" if "/" in shown else f"{what} / {shown}" if shown else what
+
+
+def line_of(label: str, x: F8, y: F8, role: Role = "law") -> Series:
+    """Return a line."""
+    return Series(label, x, y, role, line=True)
+
+
+def band_of(label: str, x: F8, y: F8, u: F8) -> Series:
+    """Return a band from y - u to y + u."""
+    return Series(label, x, y, "band", line=True, u=u)
 
 
 def mark(label: str, x: Sequence[float], texts: Sequence[str]) -> Series:

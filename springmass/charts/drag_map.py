@@ -10,7 +10,7 @@ import numpy as np
 from acquisition.errors import visible
 from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.track import F8
-from springmass.charts.chart import Chart, Panel, Series
+from springmass.charts.chart import Chart, Panel, Series, line_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,8 +63,8 @@ def drag_map(runs: Sequence[DragRun]) -> Chart:
         else:
             line, words = drag_of_plate(grid), "oscillating flat plate, Luhar and Nepf 2016"
             assumed = np.array([disc_drag_coefficient(x) for x in grid.tolist()])
-            series.append(Series("oscillating disc, as simulate assumes", grid, assumed, "rest", line=True))
-        series.append(Series(words, grid, line, "law", line=True))
+            series.append(line_of("oscillating disc, as simulate assumes", grid, assumed, "rest"))
+        series.append(line_of(words, grid, line))
         low, high = np.nanquantile(np.concatenate(heights), (0.01, 0.99)).tolist()
         shown = (0.7 * min(low, float(line.min())), 1.4 * max(high, STEADY_DISC_DRAG))
         panels.append(Panel("effective drag coefficient", tuple(series), 3.6, label, log=True, log_x=True, range=shown))

@@ -16,7 +16,7 @@ from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve
 from pipeline.track import F8, UNUSABLE, Quality
-from springmass.charts.chart import Chart, Panel, Role, Series, mark, rate_label, value_label
+from springmass.charts.chart import Chart, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
 from springmass.charts.spectrum import peaks_of, spectrum_of
 from springmass.report.recorded import Note
 from springmass.report.tables import law_status, pretty
@@ -61,7 +61,7 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
     motion = a.motion
     if isinstance(motion, Overdamped):
         grid, curve = _relaxing(a, motion)
-        series.insert(0, Series("fit", grid, curve * factor, "law", line=True))
+        series.insert(0, line_of("fit", grid, curve * factor))
     if not isinstance(motion, Oscillation):
         caption = f"The recording. Samples scatter by {sigma}."
         return Chart("position", "Position", caption, (Panel(value_label(what, track.unit), tuple(series)),))
@@ -110,9 +110,9 @@ def _fit_lines(a: Analysis, motion: Oscillation, factor: float) -> list[Series]:
     grid = np.linspace(start, end, int(PER_PERIOD * min(periods, MOST_PERIODS)) + 2)
     rest = motion.rest.at(grid)
     if periods <= MOST_PERIODS:
-        return [Series("fit", grid, (rest + model_motion(motion, grid)[0]) * factor, "law", line=True)]
+        return [line_of("fit", grid, (rest + model_motion(motion, grid)[0]) * factor)]
     reach = motion.damping.best.amplitude(grid - motion.damping.t0)
-    return [Series("fit: rest ± amplitude", grid, (rest + s * reach) * factor, "law", line=True) for s in (1, -1)]
+    return [line_of("fit: rest ± amplitude", grid, (rest + s * reach) * factor) for s in (1, -1)]
 
 
 def model_motion(motion: Oscillation, t: F8) -> tuple[F8, F8]:
@@ -149,7 +149,7 @@ def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:
     rest, windows = motion.rest, motion.demodulated
     own = windows.offset - rest.mean.value
     grid = np.linspace(float(windows.t.min()), float(windows.t.max()), 400)
-    curve = Series("rest position, fitted", grid, (rest.at(grid) - rest.mean.value) * factor, "law", line=True)
+    curve = line_of("rest position, fitted", grid, (rest.at(grid) - rest.mean.value) * factor)
     points = Series("rest of one window", windows.t, own * factor, u=np.sqrt(windows.covariance[:, 2, 2]) * factor)
     return Panel(value_label("rest", a.track.unit), (curve, points), 1.2)
 
@@ -199,7 +199,7 @@ def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> 
         )
         curve = damping.fits[name].amplitude(grid - damping.t0) * SHOWN[a.track.unit].factor
         role: Role = "law" if name == damping.selected else "rest" if name in rest else "other"
-        lines.append(Series(label, grid, curve, role, line=True))
+        lines.append(line_of(label, grid, curve, role))
     return lines
 
 
@@ -230,7 +230,7 @@ def frequency(a: Analysis) -> Chart | None:
     panel = Panel(
         f"(frequency − {mean / (2.0 * np.pi):.5g} Hz) / mHz",
         (
-            Series(model, grid * factor, shift * (phase.rate(grid) - mean), "law", line=True),
+            line_of(model, grid * factor, shift * (phase.rate(grid) - mean)),
             Series("a stretch of the run", size * factor, shift * (slope - mean), u=shift * u),
         ),
         x_label=value_label("amplitude", a.track.unit),
@@ -251,7 +251,7 @@ def spectrum(a: Analysis) -> Chart | None:
     panel = Panel(
         value_label("amplitude", a.track.unit),
         (
-            Series("residuals of the fit", f, left * factor, "other", line=True),
+            line_of("residuals of the fit", f, left * factor, "other"),
             Series("recording", f, whole * factor, line=True),
             Series("peaks", f[best], whole[best] * factor, "mark", why=tuple(f"{f[i]:.3g} Hz" for i in best)),
         ),
@@ -292,8 +292,8 @@ def drag(a: Analysis) -> Chart | None:
 
 def _with_band(curve: Curve, x: float, y: float, points: str, law: str) -> tuple[Series, ...]:
     return (
-        Series("± u of the law", x * curve.x, y * curve.y, "band", line=True, u=y * curve.u),
-        Series(law, x * curve.x, y * curve.y, "law", line=True),
+        band_of("± u of the law", x * curve.x, y * curve.y, y * curve.u),
+        line_of(law, x * curve.x, y * curve.y),
         Series(points, x * curve.x_points, y * curve.y_points, u=y * curve.u_points),
     )
 
@@ -322,7 +322,7 @@ def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     below = Panel(
         "deviation / %",
         (
-            Series("± u of the law", curve.x[moves], np.zeros(width.size), "band", line=True, u=width),
+            band_of("± u of the law", curve.x[moves], np.zeros(width.size), width),
             Series("deviation", curve.x_points[there], off, u=100.0 * curve.u_points[there] / law[there]),
         ),
         1.3,
@@ -370,22 +370,18 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     k = SHOWN[unit].factor
     off = k * (velocity - model_motion(a.motion, t)[1])
     band = rows.size // 400 + 1  # u changes slowly
-    first = [Series(names[0], t, velocity, "law", line=True)]
+    first = [line_of(names[0], t, velocity)]
     if a.track.velocity is not None:
         measured = np.where(_used(a), a.track.velocity, np.nan)[rows]
         first.append(Series("as recorded", t, measured))
     panels = (
         Panel(rate_label(names[0], 1, unit), tuple(first)),
-        Panel(
-            rate_label(names[1], 2, unit), (Series(names[1], t, smoothed.acceleration[rows], "law", line=True),), 1.6
-        ),
+        Panel(rate_label(names[1], 2, unit), (line_of(names[1], t, smoothed.acceleration[rows]),), 1.6),
         Panel(
             "v − law / (mm/s)" if unit == "m" else rate_label("deviation", 1, unit),
             (
-                Series(
-                    f"± u of the {names[0]}", t[::band], np.zeros(t[::band].size), "band", line=True, u=k * u[::band]
-                ),
-                Series(f"{names[0]} − law", t, off, "law", line=True),
+                band_of(f"± u of the {names[0]}", t[::band], np.zeros(t[::band].size), k * u[::band]),
+                line_of(f"{names[0]} − law", t, off),
             ),
             1.3,
             zero=True,
@@ -428,7 +424,7 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
         rate_label("velocity" if unit == "m" else "derivative", 1, unit),
         (
             Series(words, displacement[seen] * factor, velocity[seen], "rest"),
-            Series("fitted motion", line[:, 0] * factor, line[:, 1], "law", line=True),
+            line_of("fitted motion", line[:, 0] * factor, line[:, 1]),
         ),
         4.4,
         x_label=value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit),
@@ -457,7 +453,7 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
         (
             Series("samples used", a.track.t[near], a.track.y[near] * factor),
             Series(picked, t, y, "mark", why=("", "")),
-            *(Series("extremes of the whole recording", span, np.full(2, x), "other", line=True) for x in extremes),
+            *(line_of("extremes of the whole recording", span, np.full(2, x), "other") for x in extremes),
         ),
         x_label="time of the picked maxima / s",
     )
@@ -467,8 +463,8 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
         own.panels[0].label,
         (
             *own.panels[0].series,
-            Series("half the range in 1.5 s", classic.window_t, windows, "rest", line=True),
-            Series("its exponential", classic.window_t, curve, "other", line=True),
+            line_of("half the range in 1.5 s", classic.window_t, windows, "rest"),
+            line_of("its exponential", classic.window_t, curve, "other"),
         ),
         range=(min(float(np.min(windows)), float(np.min(curve))), 1.05 * float(max(np.max(windows), np.max(curve)))),
     )
@@ -482,9 +478,10 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
 def _smoothed(a: Analysis) -> Smoothed | None:
     """Return the motion at every sample, or None if the recording does not allow it."""
     try:
-        return a.smoothed()
+        found = a.smoothed()
     except AnalysisError:
         return None
+    return found if np.isfinite(found.position).any() else None
 
 
 CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {

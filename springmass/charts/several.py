@@ -11,7 +11,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.results.compare import Comparison
 from pipeline.track import UNUSABLE
-from springmass.charts.chart import Chart, Panel, Series, value_label
+from springmass.charts.chart import Chart, Panel, Series, band_of, line_of, value_label
 
 DETAIL_PERIODS = 8
 
@@ -30,7 +30,7 @@ def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
         rest = np.mean(y)
         if isinstance(motion, Oscillation):
             rest, fastest = motion.rest.at(t), max(fastest, motion.cycles.frequency_hz)
-        series.append(Series(visible(name), t - t[0], (y - rest) * SHOWN[unit].factor, "other", line=True))
+        series.append(line_of(visible(name), t - t[0], (y - rest) * SHOWN[unit].factor, "other"))
     what = "displacement" if unit == "m" else f"{noun(unit)} from rest"
     panel = Panel(value_label(what, unit), tuple(series), x_label="time since the first sample used / s")
     caption = "Displacement of every run from its rest position."
@@ -49,8 +49,8 @@ def comparison(found: Comparison) -> Chart:
     if found.agree:  # constants that disagree have no meaningful mean
         mean, ends = found.spring_constant, np.array([0.5, len(names) + 0.5])
         series[:0] = [
-            Series("mean ± u", ends, np.full(2, mean.value), "band", line=True, u=np.full(2, mean.u)),
-            Series("mean", ends, np.full(2, mean.value), "law", line=True),
+            band_of("mean ± u", ends, np.full(2, mean.value), np.full(2, mean.u)),
+            line_of("mean", ends, np.full(2, mean.value)),
         ]
     low, high = float(np.min(k - u)), float(np.max(k + u))
     margin = 0.1 * (high - low) or 1.0

@@ -4,38 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics import Trajectory, get_integrator
+from pipeline.dynamics import Trajectory
 from pipeline.dynamics.band import Band
-from pipeline.dynamics.halving import auto
-from pipeline.errors import DynamicsError
 from pipeline.track import F8
-from springmass.charts.chart import Chart, Panel, Series
+from springmass.charts.chart import Chart, Panel, Series, band_of, line_of
+from springmass.runs.simulating.eulers import EULERS, Eulers, beside_exact
 from springmass.runs.simulating.simulation import Against, Simulation
 
-EULERS = (("forward-euler", "forward Euler"), ("symplectic-euler", "symplectic Euler"))
 PERIODS, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
 POINTS = 1500
 GROWN = 1e6  # multiple of the starting amplitude above which curves are cut off
-ROUGH, EXACT = 1e-3, 1e-9  # errors over the amplitude: one that is visible, and one that is called exact
-
-
-@dataclass(frozen=True, slots=True)
-class _Runs:
-    """The motion with which both Euler methods are compared, its name in a legend, and their runs."""
-
-    exact: Trajectory
-    words: str
-    eulers: tuple[Trajectory, ...]
 
 
 def simulation(found: Simulation, mass_kg: float | None) -> tuple[Chart, ...]:
     """Return the charts of a simulation; without a mass, the energy is that of one kilogram."""
-    exact, words = _exact(found)
-    runs = _Runs(exact, words, tuple(_euler(found, exact, name) for name, _ in EULERS))
+    runs = beside_exact(found)
+    exact = runs.exact
     period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
     turns = max(2, int(TURNS * period / exact.spacing_s) + 1)
     end = PERIODS * period if exact.t[-1] > 2 * PERIODS * period else None
@@ -61,32 +48,8 @@ def simulation(found: Simulation, mass_kg: float | None) -> tuple[Chart, ...]:
     )
 
 
-def _exact(found: Simulation) -> tuple[Trajectory, str]:
-    """Return the reference if the error was measured, else the run, or auto's solution if the run is inaccurate."""
-    if found.check is not None:
-        return found.check.reference, "exact"
-    run, error = found.trajectory, found.solution.error
-    if error is None or not error <= ROUGH:
-        better = auto(found.problem, run.spacing_s, len(run.y) - 1, ROUGH)
-        run, error = better.trajectory, better.error
-    assert error is not None
-    return run, "exact" if error < EXACT else f"solved to {error:.0e}"
-
-
-def _euler(found: Simulation, exact: Trajectory, name: str) -> Trajectory:
-    """Run a method with the run's spacing; if it diverges, halve the duration until it can be solved."""
-    count = len(exact.y) - 1
-    while True:
-        try:
-            return get_integrator(name).run(found.problem, exact.spacing_s, count)
-        except DynamicsError:
-            if count < 2:
-                raise
-            count //= 2
-
-
 def _both(
-    runs: _Runs,
+    runs: Eulers,
     label: str,
     values: Callable[[Trajectory, int], tuple[F8, F8]],
     *,
@@ -99,7 +62,7 @@ def _both(
     for (_, words), run in zip(EULERS, runs.eulers, strict=True):
         x, y = values(run, len(run.y))
         beside_x, beside_y = values(runs.exact, len(run.y))
-        series = (Series(words, x, y, line=True), Series(runs.words, beside_x, beside_y, "law", line=True))
+        series = (Series(words, x, y, line=True), line_of(runs.words, beside_x, beside_y))
         grows = log and float(np.min(y)) > 0.0 and float(np.max(y)) > 20.0 * float(np.max(beside_y))
         name, height = f"{words}: {label}", 3.6 if equal else 2.4
         panels.append(Panel(name, series, height, x_label, log=log and bool(grows), equal=equal))
@@ -116,7 +79,7 @@ def _energy(of: Trajectory, count: int, mass_kg: float | None) -> tuple[F8, F8]:
     return of.t[rows], 0.5e3 * (1.0 if mass_kg is None else mass_kg) * start * start * relative[rows]
 
 
-def _error(found: Simulation, runs: _Runs) -> Panel:
+def _error(found: Simulation, runs: Eulers) -> Panel:
     """Return running maxima of the errors, because an error crosses zero twice per period."""
     start = found.problem.amplitude_m() or 1.0
     curves = [(run, words) for run, (_, words) in zip(runs.eulers, EULERS, strict=True)]
@@ -127,11 +90,11 @@ def _error(found: Simulation, runs: _Runs) -> Panel:
         error = np.maximum.accumulate(np.abs(run.y - runs.exact.y[: len(run.y)])) / start
         drawn = np.flatnonzero((error > 0) & (error < GROWN))
         rows = drawn[np.unique(np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp))]
-        series.append(Series(words, run.t[rows], error[rows], "other", line=True))
+        series.append(line_of(words, run.t[rows], error[rows], "other"))
     predicted = found.solution.error
     if predicted is not None and 0.0 < predicted < GROWN:
         ends = runs.exact.t[[0, -1]]
-        series.append(Series("predicted", ends, np.full(2, predicted), "law", line=True))
+        series.append(line_of("predicted", ends, np.full(2, predicted)))
     return Panel("largest error so far / amplitude", tuple(series), 3.0, log=True)
 
 
@@ -144,7 +107,7 @@ def against(found: Against) -> Chart:
             "distance / mm",
             (
                 *over,
-                Series("predicted", found.t, found.predicted * 1e3, "law", line=True),
+                line_of("predicted", found.t, found.predicted * 1e3),
                 Series("measured", found.t, found.measured * 1e3),
             ),
         ),
@@ -173,14 +136,14 @@ def band(found: Simulation, spread: Band) -> Chart:
             "displacement / mm",
             (
                 *_bands(last, middle + spread.displacement_at(last), 1e3),
-                Series(law, last, middle * 1e3, "law", line=True),
+                line_of(law, last, middle * 1e3),
             ),
             2.0,
             "time in the last periods / s",
         ),
         Panel(
             "amplitude / mm",
-            (*_bands(whole, of_amplitude, 1e3), Series(law, whole, amplitude * 1e3, "law", line=True)),
+            (*_bands(whole, of_amplitude, 1e3), line_of(law, whole, amplitude * 1e3)),
             1.6,
         ),
         Panel("phase / rad", tuple(_bands(whole, spread.phase_at(whole), 1.0)), 1.6),
@@ -194,5 +157,5 @@ def _bands(t: F8, levels: F8, factor: float) -> list[Series]:
     bands = []
     for low, high, share in ((0, 3, 95), (1, 2, 68)):
         middle, half = 0.5 * (levels[high] + levels[low]), 0.5 * (levels[high] - levels[low])
-        bands.append(Series(f"{share} %", t, middle * factor, "band", line=True, u=half * factor))
+        bands.append(band_of(f"{share} %", t, middle * factor, half * factor))
     return bands

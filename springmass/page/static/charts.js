@@ -28,7 +28,7 @@ function lookOf(role, i, dark) {
 
 function decoded(chart) {
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
-  const xs = chart.xs.map((x) => (typeof x === "string" ? new Float64Array(bytes(x)) : Float64Array.from({ length: x.count }, (_, i) => x.start + x.step * i)));
+  const xs = chart.xs.map((x) => (x.after === undefined ? Float64Array.from({ length: x.count }, (_, i) => x.start + x.step * i) : Float64Array.from(new Float32Array(bytes(x.after)), (v) => x.start + v)));
   for (const panel of chart.panels) {
     for (const s of panel.series) {
       s.x = xs[s.x];

@@ -33,7 +33,7 @@ class Drawn:
         """Return x and y of the series whose label begins so."""
         found = self.series(label, panel)
         x = self.json["xs"][found["x"]]
-        x = decoded(x, "<f8") if isinstance(x, str) else x["start"] + x["step"] * np.arange(x["count"])
+        x = x["start"] + (decoded(x["after"]) if "after" in x else x["step"] * np.arange(x["count"]))
         return x, decoded(found["y"])
 
     def series(self, label: str, panel: int = 0) -> dict[str, Any]:
@@ -178,7 +178,7 @@ def test_a_long_series_keeps_its_extremes() -> None:
     y[54_321] = 9.0
     chart = Chart("long", "", "", (Panel("y", (Series("y", np.arange(100_000.0), y),)),))
     x, drawn = Drawn(chart).xy("y")
-    assert drawn.size <= 16_000
+    assert drawn.size <= 12_500
     assert drawn.max() == 9.0
     assert x[np.argmax(drawn)] == 54_321.0
 
