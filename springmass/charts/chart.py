@@ -103,7 +103,7 @@ def thinned(series: Series, most: int = MOST_POINTS) -> Series:
 def to_json(chart: Chart, most: int = MOST_POINTS) -> dict[str, Any]:
     """Return a chart for charts.js; ``xs`` holds each x once, and a series names its x by number.
 
-    Numbers are 32-bit floats in base64, which takes two thirds of the bytes of their digits; no screen shows their error.
+    Numbers are 32-bit floats in base64, two thirds of the bytes of their digits; no screen shows their error.
     x is start, step and count if it is evenly spaced, else a start with the differences from it. NaN is missing.
     """
     xs: list[dict[str, Any]] = []

@@ -159,7 +159,7 @@ def _part(index: int, run: Analysed, charts: Mapping[str, Chart], figures: Figur
         "name": run.name,
         "index": index,
         "head": [
-            _subtitle(title, given, analysis.track, left_out=len(analysis.track) - quality["used"]),
+            _subtitle(title, given, analysis.track, quality),
             *filter(None, [date_words(run.recorded)]),
             f"Bench: {bench_words(analysis.scene)}.",
             *(f"Noted: {visible(str(note))}" for note in run.recorded.get("notes", ())),
@@ -182,11 +182,13 @@ def _part(index: int, run: Analysed, charts: Mapping[str, Chart], figures: Figur
     }
 
 
-def _subtitle(title: str, given: Mapping[str, Any], track: Track, *, left_out: int) -> str:
+def _subtitle(title: str, given: Mapping[str, Any], track: Track, quality: Mapping[str, int]) -> str:
+    causes = [f"{count} {_QUALITY.get(name, name)}" for name, count in quality.items() if count and name != "used"]
+    left_out = f"{len(track) - quality['used']} left out{': ' if causes else ''}{', '.join(causes)}"
     duration_s = float(track.t[-1] - track.t[0])
     parts = [
         title,
-        f"{len(track)} samples ({left_out} left out) at {track.rate_hz:g} Hz, {duration_s:.1f} s",
+        f"{len(track)} samples ({left_out}) at {track.rate_hz:g} Hz, {duration_s:.1f} s",
         f"format {given['format']}" if given.get("format") else None,
     ]
     return " · ".join(str(part) for part in parts if part) + "."

@@ -40,6 +40,12 @@ function decoded(chart) {
 }
 
 const known = (v) => v !== null && v !== undefined && !Number.isNaN(v);
+// The range of values, a little wider than they are.
+function around(values, log = false) {
+  const found = values.filter((v) => known(v) && (!log || v > 0)), low = Math.min(...found), high = Math.max(...found);
+  if (!found.length) return null;
+  return log ? [0.8 * low, 2 * high] : [low - (0.07 * (high - low) || 1), high + (0.07 * (high - low) || 1)];
+}
 const minus = (text) => text.replaceAll("-", "−");
 function written(v, digits = 5) {
   if (!known(v)) return "–";

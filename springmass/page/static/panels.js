@@ -114,13 +114,6 @@ function stopping(stop, age_s) {
   return left > 0 ? `${interval} About ${seconds(left)} s more for ${wanted}.` : interval;
 }
 
-// The range of values, a little wider than they are.
-function around(values, log = false) {
-  const found = values.filter((v) => known(v) && (!log || v > 0)), low = Math.min(...found), high = Math.max(...found);
-  if (!found.length) return null;
-  return log ? [0.8 * low, 2 * high] : [low - (0.07 * (high - low) || 1), high + (0.07 * (high - low) || 1)];
-}
-
 // The names of a panel's series under it.
 function name_series(chart) {
   const names = entriesOf({ panels: [chart.panel] }, isDark(chart.box)).map((entry) => {
