@@ -83,8 +83,11 @@ def write_reports(
         Reasons why reports could not be written or removed, by the name of the report's folder.
     """
     tasks = [(run, job, folder / REPORTS / report_name(run)) for run, job in chosen]
-    write_script(folder)
     failed: dict[str, str] = {}
+    try:
+        write_script(folder)
+    except WriteFailed as error:
+        failed[SHARED] = str(error)
     for name in sorted(linked(folder) - {place.name for _, _, place in tasks}):
         try:
             with writing(folder / REPORTS / name):
