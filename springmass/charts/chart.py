@@ -17,8 +17,8 @@ from springmass.report.tables import page_unit
 Role = Literal["data", "law", "other", "rest", "flagged", "band", "mark"]
 """What a series is; its colours, dashes and marker stand in charts.js, and the drawer of files reads them there."""
 
-MOST_POINTS = 12_500
-"""Points of a series; of more, each bin's least and greatest are kept, which a screen cannot tell from all."""
+MOST_POINTS, MOST_OF_LINE = 12_500, 6_000
+"""Largest series that is kept as it is; of a larger one two thirds as many rows remain: the extremes of bins."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,10 +86,12 @@ class Chart:
     detail: float | None = None
 
 
-def thinned(series: Series, most: int = MOST_POINTS) -> Series:
-    """Keep each bin's least and greatest value of a series with more points than that; of points, also every n-th."""
-    if series.x.size <= most:
+def thinned(series: Series, of_line: int = MOST_OF_LINE) -> Series:
+    """Keep each bin's least and greatest value of a series that is too long; of points, also every n-th."""
+    largest = of_line if series.line else MOST_POINTS
+    if series.x.size <= largest:
         return series
+    most = 2 * largest // 3
     y = np.where(np.isfinite(series.y), series.y, np.nanmedian(series.y) if np.isfinite(series.y).any() else 0.0)
     bins = most // (2 if series.line else 4)
     edges = np.linspace(0, y.size, bins + 1).astype(np.intp)
@@ -100,7 +102,7 @@ def thinned(series: Series, most: int = MOST_POINTS) -> Series:
     return replace(series, x=series.x[rows], y=series.y[rows], u=u, why=why)
 
 
-def to_json(chart: Chart, most: int = MOST_POINTS) -> dict[str, Any]:
+def to_json(chart: Chart) -> dict[str, Any]:
     """Return a chart for charts.js; ``xs`` holds each x once, and a series names its x by number.
 
     Numbers are 32-bit floats in base64, two thirds of the bytes of their digits; no screen shows their error.
@@ -110,7 +112,7 @@ def to_json(chart: Chart, most: int = MOST_POINTS) -> dict[str, Any]:
     panels = []
     for panel in chart.panels:
         series = []
-        for one in (thinned(each, most) for each in panel.series):
+        for one in map(thinned, panel.series):
             x = _evenly(one.x) or _from_start(one.x)
             if x not in xs:
                 xs.append(x)

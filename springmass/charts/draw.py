@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Kind = Literal["svg", "pdf", "png"]
 STYLE = Path(__file__).with_name("figures.mplstyle")
 WIDTH = 7.2  # inches, the width of the text on A4
-MOST_POINTS, RASTER_POINTS = 3000, 300  # of a line; more markers than the latter are pixels, which are fewer bytes
+MOST_OF_LINE, RASTER_POINTS = 3000, 300  # of a line; more markers than the latter are pixels, which are fewer bytes
 LONG_LABEL = 30  # characters; three columns of such labels fill the width of a page
 
 
@@ -145,7 +145,7 @@ def draw(panel: Panel, ax: Axes) -> Axes:
     others = count()
     numbers = {one.label: next(others) for one in {s.label: s for s in panel.series if s.role == "other"}.values()}
     named: set[str] = set()
-    for i, series in enumerate(thinned(each, MOST_POINTS) if each.line else thinned(each) for each in panel.series):
+    for i, series in enumerate(thinned(each, MOST_OF_LINE) for each in panel.series):
         label = "_" if series.label in named else series.label.replace("$", r"\$")
         named.add(series.label)
         _draw(ax, series, label, numbers.get(series.label, 0), (low, high), 1.5 + 0.01 * i)
