@@ -278,8 +278,9 @@ function paintMarks({ plot, ctx, bbox, at, to, px }, s, look) {
       ctx.stroke();
       ctx.setLineDash([]);
     }
-    const left = Math.max(bbox.left, Math.min(x + (ring ? -wide / 2 : 4 * px), bbox.left + bbox.width - wide));
-    const base = Math.max(ring ? to(s.y[i]) - 6 * px : 0, bbox.top + high);
+    const above = ring && to(s.y[i]) - 6 * px > bbox.top + high, beside = above ? -wide / 2 : (ring ? 7 : 4) * px;
+    const left = Math.max(bbox.left, Math.min(x + beside, bbox.left + bbox.width - wide));
+    const base = above ? to(s.y[i]) - 6 * px : Math.max(ring ? to(s.y[i]) + 4 * px : 0, bbox.top + high);
     if (taken.some((box) => left < box.left + box.wide && box.left < left + wide && Math.abs(base - box.base) < high)) continue;
     taken.push({ left, base, wide });
     ctx.fillText(text, left, base);
