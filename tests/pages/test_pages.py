@@ -16,7 +16,7 @@ from springmass.report.script import script_sha256
 from tests.pages.conftest import WIDTHS
 from tests.sampling import sampled
 
-NAMES = ("analyse", "course", "warned", "compare")
+NAMES = ("analyse", "course", "warned", "compare", "simulate")
 BOTTOM = "(id) => document.querySelector(id).getBoundingClientRect().bottom"
 SHOWN = "(id) => { const box = document.querySelector(id).getBoundingClientRect(); return box.width * box.height > 0; }"
 Show = Callable[[Path, str], None]
