@@ -53,10 +53,9 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
     samples = Series("samples used", t, np.where(used, y, np.nan))
     # A missing distance has no place; its time is marked at the middle of the others.
     middle = float(np.median(y[used])) if used.any() else 0.0
-    flagged = Series(
-        f"left out ({out.size})", t[out], np.where(np.isfinite(y[out]), y[out], middle), "flagged", why=why
-    )
-    series = [samples, *([flagged] if out.size else []), *_marks(notes)]
+    places = np.where(np.isfinite(y[out]), y[out], middle)
+    flagged = [Series(f"left out ({out.size})", t[out], places, "flagged", why=why)] if out.size else []
+    series = [samples, *flagged, *_marks(notes)]
     sigma = pretty(_in_shown(a, a.estimates["noise"]))
     motion = a.motion
     if isinstance(motion, Overdamped):
@@ -96,8 +95,7 @@ def _in_shown(a: Analysis, x: Estimate) -> Estimate:
 
 def _marks(notes: Sequence[Note]) -> list[Series]:
     """Marks of the recording, its trigger and its losses, as vertical lines."""
-    words = {"mark": "mark", "trigger": "trigger", "lost": "lost", "reopened": "reopened"}
-    chosen = [note for note in notes if note.kind in words]
+    chosen = [note for note in notes if note.kind in ("mark", "trigger", "lost", "reopened")]
     texts = [note.text if note.kind == "mark" else note.kind for note in chosen]
     return [mark("marks", [note.t_s for note in chosen], texts)] if chosen else []
 
@@ -162,25 +160,16 @@ def amplitude(a: Analysis, laws: Sequence[str] | None = None) -> Chart | None:
     t, y, u, kept = windows.t, windows.amplitude * factor, damping.scatter.u * factor, damping.scatter.kept
     curves = _law_lines(a, a.motion, laws)
     points = Series("amplitude of one window", t[kept], y[kept], u=u[kept])
-    why = tuple("left out of the fits of the laws: far from its neighbours" for _ in range(np.count_nonzero(~kept)))
+    why = ("left out of the fits of the laws: far from its neighbours",) * int(np.count_nonzero(~kept))
     out = [] if kept.all() else [Series("left out of the fits", t[~kept], y[~kept], "flagged", why=why)]
     low, high = float(np.min((y - u)[kept])), float(np.max((y + u)[kept]))
     margin = 0.1 * max(high - low, 1e-9 * abs(high)) or 1.0
     residual = (y - damping.best.amplitude(t - damping.t0) * factor) / np.where(u > 0.0, u, 1.0)
-    panels = (
-        Panel(
-            value_label("amplitude", a.track.unit),
-            (*curves, points, *out),
-            log=None if low <= 0.0 else False,
-            range=(low - margin, high + margin),
-        ),
-        Panel("residual / u", (Series("residual", t[kept], residual[kept]),), 1.3, zero=True),
-    )
-    caption = (
-        "Amplitude of each window (one period or a few) ± u, with the damping laws; "
-        f"below, residuals of the law {damping.selected}, divided by u."
-    )
-    return Chart("amplitude", "Amplitude and damping laws", caption, panels)
+    ends, log = (low - margin, high + margin), None if low <= 0.0 else False
+    above = Panel(value_label("amplitude", a.track.unit), (*curves, points, *out), log=log, range=ends)
+    below = Panel("residual / u", (Series("residual", t[kept], residual[kept]),), 1.3, zero=True)
+    caption = "Amplitude of each window (one period or a few) ± u, with the damping laws; below, residuals of the law "
+    return Chart("amplitude", "Amplitude and damping laws", f"{caption}{damping.selected} over u.", (above, below))
 
 
 def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> list[Series]:
@@ -194,9 +183,8 @@ def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> 
     lines = []
     for name in (*rest, *sorted(named, key=lambda name: name != damping.selected)):
         words = "exponential, linear drag" if name == EXPONENTIAL else name
-        label = (
-            f"{len(rest)} other laws" if name in rest and len(rest) > 1 else f"{words} ({law_status(damping, name)})"
-        )
+        together = name in rest and len(rest) > 1
+        label = f"{len(rest)} other laws" if together else f"{words} ({law_status(damping, name)})"
         curve = damping.fits[name].amplitude(grid - damping.t0) * SHOWN[a.track.unit].factor
         role: Role = "law" if name == damping.selected else "rest" if name in rest else "other"
         lines.append(line_of(label, grid, curve, role))
@@ -227,17 +215,12 @@ def frequency(a: Analysis) -> Chart | None:
     shift = 1e3 / (2.0 * np.pi)
     changes = phase.backbone is not None
     model = "model: the frequency depends on the amplitude" if changes else "model: one frequency"
-    panel = Panel(
-        f"(frequency − {mean / (2.0 * np.pi):.5g} Hz) / mHz",
-        (
-            line_of(model, grid * factor, shift * (phase.rate(grid) - mean)),
-            Series("a stretch of the run", size * factor, shift * (slope - mean), u=shift * u),
-        ),
-        x_label=value_label("amplitude", a.track.unit),
-    )
-    caption = (
-        f"Frequency of stretches of the run ± u; in the fitted model it {'changes' if changes else 'is constant'}."
-    )
+    law = line_of(model, grid * factor, shift * (phase.rate(grid) - mean))
+    stretches = Series("a stretch of the run", size * factor, shift * (slope - mean), u=shift * u)
+    label = f"(frequency − {mean / (2.0 * np.pi):.5g} Hz) / mHz"
+    panel = Panel(label, (law, stretches), x_label=value_label("amplitude", a.track.unit))
+    found = "changes" if changes else "is constant"
+    caption = f"Frequency of stretches of the run ± u; in the fitted model it {found}."
     return Chart("frequency", "Frequency against amplitude", caption, (panel,))
 
 
@@ -248,17 +231,13 @@ def spectrum(a: Analysis) -> Chart | None:
     f, whole, left = found
     factor, best = SHOWN[a.track.unit].factor, peaks_of(whole)
     floor = float(np.median(left[left > 0])) if (left > 0).any() else float(whole.max()) * 1e-6
-    panel = Panel(
-        value_label("amplitude", a.track.unit),
-        (
-            line_of("residuals of the fit", f, left * factor, "other"),
-            Series("recording", f, whole * factor, line=True),
-            Series("peaks", f[best], whole[best] * factor, "mark", why=tuple(f"{f[i]:.3g} Hz" for i in best)),
-        ),
-        x_label="frequency / Hz",
-        log=True,
-        range=(floor * factor / 20.0, float(whole.max()) * factor * 8.0),
+    lines = (
+        line_of("residuals of the fit", f, left * factor, "other"),
+        Series("recording", f, whole * factor, line=True),
+        Series("peaks", f[best], whole[best] * factor, "mark", why=tuple(f"{f[i]:.3g} Hz" for i in best)),
     )
+    ends = (floor * factor / 20.0, float(whole.max()) * factor * 8.0)
+    panel = Panel(value_label("amplitude", a.track.unit), lines, x_label="frequency / Hz", log=True, range=ends)
     caption = "Amplitude spectra (Hann window). A peak of the residuals is a motion that the fit does not describe."
     return Chart("spectrum", "Spectrum", caption, (panel,))
 
@@ -276,13 +255,9 @@ def drag(a: Analysis) -> Chart | None:
     ends = np.concatenate([curve.y - curve.u, curve.y + curve.u, curve.y_points - curve.u_points])
     low, high = min(0.0, max(float(np.min(ends)), -most)), min(float(np.max(curve.y_points + curve.u_points)), most)
     high = max(high, float(np.max(curve.y + curve.u)))
-    panel = Panel(
-        "effective drag coefficient",
-        _with_band(curve, SHOWN[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}"),
-        3.0,
-        x_label=value_label("amplitude", unit),
-        range=(low, high + 0.08 * (high - low)),
-    )
+    series = _with_band(curve, SHOWN[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}")
+    shown = (low, high + 0.08 * (high - low))
+    panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
     caption = (
         "−dA/dt · 3π m/(2 ω ρ S A²): the coefficient of purely quadratic drag on the disc with the same energy loss, "
         "that of the spring included. Where it depends on the amplitude, a constant does not describe the drag."
@@ -313,21 +288,12 @@ def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     there, moves = law > 0.0, curve.y > 0.0
     off = 100.0 * (curve.y_points[there] / law[there] - 1.0)
     width = 100.0 * curve.u[moves] / curve.y[moves]
-    above = Panel(
-        "energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)",
-        (*_with_band(curve, 1.0, 1e3, "from single amplitudes", f"law {motion.damping.selected}"), *parts),
-        2.6,
-        log=low < high / 20.0 if low > 0.0 else None,
-    )
-    below = Panel(
-        "deviation / %",
-        (
-            band_of("± u of the law", curve.x[moves], np.zeros(width.size), width),
-            Series("deviation", curve.x_points[there], off, u=100.0 * curve.u_points[there] / law[there]),
-        ),
-        1.3,
-        zero=True,
-    )
+    label = "energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)"
+    series = _with_band(curve, 1.0, 1e3, "from single amplitudes", f"law {motion.damping.selected}")
+    above = Panel(label, (*series, *parts), 2.6, log=low < high / 20.0 if low > 0.0 else None)
+    band = band_of("± u of the law", curve.x[moves], np.zeros(width.size), width)
+    points = Series("deviation", curve.x_points[there], off, u=100.0 * curve.u_points[there] / law[there])
+    below = Panel("deviation / %", (band, points), 1.3, zero=True)
     mass = motion.derived.effective_mass_kg
     of = f"the mass that oscillates, {pretty(mass)}" if mass is not None else "one kilogram, as no mass was given"
     caption = f"Energy m ω² A²/2 of {of}; below, the deviation of single amplitudes from the law."
@@ -372,20 +338,13 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     band = rows.size // 400 + 1  # u changes slowly
     first = [line_of(names[0], t, velocity)]
     if a.track.velocity is not None:
-        measured = np.where(_used(a), a.track.velocity, np.nan)[rows]
-        first.append(Series("as recorded", t, measured))
+        first.append(Series("as recorded", t, np.where(_used(a), a.track.velocity, np.nan)[rows]))
+    around = band_of(f"± u of the {names[0]}", t[::band], np.zeros(t[::band].size), k * u[::band])
+    label = "v − law / (mm/s)" if unit == "m" else rate_label("deviation", 1, unit)
     panels = (
         Panel(rate_label(names[0], 1, unit), tuple(first)),
         Panel(rate_label(names[1], 2, unit), (line_of(names[1], t, smoothed.acceleration[rows]),), 1.6),
-        Panel(
-            "v − law / (mm/s)" if unit == "m" else rate_label("deviation", 1, unit),
-            (
-                band_of(f"± u of the {names[0]}", t[::band], np.zeros(t[::band].size), k * u[::band]),
-                line_of(f"{names[0]} − law", t, off),
-            ),
-            1.3,
-            zero=True,
-        ),
+        Panel(label, (around, line_of(f"{names[0]} − law", t, off)), 1.3, zero=True),
     )
     caption = (
         f"{names[0].capitalize()} and {names[1]} from all samples, not by differences of neighbours; below, the "
@@ -420,17 +379,13 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
         turns.append(np.full((1, 2), np.nan))  # lifts the pen
     line = np.concatenate(turns)
     fastest = 1.1 * float(np.nanmax(np.abs(line[:, 1])))
-    panel = Panel(
-        rate_label("velocity" if unit == "m" else "derivative", 1, unit),
-        (
-            Series(words, displacement[seen] * factor, velocity[seen], "rest"),
-            line_of("fitted motion", line[:, 0] * factor, line[:, 1]),
-        ),
-        4.4,
-        x_label=value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit),
-        equal=True,
-        range=(-fastest, fastest),
+    series = (
+        Series(words, displacement[seen] * factor, velocity[seen], "rest"),
+        line_of("fitted motion", line[:, 0] * factor, line[:, 1]),
     )
+    label = rate_label("velocity" if unit == "m" else "derivative", 1, unit)
+    x_label = value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit)
+    panel = Panel(label, series, 4.4, x_label, equal=True, range=(-fastest, fastest))
     caption = "Velocity against displacement from rest." + (f" One turn in {step} is drawn." if step > 1 else "")
     return Chart("phase", "Phase plot", caption, (panel,))
 
@@ -443,31 +398,22 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     factor, period = SHOWN[a.track.unit].factor, classic.estimates["period"].value
     start, end = (float(classic.crests_t[i]) + s * 0.75 * period for i, s in ((0, -1), (-1, 1)))
     near = np.flatnonzero(_used(a) & (a.track.t >= start) & (a.track.t <= end))
-    ends = np.array([0, CYCLES])
+    chosen = np.array([0, CYCLES])
     picked = f"picked maxima, {CYCLES} periods apart"
-    t, y = classic.crests_t[ends], classic.crests_y[ends] * factor
+    t, y = classic.crests_t[chosen], classic.crests_y[chosen] * factor
     extremes = [factor * each for _, each in classic.extremes]
     span = np.array([a.track.t[near[0]], a.track.t[near[-1]]])
-    above = Panel(
-        value_label("position", a.track.unit),
-        (
-            Series("samples used", a.track.t[near], a.track.y[near] * factor),
-            Series(picked, t, y, "mark", why=("", "")),
-            *(line_of("extremes of the whole recording", span, np.full(2, x), "other") for x in extremes),
-        ),
-        x_label="time of the picked maxima / s",
+    picks = (
+        Series("samples used", a.track.t[near], a.track.y[near] * factor),
+        Series(picked, t, y, "mark", why=("", "")),
+        *(line_of("extremes of the whole recording", span, np.full(2, x), "other") for x in extremes),
     )
-    windows = factor * classic.window_amplitude
-    curve = factor * classic.exponential()
-    below = Panel(
-        own.panels[0].label,
-        (
-            *own.panels[0].series,
-            line_of("half the range in 1.5 s", classic.window_t, windows, "rest"),
-            line_of("its exponential", classic.window_t, curve, "other"),
-        ),
-        range=(min(float(np.min(windows)), float(np.min(curve))), 1.05 * float(max(np.max(windows), np.max(curve)))),
-    )
+    above = Panel(value_label("position", a.track.unit), picks, x_label="time of the picked maxima / s")
+    sliding = line_of("half the range in 1.5 s", classic.window_t, factor * classic.window_amplitude, "rest")
+    fitted = line_of("its exponential", classic.window_t, factor * classic.exponential(), "other")
+    both = np.concatenate([sliding.y, fitted.y])
+    ends = (float(np.min(both)), 1.05 * float(np.max(both)))
+    below = Panel(own.panels[0].label, (*own.panels[0].series, sliding, fitted), range=ends)
     caption = (
         "The lab report's method on this recording, for comparison only. Above, its maxima and extremes; below, half "
         "the range within 1.5 s of every sample and its exponential, with the amplitudes and the law of this analysis."
