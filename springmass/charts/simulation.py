@@ -30,21 +30,15 @@ def simulation(found: Simulation, mass_kg: float | None) -> tuple[Chart, ...]:
     of_velocity = _both(runs, "v / (m/s)", lambda of, n: (of.t[:n], of.v[:n]))
     label = "E / mJ" if mass_kg is not None else "E per mass / (mJ/kg)"
     of_energy = _both(runs, label, lambda of, n: _energy(of, n, mass_kg), log=True)
-    of_phase = _both(
-        runs,
-        "v / (m/s)",
-        lambda of, n: (of.y[: min(n, turns)] * 1e3, of.v[: min(n, turns)]),
-        x_label="displacement y / mm",
-        equal=True,
-    )
+    shown = slice(0, turns)
+    of_phase = _both(runs, "v / (m/s)", lambda of, n: (of.y[:n][shown] * 1e3, of.v[:n][shown]), equal=True)
+    beside = "Each method beside the exact motion."
     return (
-        Chart("position", "Position", "Each method beside the exact motion.", of_position, end),
-        Chart("velocity", "Velocity", "Each method beside the exact motion.", of_velocity, end),
-        Chart("energy", "Energy", "Each method beside the exact motion.", of_energy),
+        Chart("position", "Position", beside, of_position, end),
+        Chart("velocity", "Velocity", beside, of_velocity, end),
+        Chart("energy", "Energy", beside, of_energy),
         Chart("phase", "Phase plot", f"The first {TURNS} turns of each method.", of_phase),
-        Chart(
-            "error", "Error of each method", "Largest difference so far from the exact motion.", (_error(found, runs),)
-        ),
+        Chart("error", "Error of each method", "Largest difference so far from the exact motion.", _error(found, runs)),
     )
 
 
@@ -53,7 +47,6 @@ def _both(
     label: str,
     values: Callable[[Trajectory, int], tuple[F8, F8]],
     *,
-    x_label: str = "time / s",
     log: bool | None = None,
     equal: bool = False,
 ) -> tuple[Panel, ...]:
@@ -64,8 +57,8 @@ def _both(
         beside_x, beside_y = values(runs.exact, len(run.y))
         series = (Series(words, x, y, line=True), line_of(runs.words, beside_x, beside_y))
         grows = log and float(np.min(y)) > 0.0 and float(np.max(y)) > 20.0 * float(np.max(beside_y))
-        name, height = f"{words}: {label}", 3.6 if equal else 2.4
-        panels.append(Panel(name, series, height, x_label, log=log and bool(grows), equal=equal))
+        height, x_label = (3.6, "displacement y / mm") if equal else (2.4, "time / s")
+        panels.append(Panel(f"{words}: {label}", series, height, x_label, log=log and bool(grows), equal=equal))
     return tuple(panels)
 
 
@@ -79,7 +72,7 @@ def _energy(of: Trajectory, count: int, mass_kg: float | None) -> tuple[F8, F8]:
     return of.t[rows], 0.5e3 * (1.0 if mass_kg is None else mass_kg) * start * start * relative[rows]
 
 
-def _error(found: Simulation, runs: Eulers) -> Panel:
+def _error(found: Simulation, runs: Eulers) -> tuple[Panel, ...]:
     """Return running maxima of the errors, because an error crosses zero twice per period."""
     start = found.problem.amplitude_m() or 1.0
     curves = [(run, words) for run, (_, words) in zip(runs.eulers, EULERS, strict=True)]
@@ -95,28 +88,19 @@ def _error(found: Simulation, runs: Eulers) -> Panel:
     if predicted is not None and 0.0 < predicted < GROWN:
         ends = runs.exact.t[[0, -1]]
         series.append(line_of("predicted", ends, np.full(2, predicted)))
-    return Panel("largest error so far / amplitude", tuple(series), 3.0, log=True)
+    return (Panel("largest error so far / amplitude", tuple(series), 3.0, log=True),)
 
 
 def against(found: Against) -> Chart:
     """A measured run with its prediction and the band from the uncertain inputs, and the residuals."""
     bands = [] if found.band is None else _bands(found.t, found.band, 1e3)
     over = [] if found.band is None else _bands(found.t, found.band + found.predicted, 1e3)
+    predicted = line_of("predicted", found.t, found.predicted * 1e3)
+    measured = Series("measured", found.t, found.measured * 1e3)
+    residual = Series("residual", found.t, (found.measured - found.predicted) * 1e3)
     panels = (
-        Panel(
-            "distance / mm",
-            (
-                *over,
-                line_of("predicted", found.t, found.predicted * 1e3),
-                Series("measured", found.t, found.measured * 1e3),
-            ),
-        ),
-        Panel(
-            "residual / mm",
-            (*bands, Series("residual", found.t, (found.measured - found.predicted) * 1e3)),
-            1.6,
-            zero=True,
-        ),
+        Panel("distance / mm", (*over, predicted, measured)),
+        Panel("residual / mm", (*bands, residual), 1.6, zero=True),
     )
     return Chart("against", "Measured and predicted", "The measured run over the prediction of its scene.", panels)
 
@@ -130,22 +114,12 @@ def band(found: Simulation, spread: Band) -> Chart:
     whole = spread.t[spread.t <= end]
     amplitude, of_amplitude = spread.amplitude_at(whole)
     middle = found.trajectory.at(last)
-    law = "the scene's values"
+    law, late = "the scene's values", "time in the last periods / s"
+    motion = (*_bands(last, middle + spread.displacement_at(last), 1e3), line_of(law, last, middle * 1e3))
+    size = (*_bands(whole, of_amplitude, 1e3), line_of(law, whole, amplitude * 1e3))
     panels = (
-        Panel(
-            "displacement / mm",
-            (
-                *_bands(last, middle + spread.displacement_at(last), 1e3),
-                line_of(law, last, middle * 1e3),
-            ),
-            2.0,
-            "time in the last periods / s",
-        ),
-        Panel(
-            "amplitude / mm",
-            (*_bands(whole, of_amplitude, 1e3), line_of(law, whole, amplitude * 1e3)),
-            1.6,
-        ),
+        Panel("displacement / mm", motion, 2.0, late),
+        Panel("amplitude / mm", size, 1.6),
         Panel("phase / rad", tuple(_bands(whole, spread.phase_at(whole), 1.0)), 1.6),
         Panel("band / mm", tuple(_bands(whole, spread.displacement_at(whole), 1e3)), 1.6),
     )

@@ -15,18 +15,12 @@ _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
 class Harm(enum.IntEnum):
     """What a finding does to the results, the worst first."""
 
-    UNUSABLE = 0
-    """A result must not be used."""
-    SCALE = 1
-    """If an assumption is wrong, every value is wrong by a factor."""
-    PART = 2
-    """Only part of the recording, or no damping law, could be used."""
-    UNCERTAINTY = 3
-    """The values are valid, and their uncertainties were increased."""
-    IMPROVABLE = 4
-    """The values are valid; a better recording or scene would reduce their uncertainties."""
-    NOTE = 5
-    """No action is needed."""
+    UNUSABLE = 0  # a result must not be used
+    SCALE = 1  # if an assumption is wrong, every value is wrong by a factor
+    PART = 2  # only part of the recording, or no damping law, could be used
+    UNCERTAINTY = 3  # the values are valid, and their uncertainties were increased
+    IMPROVABLE = 4  # the values are valid; a better recording or scene would reduce their uncertainties
+    NOTE = 5  # no action is needed
 
 
 _CONSEQUENCES = {
