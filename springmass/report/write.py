@@ -130,9 +130,8 @@ def _write_lab_report(folder: Path, run: Analysed) -> None:
     """Write the document to complete, with the figures for a lab report."""
     charts = charts_of(run.analysis)
     captions = {name: charts[name].caption for name in OF_LAB_REPORT if name in charts}
-    figures = {name: f"figures/{name}" for name in captions}
     text = [text for title, text in sentences(run.analysis) if title != "What to do"]
-    write_whole(folder / LAB_REPORT, lab_report_tex(run, figures, captions, text))
+    write_whole(folder / LAB_REPORT, lab_report_tex(run, captions, text))
 
 
 def _stems(names: Sequence[str]) -> list[str]:
