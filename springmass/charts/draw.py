@@ -22,6 +22,7 @@ from storage.atomic import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 Kind = Literal["svg", "pdf", "png"]
@@ -149,11 +150,13 @@ def draw(panel: Panel, ax: Axes) -> Axes:
         label = "_" if series.label in named else series.label.replace("$", r"\$")
         named.add(series.label)
         _draw(ax, series, label, numbers.get(series.label, 0), (low, high), 1.5 + 0.01 * i)
+    if panel.log:
+        low = low if low > 0.0 else high * 1e-6
+        ax.set_yscale("log")
+        _logarithmic(ax.yaxis, high / low)
     if panel.log_x:
         ax.set_xscale("log")
-    if panel.log:
-        ax.set_yscale("log")
-        low = low if low > 0.0 else high * 1e-6
+        _logarithmic(ax.xaxis, ax.get_xlim()[1] / max(ax.get_xlim()[0], 1e-9))
     if panel.zero:
         ax.axhline(0.0, color="#000000", lw=0.8, zorder=1.4)
     ax.set_ylim(low, high)
@@ -162,6 +165,15 @@ def draw(panel: Panel, ax: Axes) -> Axes:
         ax.tick_params(axis="x", labelrotation=20 if sum(map(len, panel.names)) > 60 else 0)
     ax.set(xlabel=panel.x_label, ylabel=panel.label)
     return ax
+
+
+def _logarithmic(axis: Axis, ratio: float) -> None:
+    """Write plain numbers at powers of ten of a logarithmic axis, and at 2 and 5 if it spans less than two."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio < 100.0 else (1.0,)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _draw(ax: Axes, s: Series, label: str, number: int, ends: tuple[float, float], above: float) -> None:
