@@ -120,7 +120,7 @@ _TEX_MATH = {
     **dict(zip("±−×·≤≥≈∞", (r"\pm", "-", r"\times", r"\cdot", r"\leq", r"\geq", r"\approx", r"\infty"), strict=True)),
     "χ²": r"\chi^2",
     "φ": r"\varphi",
-    "λ": r"\lambda",  # LAMDA in Unicode
+    "λ": r"\lambda",  # Unicode spells its name without the b
     **{letter: "\\" + unicodedata.name(letter).split()[-1].lower() for letter in "αβγδζηθκμνπρστψω"},
     **{letter: "\\" + unicodedata.name(letter).split()[-1].capitalize() for letter in "ΔΩ"},
     **{lowered: f"_{digit}" for digit, lowered in enumerate("₀₁₂₃₄₅₆₇₈₉")},

@@ -10,8 +10,8 @@ from pipeline.numerics.quantity import noun
 from pipeline.registry.quantities import INPUTS
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.budgets import BudgetRow, budgets_of
-from springmass.report.tables import prefixed
-from springmass.report.words import damping_sentence, is_about, kept, listed, typeset
+from springmass.report.tables import is_about, prefixed
+from springmass.report.words import damping_sentence, kept, listed, typeset
 
 _TRUST = {
     Harm.UNUSABLE: "Do not use the results that this spoils: “{message}”",

@@ -14,6 +14,7 @@ from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping
+from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
 from pipeline.registry.quantities import QUANTITIES
 
@@ -67,13 +68,14 @@ class TableRow:
 def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     """Return the contents of Table 1 for a run: estimates and coefficients, each with its law."""
     found = _shown_estimates(analysis)
-    if any(finding.code in _WITHOUT_OFFSET for finding in analysis.findings):
+    if is_about(analysis, "offset"):
         found.pop(TableKey("offset"), None)
     return found
 
 
-_WITHOUT_OFFSET = frozenset({"offset_unknown", "offset_unknown_after_gap"})
-"""Codes of findings that the rest position is not that of the bob."""
+def is_about(analysis: Analysis, subject: str) -> bool:
+    """Return whether a finding is about a subject of ``about`` in findings.toml."""
+    return any(subject in kinds()[finding.code].about for finding in analysis.findings)
 
 
 def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:

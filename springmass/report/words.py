@@ -7,10 +7,9 @@ from collections.abc import Sequence
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.laws import words_of
-from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from springmass.report.budgets import budgets_of
-from springmass.report.tables import page_unit, pretty, pretty_number, raised
+from springmass.report.tables import is_about, page_unit, pretty, pretty_number, raised
 
 LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
 
@@ -60,11 +59,6 @@ def typeset(message: str) -> str:
     for pattern, by in _SUBSTITUTES:
         message = pattern.sub(by, message)
     return message
-
-
-def is_about(analysis: Analysis, subject: str) -> bool:
-    """Return whether a finding is about a subject of ``about`` in findings.toml."""
-    return any(subject in kinds()[finding.code].about for finding in analysis.findings)
 
 
 def method(analysis: Analysis) -> tuple[str, ...]:
