@@ -162,7 +162,8 @@ def amplitude(a: Analysis, laws: Sequence[str] | None = None) -> Chart | None:
     points = Series("amplitude of one window", t[kept], y[kept], u=u[kept])
     why = ("left out of the fits of the laws: far from its neighbours",) * int(np.count_nonzero(~kept))
     out = [] if kept.all() else [Series("left out of the fits", t[~kept], y[~kept], "flagged", why=why)]
-    low, high = float(np.min((y - u)[kept])), float(np.max((y + u)[kept]))
+    shown = kept if kept.any() else ~kept
+    low, high = float(np.min((y - u)[shown])), float(np.max((y + u)[shown]))
     margin = 0.1 * max(high - low, 1e-9 * abs(high)) or 1.0
     residual = (y - damping.best.amplitude(t - damping.t0) * factor) / np.where(u > 0.0, u, 1.0)
     ends, log = (low - margin, high + margin), None if low <= 0.0 else False
@@ -253,7 +254,8 @@ def drag(a: Analysis) -> Chart | None:
     # The long error bar of a stretch with hardly any damping would compress everything else.
     most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
     ends = np.concatenate([curve.y - curve.u, curve.y + curve.u, curve.y_points - curve.u_points])
-    low, high = min(0.0, max(float(np.min(ends)), -most)), min(float(np.max(curve.y_points + curve.u_points)), most)
+    tops = curve.y_points + curve.u_points
+    low, high = min(0.0, max(float(np.min(ends)), -most)), min(float(np.max(tops, initial=0.0)), most)
     high = max(high, float(np.max(curve.y + curve.u)))
     series = _with_band(curve, SHOWN[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}")
     shown = (low, high + 0.08 * (high - low))
@@ -282,7 +284,7 @@ def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     if curve is None:
         return None
     parts = _energy_means(motion, smoothed or _smoothed(a)) if a.track.unit == "m" else ()
-    low, high = float(np.min(curve.y - curve.u)), float(np.max(curve.y_points))
+    low, high = float(np.min(curve.y - curve.u)), float(np.max(curve.y))
     law = np.interp(curve.x_points, curve.x, curve.y)
     # Where friction has stopped the motion, the law predicts no energy for comparison.
     there, moves = law > 0.0, curve.y > 0.0
@@ -330,7 +332,7 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
         return None
     rows = np.flatnonzero(np.isfinite(smoothed.position))
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
-    rows = rows[:: max(1, int(a.track.rate_hz / a.motion.cycles.frequency_hz / PER_PERIOD))]
+    rows = rows[:: max(1, round(a.track.rate_hz / a.motion.cycles.frequency_hz / PER_PERIOD))]
     t, velocity, u = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
     names = ("velocity", "acceleration") if unit == "m" else ("derivative", "2nd derivative")
     k = SHOWN[unit].factor
@@ -398,6 +400,8 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     factor, period = SHOWN[a.track.unit].factor, classic.estimates["period"].value
     start, end = (float(classic.crests_t[i]) + s * 0.75 * period for i, s in ((0, -1), (-1, 1)))
     near = np.flatnonzero(_used(a) & (a.track.t >= start) & (a.track.t <= end))
+    if not near.size:
+        return None
     chosen = np.array([0, CYCLES])
     picked = f"picked maxima, {CYCLES} periods apart"
     t, y = classic.crests_t[chosen], classic.crests_y[chosen] * factor
