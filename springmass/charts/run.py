@@ -38,6 +38,7 @@ PER_PERIOD = 26  # points of a drawn period: a polygon that looks round
 MOST_PERIODS = 460  # of more periods the envelope is drawn, which a screen cannot tell from the motion
 MOST_STRETCHES, LEAST_WINDOWS = 24, 6
 LEAST_TURNS, MOST_TURNS = 4, 24
+MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 MOST_MEANS = 120  # of kinetic and potential energy; of more periods, one mean covers several
 
 
@@ -413,8 +414,10 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
         *(line_of("extremes of the whole recording", span, np.full(2, x), "other") for x in extremes),
     )
     above = Panel(value_label("position", a.track.unit), picks, x_label="time of the picked maxima / s")
-    sliding = line_of("half the range in 1.5 s", classic.window_t, factor * classic.window_amplitude, "rest")
-    fitted = line_of("its exponential", classic.window_t, factor * classic.exponential(), "other")
+    every = slice(None, None, classic.window_t.size // MOST_SLIDING + 1)
+    times, amplitudes = classic.window_t[every], factor * classic.window_amplitude[every]
+    sliding = line_of("half the range in 1.5 s", times, amplitudes, "rest")
+    fitted = line_of("its exponential", times, factor * classic.exponential()[every], "other")
     both = np.concatenate([sliding.y, fitted.y])
     ends = (float(np.min(both)), 1.05 * float(np.max(both)))
     below = Panel(own.panels[0].label, (*own.panels[0].series, sliding, fitted), range=ends)
