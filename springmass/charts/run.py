@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from pipeline.analyse import Analysis, Oscillation, Overdamped
 from pipeline.errors import AnalysisError
-from pipeline.motion.smoother import Smoothed
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve
+from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
 from springmass.charts.chart import Chart, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
 from springmass.charts.spectrum import peaks_of, spectrum_of
@@ -350,7 +350,7 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
         Panel(label, (around, line_of(f"{names[0]} − law", t, off)), 1.3, zero=True),
     )
     caption = (
-        f"{names[0].capitalize()} and {names[1]} from all samples, not by differences of neighbours; below, the "
+        f"{names[0].capitalize()} and {names[1]} from the fit, not by differences of neighbours; below, the "
         f"difference from the fitted law, with ±u. motion.csv holds them with their uncertainties at every sample."
     )
     end = float(t[0]) + DETAIL_PERIODS / a.motion.cycles.frequency_hz
@@ -372,7 +372,7 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     smoothed = smoothed or _smoothed(a)
     moving = track.velocity if recorded else np.nan if smoothed is None else smoothed.velocity
     velocity = np.where(_used(a), np.asarray(moving, np.float64), np.nan)
-    words = "samples, velocity as recorded" if recorded else "samples, velocity from the motion around them"
+    words = "samples, velocity as recorded" if recorded else "samples, velocity by the fit"
     displacement, turn = track.y - motion.rest.at(track.t), np.floor((track.t - first) / period)
     seen = np.flatnonzero(np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, step) == 0))
     turns = []
