@@ -136,6 +136,8 @@ class Family:
         Options of the decoder (column, unit, ...): their names, each with a description of one line.
     past_options : tuple of str
         Options that only logs of earlier versions have; the decoder still takes them.
+    past_defaults : mapping
+        Values of options that logs of earlier versions do not state; logs of this version state theirs.
     has_device_time : bool
         Whether readings contain a clock time or a counter of the device.
     clock_ppm : float
@@ -161,6 +163,7 @@ class Family:
     poll: Poll | None = None
     options: Mapping[str, str] = field(default_factory=dict)
     past_options: tuple[str, ...] = ()
+    past_defaults: Mapping[str, Any] = field(default_factory=dict)
     has_device_time: bool = False
     clock_ppm: float = RESONATOR_PPM
     identify: bytes = b""
@@ -182,6 +185,6 @@ class Family:
 
     def describe(self) -> dict[str, Any]:
         """Return the description as plain data, for the JSON list of the sensors."""
-        hidden = ("decoder", "encoder", "poll", "identify", "past_options")
+        hidden = ("decoder", "encoder", "poll", "identify", "past_options", "past_defaults")
         shown = (item.name for item in fields(self) if item.name not in hidden)
         return {name: getattr(self, name) for name in shown} | {"polled": self.poll is not None}

@@ -14,7 +14,10 @@ from acquisition.errors import SensorError
 from acquisition.extensions import entry_points_of, load_entry
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from importlib.metadata import EntryPoint
+
+    from acquisition.decoders.text_lines import TextLinesDecoder
 
 GROUP = "springmass.sensors"
 
@@ -69,18 +72,19 @@ def probe(data: bytes) -> list[str]:
     ]
 
 
-def describe_bytes(data: bytes) -> str:
-    """Return a one-line description of bytes from a port, for the user."""
+def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> str:
+    """Return a one-line description of bytes from a port, for the user.
+
+    ``unread`` are the options with which ``text-lines`` found no distance in the bytes.
+    """
     if not data:
         return "silence"
-    if names := probe(data):
+    if names := [name for name in probe(data) if unread is None or name != "text-lines"]:
         return "looks like " + " or ".join(f"{get_family(name).title} [{name}]" for name in names)
     if len(set(data)) == 1:
         return f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?"
     if b"\n" in data and sum(byte in b"\t\r\n" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data):
-        lines = data.decode("ascii", "replace").splitlines()
-        sample = next((line.strip()[:40] for line in lines if line.strip()), "")
-        return f"looks like text lines without a distance ({sample!r})"
+        return cast("TextLinesDecoder", get_family("text-lines").decoder(**(unread or {}))).unread(data)
     return "looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?"
 
 

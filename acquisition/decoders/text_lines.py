@@ -1,137 +1,239 @@
-r"""Text lines from a microcontroller's sketch, with the reading as a number in a column or after a name.
+r"""Text lines from a microcontroller's sketch: the distance has a name or a unit, is alone, or its column is stated.
 
-Examples are ``12.34``, ``512;12.34`` and ``t=512 d=12.34 cm``. Options state the column, the unit and the separator,
-because the lines do not. The port may be opened in the middle of a line, and the last digits of a number look like a
-complete number. So the first line is dropped and counted as ``partial_line``. A line without the expected number is
+Examples are ``12.34``, ``Distance: 26.9 cm``, ``(19.124,)``, ``t=512 d=12,34`` and, with ``column=1``, ``512;12.34``;
+see :mod:`acquisition.line_numbers`. The port may be opened in the middle of a line, and the last digits of a number
+look like a complete number. So the first line is dropped and counted as ``partial_line``. A line without a distance is
 counted as ``bad_frame``.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
 
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import DeviceStatus, Family
 from acquisition.decoders.framed import FramedDecoder
 from acquisition.decoders.lines import LineSplitter
 from acquisition.errors import SensorError
+from acquisition.line_numbers import LENGTHS_M, TIMES_US, Number, find_distance, has_decimal_comma, numbers
 from acquisition.readings import NAN, Reading
 
 LONGEST = 256  # maximum length of a line, bytes
 
-LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}
 SEPARATORS = {"tab": "\t", "space": " ", "comma": ",", "semicolon": ";", None: "", "any": ""}
 
 _FARTHEST_M = 20.0  # no rangefinder in air receives an echo from this distance
 _LATEST_US = 38_000.0  # an HC-SR04 reports this value if there was no echo
-
-# float() alone would also accept "nan", "inf" and "1_0".
-_NUMBER = rb"[+-]?(?:[0-9]{1,15}(?:\.[0-9]{0,12})?|\.[0-9]{1,12})(?:[eE][+-]?[0-9]{1,2})?"
+_ECHO_M_PER_US = 172e-6
+_COUNTS, _EVEN = 50, 0.02  # so many steps in a row of a lone number, equal to this share, are those of a counter
 _NAME = re.compile(r"[A-Za-z_][\w .-]{0,31}", re.ASCII)
-_ANY = re.compile(rb"[\s,;]+")
+_NO_TARGET = re.compile(
+    r"out of range|fuera de|fora d[eo]|au(?:ß|ss)er|hors de|no (?:echo|target)|kein (?:echo|ziel)|timed? ?out",
+    re.IGNORECASE,
+)
 
-Finder = Callable[[bytes, list[bytes]], float | None]
-"""Finds a number in a line, which is given whole and as its cells."""
+Found = tuple[str, list[Number], list[tuple[int, int]]]
+"""A line, its numbers, and where its cells begin and end."""
 
 
 class TextLinesDecoder(FramedDecoder):
     """Decodes text lines; the arguments are the options of the family.
 
     There is no checksum. A number in a completely received line gives a reading, so a flipped bit that changes a digit
-    to another digit cannot be detected. Zero, negative numbers, echo times of 38 ms or more and distances of 20 m or
-    more are missing samples.
+    to another digit cannot be detected. Zero, negative numbers, echo times of 38 ms or more, distances of 20 m or more
+    and lines such as ``out of range`` are missing samples. A lone number that counts evenly is a clock or a counter.
+
+    ``resolution_m`` is the step of the last digit of the distances so far, m; None before the first.
     """
 
     def __init__(
         self,
-        column: int | str = 0,
-        unit: str = "cm",
+        column: int | str = "auto",
+        unit: str | None = None,
         separator: str | None = None,
         sequence: int | str | None = None,
         time: int | str | None = None,
-        time_unit: str = "us",
+        time_unit: str | None = None,
         temperature: int | str | None = None,
     ) -> None:
         faults = {"garbage_bytes": 0, "bad_frame": 0, "partial_line": 0, "blank_line": 0}
         super().__init__(LineSplitter(b"\n", LONGEST, faults, skip_first=True))
+        _demand("unit", unit, {**LENGTHS_M, "us": 1.0})
+        _demand("time_unit", time_unit, TIMES_US)
+        self._unit, self._time_unit = unit or "", time_unit
         self._separator = _separator(separator)
-        self._is_echo = unit == "us"
-        self._scale = 1.0 if self._is_echo else _factor("unit", unit, LENGTHS_M, "us")
-        self._time_us = _factor("time_unit", time_unit, TIMES_US)
-        self._value = _finder("column", column, unit)
-        self._sequence = None if sequence is None else _finder("sequence", sequence)
-        self._time = None if time is None else _finder("time", time, time_unit)
-        self._temperature = None if temperature is None else _finder("temperature", temperature, "C")
+        self._column = None if column == "auto" else _place("column", column)
+        self._sequence, self._time, self._temperature = (
+            None if where is None else _place(option, where)
+            for option, where in (("sequence", sequence), ("time", time), ("temperature", temperature))
+        )
+        self.status = DeviceStatus()
+        self.resolution_m: float | None = None
+        self._last = self._step = 0.0
+        self._steps = 0
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
         """Return the reading of a line, or None; count the fault of a line without a reading."""
-        text = frame.strip(b"\r ")
+        text = _text(frame)
         if not text:
-            self._count("blank_line", 0)
+            noise = bool(frame.strip(b"\r "))
+            self._count("bad_frame" if noise else "blank_line", len(frame) + 1 if noise else 0)
             return None
-        cells = text.split(self._separator) if self._separator else _ANY.split(text)
-        value = self._value(text, cells)
-        sequence = _whole(self._sequence, text, cells, 1.0)
-        device_us = _whole(self._time, text, cells, self._time_us)
-        if value is None or sequence is None or device_us is None:
+        line = self._found(text)
+        silent = self._column is None and _NO_TARGET.search(text) is not None
+        number = None if silent else self._distance(line)
+        sequence = _whole(self._sequence, line, 1.0)
+        device_us = _whole(self._time, line, None if self._time_unit is None else TIMES_US[self._time_unit])
+        if sequence is None or device_us is None or (number is None and not silent):
             self._count("bad_frame", len(frame) + 1)
             return None
-        celsius = None if self._temperature is None else self._temperature(text, cells)
-        scaled = value * self._scale
-        measured = scaled if 0 < scaled < (_LATEST_US if self._is_echo else _FARTHEST_M) else NAN
-        echo_us, distance_m = (measured, NAN) if self._is_echo else (NAN, measured)
-        return Reading(host_ns, sequence, device_us, echo_us, distance_m, NAN if celsius is None else celsius)
+        celsius = None if self._temperature is None else _at(self._temperature, line)
+        warm = celsius.value if celsius is not None and celsius.unit in ("C", "") else NAN
+        echo_us = distance_m = NAN
+        if number is not None and not self._is_counter(number):
+            unit = number.unit or self._unit or "cm"
+            scale = 1.0 if unit == "us" else LENGTHS_M[unit]
+            scaled = number.value * scale
+            measured = scaled if 0 < scaled < (_LATEST_US if unit == "us" else _FARTHEST_M) else NAN
+            echo_us, distance_m = (measured, NAN) if unit == "us" else (NAN, measured)
+            if measured == measured:
+                step_m = number.step * (_ECHO_M_PER_US if unit == "us" else scale)
+                self.resolution_m = min(step_m, self.resolution_m or step_m)
+        return Reading(host_ns, sequence, device_us, echo_us, distance_m, warm)
+
+    def unread(self, data: bytes) -> str:
+        """Return what the lines look like that gave no reading, and which option would read them."""
+        lines = [line.strip() for line in data.decode("utf-8", "replace").splitlines()[1:]]
+        lines = [line for line in lines if line]
+        found = [line for line in map(self._found, lines) if not all(number.is_other for number in line[1])]
+        if not found:
+            return f"looks like text lines without a distance ({(lines or [''])[0][:40]!r})"
+        text, known, cells = found[-1]
+        quoted = f"looks like text lines with numbers ({text[:40]!r})"
+        if self._column is not None and _at(self._column, found[-1]) is None:
+            listed = ", ".join(f"{_cell(each, cells)} is {each.value:g}" for each in known[:8])
+            return f"{quoted}, none at column {self._column}: of the columns, counted from 0, {listed}"
+        units = {number.unit for number in known if number.unit in LENGTHS_M}
+        if units and self._unit and self._unit not in units:
+            return (
+                f"{quoted}, whose unit is {' and '.join(sorted(units))} and not {self._unit}; leave out --option unit"
+            )
+        if has_decimal_comma(text, self._separator) is None:
+            return (
+                f"{quoted}: add --option separator=space if the comma is a decimal comma, "
+                "or --option separator=comma --option column=1 if it separates the distance"
+            )
+        even = {cell for cell in (_cell(each, cells) for each in known) if _counts(cell, found)}
+        likely = [each for each in known if not each.is_other and _cell(each, cells) not in even] or known
+        time = f", --option time={min(even)} --option time_unit=ms for the one that counts evenly" if even else ""
+        example = f"--option column={_cell(likely[0], cells)}" + ("" if likely[0].unit else " --option unit=cm")
+        return f"{quoted}: state the column of the distance, counted from 0, and its unit: for example {example}{time}"
+
+    def _found(self, text: str) -> Found:
+        comma = has_decimal_comma(text, self._separator)
+        separator = re.escape(self._separator) if self._separator else r"[\s;]+" if comma else r"[\s,;]+"
+        ends = [match.span() for match in re.finditer(separator, text)]
+        cells = list(zip([0, *(end for _, end in ends)], [*(start for start, _ in ends), len(text)], strict=True))
+        return text, numbers(text, decimal_comma=bool(comma), colon_separates=self._separator == ":"), cells
+
+    def _distance(self, line: Found) -> Number | None:
+        text, known, _ = line
+        if self._column is not None:
+            number = _at(self._column, line)
+            allowed = ("", self._unit) if self._unit else ("", *LENGTHS_M, "us")
+            return number if number is not None and number.unit in allowed else None
+        if has_decimal_comma(text, self._separator) is None:
+            return None
+        others = [_at(where, line) for where in (self._sequence, self._time, self._temperature) if where is not None]
+        return find_distance(text, [number for number in known if number not in others], self._unit)
+
+    def _is_counter(self, number: Number) -> bool:
+        """Return whether a number without a name and a unit has counted evenly for a while."""
+        if self._column is not None or number.label or number.unit:
+            return False
+        step = number.value - self._last
+        if not (step > 0.0 and abs(step - self._step) <= _EVEN * self._step):
+            self._step, self._steps = step, 0
+        self._last, self._steps = number.value, self._steps + 1
+        counts = self._steps > _COUNTS
+        self.status.complaint = (
+            "the number in the lines counts evenly, so it is no distance: print the distance" if counts else ""
+        )
+        return counts
 
 
-def _whole(find: Finder | None, text: bytes, cells: list[bytes], scale: float) -> int | None:
-    """Return the scaled whole number in a column; -1 without a column, None without a valid number of at least 0."""
-    if find is None:
-        return -1
-    value = find(text, cells)
-    return None if value is None or not 0 <= value * scale < 2**63 else round(value * scale)
+def _text(line: bytes) -> str:
+    """Return the text of a line, empty if it is noise, which may have digits too."""
+    try:
+        text = line.decode().strip()
+    except UnicodeDecodeError:
+        text = line.decode("latin-1").strip()
+        if sum(letter > "~" for letter in text) > 2:
+            return ""
+    return text if text.replace("\t", " ").isprintable() else ""
 
 
-def _finder(option: str, where: int | str, unit: str = "") -> Finder:
-    """Return what finds the number of a column, given by its index or by the name before it.
+def _at(where: int | str, line: Found) -> Number | None:
+    """Return the number in a cell, given by its index, or behind a name; None unless it is the only one there."""
+    _, known, cells = line
+    if isinstance(where, int):
+        begin, end = cells[where] if where < len(cells) else (0, 0)
+        found = [number for number in known if begin <= number.start < end]
+    else:
+        name = re.escape(where) + r"[\"')\] ]*(?:[(\[][^\W\d_]+[)\]])?[\"' ]*[:=]?[\"'\s]*$"
+        found = [number for number in known if re.search(r"(?<!\w)" + name, number.before)]
+        found = found or [each for each in known if re.search(r"(?<!\w)" + name, each.before, re.IGNORECASE)]
+    return found[0] if len(found) == 1 else None
 
-    Only the given unit may follow the number: a line with "12.3 cm" is refused if the unit is mm.
+
+def _cell(number: Number, cells: list[tuple[int, int]]) -> int:
+    return next(index for index, (begin, end) in enumerate(cells) if begin <= number.start <= end)
+
+
+def _counts(cell: int, lines: list[Found]) -> bool:
+    """Return whether the numbers of a cell count evenly, apart from lines that were lost."""
+    values = [number.value for line in lines if (number := _at(cell, line)) is not None]
+    steps = [b - a for a, b in pairwise(values)]
+    return len(steps) >= 4 and min(steps) > 0 and sorted(steps)[3 * len(steps) // 4] <= 1.5 * min(steps)
+
+
+def _whole(where: int | str | None, line: Found, scale: float | None) -> int | None:
+    """Return the scaled whole number in a column; -1 without a column, None without a valid number of at least 0.
+
+    Without a scale, the number is a time in the unit printed with it, else in microseconds.
     """
+    if where is None:
+        return -1
+    number = _at(where, line)
+    if number is None:
+        return None
+    scaled = number.value * (TIMES_US.get(number.unit, 1.0) if scale is None else scale)
+    return round(scaled) if 0 <= scaled < 2**63 else None
+
+
+def _place(option: str, where: int | str) -> int | str:
+    """Return a column as an index or as the name before its number."""
     text = str(where).strip()
-    tail = rb"(?:[ ]?" + re.escape(unit.encode()) + rb")?" if unit else b""
     if text.isdecimal() and text.isascii() and int(text) < 64:
-        index, cell = int(text), re.compile(rb"(" + _NUMBER + rb")" + tail)
-
-        def by_index(_: bytes, cells: list[bytes]) -> float | None:
-            match = cell.fullmatch(cells[index].strip()) if index < len(cells) else None
-            return None if match is None else float(match[1])
-
-        return by_index
+        return int(text)
     if _NAME.fullmatch(text) is None:
         raise SensorError(f"{option} of text-lines must be a column from 0 to 63 or a name, got {where!r}")
-    before, after = rb"(?:^|[\s,;:|])", rb"\s*[=:]\s*(" + _NUMBER + rb")" + tail + rb"(?=$|[\s,;|])"
-    no_other_unit = rb"(?!\s+(?:m|cm|mm|in|us|ms|s)(?:$|[\s,;|]))" if unit else b""
-    named = re.compile(before + re.escape(text.encode()) + after + no_other_unit)
-
-    def by_name(line: bytes, _: list[bytes]) -> float | None:
-        match = named.search(line)
-        return None if match is None else float(match[1])
-
-    return by_name
+    return text
 
 
-def _separator(text: str | None) -> bytes:
-    """Return a separator as bytes; it is empty if blanks, commas and semicolons are all separators."""
+def _separator(text: str | None) -> str:
+    """Return a separator; it is empty if blanks, commas and semicolons are all separators."""
     plain = SEPARATORS.get(text, text or "")
     if len(plain) > 1 or not plain.isascii() or (plain and plain in "\r\n.+-"):
         raise SensorError(f"separator of text-lines must be one character, tab or any, got {text!r}")
-    return plain.encode()
+    return plain
 
 
-def _factor(option: str, unit: str, known: Mapping[str, float], *more: str) -> float:
-    if unit not in known:
-        raise SensorError(f"{option} of text-lines must be one of {', '.join([*known, *more])}, got {unit!r}")
-    return known[unit]
+def _demand(option: str, unit: str | None, known: Mapping[str, Any]) -> None:
+    if unit is not None and unit not in known:
+        raise SensorError(f"{option} of text-lines must be one of {', '.join(known)}, got {unit!r}")
 
 
 FAMILY = Family(
@@ -141,16 +243,17 @@ FAMILY = Family(
     rate_hz=20.0,
     resolution_m=1e-3,
     range_m=(0.02, 4.0),
-    limits="Column and unit come from options, and a changed digit in a line cannot be detected.",
+    limits="Resolution is that of the digits in the lines, and a changed digit in a line cannot be detected.",
     decoder=TextLinesDecoder,
     options={
-        "column": "of the reading: a number from 0, or a name as in d=12.3 (default 0)",
-        "unit": "of the reading: m, cm, mm, in, or us for an echo time (default cm)",
+        "column": "of the distance: a number from 0, or a name as in d=12.3 (default: the named or only distance)",
+        "unit": "of the distance: m, cm, mm, in, or us for an echo time (default: the unit in the line, else cm)",
         "separator": "between columns: one character, tab, or nothing for blanks, commas and semicolons",
         "sequence": "column of the device's counter, if it sends one",
         "time": "column of the device's clock, if it sends one",
-        "time_unit": "of that clock: us, ms or s (default us)",
+        "time_unit": "of that clock: us, ms or s (default: the unit in the line, else us)",
         "temperature": "column of a temperature in degC, if it sends one",
     },
+    past_defaults={"column": 0},
     source="the sketch",
 )

@@ -140,7 +140,8 @@ class SensorChain:
     def info(self, name: str, kind: Kind = "live") -> SourceInfo:
         """Return the description of the source; its kind of clock is determined by the first reading."""
         rate_hz, clock = self.timebase.rate_hz, self.timebase.clock
-        return SourceInfo(kind, name, rate_hz, quantum_m=self.family.resolution_m, clock=clock)
+        quantum_m = getattr(self.decoder, "resolution_m", None) or self.family.resolution_m
+        return SourceInfo(kind, name, rate_hz, quantum_m=quantum_m, clock=clock)
 
     def report(self) -> dict[str, Any]:
         """Return faults, gaps, temperature and the clock comparison as plain data, for the provenance of the run."""

@@ -76,14 +76,16 @@ class Sensor:
             self.port.name,
             self.baud,
             self.rate_hz,
-            dict(self.options),
+            {**dict.fromkeys(self.family.past_defaults, "auto"), **self.options},
             self.clock_ppm,
             calibration=dict(self.calibration.to_mapping()),
         )
 
     def not_heard(self, heard: bytes) -> str:
         """Return a line that describes what was received instead of readings."""
-        what = describe_bytes(heard) if heard else "not a byte came; is the sensor powered, its line on the right pin?"
+        what = "not a byte came; is the sensor powered, its line on the right pin?"
+        if heard:
+            what = describe_bytes(heard, self.options if self.family.name == "text-lines" else None)
         return (
             f"{self.port.name}: a {self.family.name} sensor at {self.baud} baud was expected, {what}; "
             "see `springmass sensors` for --sensor and --baud"

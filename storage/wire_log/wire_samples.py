@@ -22,9 +22,10 @@ HELD_BYTES = 1 << 18
 
 def chain_of(sensor: SensorEntry) -> SensorChain:
     """Return the decoding chain of a sensor. Raises AcquisitionError for an unknown family or option."""
+    family = get_family(sensor.family)
     return SensorChain(
-        get_family(sensor.family),
-        options=sensor.options,
+        family,
+        options={**family.past_defaults, **sensor.options},
         rate_hz=sensor.rate_hz,
         calibration=Calibration.from_mapping(sensor.calibration) if sensor.calibration else None,
         clock_ppm=sensor.clock_ppm,

@@ -356,3 +356,60 @@ def test_no_rangefinder_and_several_are_told(
         done = cli("record", "-o", tmp_path / "run.h5")
     assert done.code == 4
     assert other.path in done.complaint
+
+
+class Sketch:
+    """Writes the distance as a sketch prints it, in centimetres."""
+
+    def __init__(self, template: str) -> None:
+        self._template = template
+
+    def encode(self, *, device_us: int, distance_m: float, **_: object) -> bytes:
+        """Return one line."""
+        decimal_comma = self._template.startswith("{ms};")
+        line = self._template.format(ms=device_us // 1000, cm=100 * distance_m)
+        return (line.replace(".", ",") if decimal_comma else line).encode() + b"\r\n"
+
+
+@pytest.mark.parametrize(
+    ("template", "options", "step_m"),
+    [
+        ("Distance: {cm:.1f} cm", [], 1e-3),
+        ("({cm:.3f},)", [], 1e-5),
+        ("{ms};{cm:.2f}", ["column=1", "time=0", "time_unit=ms"], 1e-4),
+        ("{ms},{cm:.2f}", None, 1e-4),
+    ],
+)
+def test_lines_of_a_sketch_are_recorded(
+    tmp_path: Path, template: str, options: list[str] | None, step_m: float, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As they are, or with the options that the refusal names; every digit is there, and nothing is found wrong."""
+    finder = VirtualRangefinder(
+        lambda t: 0.4 + 0.05 * np.cos(OMEGA * t),
+        VirtualSensor(rate_hz=50.0, noise_m=3e-4),
+        np.random.default_rng(5),
+    )
+    family = replace(get_family("text-lines"), encoder=lambda: Sketch(template))
+    with VirtualPort(family, finder, SystemClock(), seconds=20.0) as port:
+        port.start()
+        typed = [
+            "record",
+            "--port",
+            port.path,
+            "--sensor",
+            "text-lines",
+            "--seconds",
+            "4",
+            "-o",
+            str(tmp_path / "r.h5"),
+        ]
+        if options is None:
+            assert main(typed) == 4
+            asked = capfd.readouterr().err
+            options = re.findall(r"--option (\w+=\w+)", asked)
+        assert main([*typed, *(word for option in options for word in ("--option", option))]) == 0
+    loaded = load(tmp_path / "r.h5")
+    assert loaded.info.quantum_m == pytest.approx(step_m)
+    result = analyse(tmp_path / "r.h5")
+    assert abs(result["angular_frequency"].value - OMEGA) < 5.0 * result["angular_frequency"].u
+    assert "quantised" not in {finding.code for finding in result.findings} or step_m == 1e-3

@@ -7,6 +7,7 @@ and a coverage-guided fuzzer where one is installed.
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import math
 import random
@@ -66,14 +67,14 @@ def sealed_lines(data: bytes) -> set[float]:
 
 
 def whole_lines(data: bytes) -> set[float]:
-    """Return the first number, in m, of every line that is ended and was begun after another."""
+    """Return every number, in m, cm, mm and inches, of every line that is ended and was begun after another."""
     numbers = set()
     for line in data.split(b"\n")[1:-1]:
-        found = re.match(rb"[\r ]*[,;]?([-+.\deE]+)(cm| cm)?[\s,;]", line + b" ")
-        try:
-            numbers.add(float(found[1]) / 100 if found else math.nan)
-        except ValueError:
-            continue
+        for run in re.findall(rb"[-+.,\deE]+", line):
+            within = re.findall(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", run)
+            for text in (run.replace(b",", b"."), *run.split(b","), *within):
+                with contextlib.suppress(ValueError):
+                    numbers |= {float(text) * scale for scale in (1.0, 0.01, 0.001, 0.0254)}
     return numbers
 
 
