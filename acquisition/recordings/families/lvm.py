@@ -11,6 +11,7 @@ rows. What is easy to get wrong:
 - Headers may be outdated: more or fewer rows than ``Samples``, or a step other than ``Delta_X``. If the column of times
   agrees with the formula within its rounding, the formula is more accurate and is used; otherwise the column is used.
 - Channels of one segment may have different lengths; a comment column may follow.
+- A loop may write a segment in each pass. If each goes on where the one before it ends, all are offered as one run.
 - A date in 1903 or 1904 is LabVIEW's zero of time and not a start time.
 """
 
@@ -19,6 +20,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,7 +30,7 @@ from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import name_and_unit
 from acquisition.recordings.tables.rows import read_rows
-from acquisition.recordings.tables.table import Column, Table
+from acquisition.recordings.tables.table import Column, Lines, Table
 from acquisition.recordings.tables.text import Line, Text, decode, is_text, text_of
 
 _MAGIC = "LabVIEW Measurement"
@@ -75,10 +77,11 @@ def _tables(path: str, data: bytes) -> list[Table]:
     mark = mark or "\t"
     top = _header(path, text, text.start, 1, mark)
     segments = list(_segments(path, text, top, mark))
-    tables: list[Table] = []
+    passes: list[list[Table]] = []
     for number, (segment, stop) in enumerate(segments, 1):
         run = f"Segment {number}" if len(segments) > 1 else ""
-        tables.extend(_of_segment(path, text, top, segment, stop, mark, run))
+        passes.append(list(_of_segment(path, text, top, segment, stop, mark, run)))
+    tables = [*_joined(passes), *(each for own in passes for each in own)]
     if not tables:
         raise FormatError(path, "expected channels below the header, got none", "export the run again")
     title = segments[0][0].first_of("Notes") or top.first_of("Description")
@@ -150,6 +153,81 @@ def _of_segment(
             ragged=True,
             beside=beside,
         )
+
+
+def _joined(passes: list[list[Table]]) -> list[Table]:
+    """Return the tables of all segments as one run, if they have the same channels and each segment runs on."""
+    labels = [[table.columns[0].label for table in own] for own in passes]
+    if len(passes) < 2 or any(each != labels[0] or not each for each in labels):
+        return []
+    if not all(_runs_on(before[0], after[0]) for before, after in pairwise(passes)):
+        return []
+    tables = []
+    for parts in zip(*passes, strict=True):
+        first = parts[0]
+        columns = [_one([each.columns[0] for each in parts])]
+        beside = [_one(list(each)) for each in zip(*(part.beside for part in parts), strict=True)]
+        tables.append(
+            replace(
+                first,
+                columns=tuple(columns),
+                times=None if first.times is None else _one([part.times for part in parts if part.times is not None]),
+                formula=_one_formula([part.formula for part in parts], [part.columns[0].values.size for part in parts]),
+                run=f"Segments 1 to {len(parts)}",
+                lines=_one_lines([part.lines for part in parts if part.lines is not None]),
+                beside=tuple(beside),
+            )
+        )
+    return tables
+
+
+def _runs_on(before: Table, after: Table) -> bool:
+    """Return whether a segment begins at most one step late behind the segment before it."""
+    if len(before.beside) != len(after.beside):
+        return False
+    if before.times is not None and after.times is not None:
+        t = before.times.values[np.isfinite(before.times.values)]
+        begins = after.times.values[:1]
+        return bool(t.size > 1 and begins.size and 0.0 < begins[0] - t[-1] < 2.5 * (t[-1] - t[0]) / (t.size - 1))
+    if before.times is not None or after.times is not None:
+        return False
+    return _one_formula([before.formula, after.formula], [before.columns[0].values.size, 0]) is not None
+
+
+def _one(parts: list[Column]) -> Column:
+    return replace(
+        parts[0],
+        values=np.concatenate([part.values for part in parts]),
+        decimals=np.concatenate([part.forms for part in parts]),
+    )
+
+
+def _one_formula(parts: list[Formula | None], sizes: list[int]) -> Formula | None:
+    """Return the formula of segments with these numbers of rows; None if a start differs from the end before it."""
+    first, rows = parts[0], 0
+    for part, size in zip(parts, sizes, strict=True):
+        if first is None or part is None or not abs(part.step_s - first.step_s) <= 1e-9 * first.step_s:
+            return None
+        if not abs(part.start_s - (first.start_s + rows * first.step_s)) < 0.01 * first.step_s:
+            return None
+        rows += size
+    return None if first is None else replace(first, samples=rows)
+
+
+def _one_lines(parts: list[Lines]) -> Lines:
+    """Return where the rows of all segments stand; the lines between two segments are no rows."""
+    rows, line = 0, parts[0].first
+    skipped = []
+    for part in parts:
+        skipped += [np.full(part.first - line, rows), part.skipped + rows]
+        rows += part.rows
+        line = part.first + part.rows + part.skipped.size
+    return parts[-1]._replace(
+        first=parts[0].first,
+        rows=rows,
+        skipped=np.concatenate(skipped).astype(np.int64),
+        words=np.concatenate([part.words for part in parts]),
+    )
 
 
 def _name_and_unit(label: str, unit: str, column: int) -> tuple[str, str]:

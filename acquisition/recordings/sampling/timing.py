@@ -15,6 +15,7 @@ from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.nominal import Grid, find_rate, median
 
+_PLACEHOLDER_S = 1.0  # the step that LabVIEW writes if no rate was set
 _SHARE_OF_JITTER = 0.2
 _ANY_RATE_HZ = 100.0  # an example: the rate of many sensors
 _FEWEST_BURSTS = 20  # minimum number of bursts for which their interval can be determined
@@ -154,6 +155,11 @@ def find_timing(path: str, rows: Rows, formula: Formula | None, rate_hz: float |
             message = f"the header declares {samples} samples, but there are {count} rows; all are kept"
             traps.append(Trap("stale_header", message, abs(samples - count)))
         timing = _by_formula(path, formula, rows, rate_hz)
+        if formula.step_s == _PLACEHOLDER_S and rate_hz is None and rows.printed is None:
+            message = (
+                "the header states steps of 1 s, as LabVIEW does if no rate was set; if they are not, state the rate"
+            )
+            traps.append(Trap("rate_assumed", message))
         if timing is None:
             stated = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
             what = "which are impossible" if rows.printed is None else "but the column of times differs and is used"
@@ -179,6 +185,8 @@ def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) 
         slack = 0.5001 * rows.time_resolution + 1e-9 * np.maximum(np.abs(expected), step_s)
         if ((np.abs(rows.printed - expected) > slack) & ~rows.unread).any():  # the comparison is false for a NaN
             return None
+    if rate_hz is not None and step_s == _PLACEHOLDER_S:
+        return Timing(rate_hz, Grid(rate_hz, start_s), 0.0, certain=True, given=True, by_row=True)
     rate = 1.0 / step_s
     rounded = float(f"{rate:.9g}")
     rate = rounded if math.isclose(rounded, rate, rel_tol=1e-12) else rate

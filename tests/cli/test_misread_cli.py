@@ -1,0 +1,476 @@
+"""Files as people really have them: the command line goes in, and a period, a question or one line comes out."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+Cli = Callable[..., Any]
+
+PERIOD_S = 0.790066
+later = pytest.mark.xfail(strict=True, reason="not yet")
+
+
+def swing(t: np.ndarray, seed: int = 1, noise: float = 8e-5, rest: float = 0.219) -> np.ndarray:
+    """Return positions of a bob in m: 52 mm at the start, damped with 0.015 1/s."""
+    noisy = np.random.default_rng(seed).normal(0.0, noise, t.size)
+    return rest + 0.052 * np.exp(-0.015 * t) * np.cos(2 * np.pi / PERIOD_S * t) + noisy
+
+
+T = np.arange(2000) / 100
+Y = swing(T)
+
+
+def lines(*rows: str, end: str = "\n") -> str:
+    """Return lines of a text."""
+    return end.join([*rows, ""])
+
+
+def stamps(pattern: str, start: str = "2025-04-17T17:00:08", t: np.ndarray = T) -> list[str]:
+    """Return clock times; ``{ms}`` in the pattern stands for three digits of milliseconds."""
+    begun = datetime.fromisoformat(start)
+    moments = [begun + timedelta(milliseconds=round(1e3 * each)) for each in t]
+    return [each.strftime(pattern.replace("{ms}", f"{each.microsecond // 1000:03d}")) for each in moments]
+
+
+@pytest.fixture
+def read(cli: Cli, tmp_path: Path) -> Callable[..., Any]:
+    """Return a function that analyses a text or bytes as a file, and checks the period; it returns the result."""
+
+    def analysed(content: str | bytes | Path, *options: str, name: str = "run.csv", period_s: float = PERIOD_S) -> Any:
+        path = tmp_path / name
+        if not isinstance(content, Path):
+            path.write_bytes(content.encode() if isinstance(content, str) else content)
+        done = cli("analyse", content if isinstance(content, Path) else path, "--json", *options)
+        assert done.err == ""
+        (result,) = done.results
+        period = result["estimates"]["period"]
+        assert abs(period["value"] - period_s) < 5.0 * period["u"] < 0.005 * period_s
+        return result
+
+    return analysed
+
+
+def codes(result: Any) -> set[str]:
+    """Return the codes of the warnings and errors of a result."""
+    return {each["code"] for each in result["findings"] if each["severity"] != "info"}
+
+
+def rewritten(values: np.ndarray, form: str = "{:.3f}") -> list[str]:
+    """Return numbers as text."""
+    return [form.format(each) for each in values]
+
+
+def csv(heading: str, *columns: list[str], mark: str = ",") -> str:
+    """Return a table with a line of headings."""
+    return lines(heading, *(mark.join(row) for row in zip(*columns, strict=True)))
+
+
+# LabVIEW
+
+
+def tdms(path: Path, channels: dict[str, np.ndarray], **properties: object) -> Path:
+    """Write a TDMS file of two segments; the properties are those of the last channel."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(str(path)) as writer:
+        for half in (slice(0, 1200), slice(1200, None)):
+            writer.write_segment(
+                [
+                    ChannelObject("run", name, values[half], properties if at == len(channels) - 1 else {})
+                    for at, (name, values) in enumerate(channels.items())
+                ]
+            )
+    return path
+
+
+def test_a_channel_of_time_stamps_is_the_time(read: Callable[..., Any], tmp_path: Path) -> None:
+    """Without an increment."""
+    clock = np.datetime64("2024-05-11T14:37:48.300000") + np.round(1e6 * T).astype("timedelta64[us]")
+    path = tdms(tmp_path / "run.tdms", {"Timestamp": clock, "Distance": 100 * Y}, unit_string="cm")
+    result = read(path)
+    assert result["input"]["rate_hz"] == 100.0
+
+
+def test_a_placeholder_gives_way_to_the_rate_that_is_stated(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
+    """An increment of one second is read, and it is said what it may be; any other one is not overruled."""
+    path = tdms(tmp_path / "run.tdms", {"Untitled": 100 * Y}, wf_increment=1.0)
+    result = read(path, "--unit", "cm", "--rate-hz", "100")
+    assert "rate_assumed" not in codes(result)
+    slow = read(path, "--unit", "cm", period_s=100 * PERIOD_S)
+    assert "rate_assumed" in codes(slow)
+    other = tdms(tmp_path / "other.tdms", {"Untitled": 100 * Y}, wf_increment=0.5)
+    assert "2 Hz" in cli("analyse", other, "--unit", "cm", "--rate-hz", "100").complaint
+
+
+@pytest.mark.parametrize("left_out", [10, 900, 4000])
+def test_a_cut_file_is_a_finding(read: Callable[..., Any], tmp_path: Path, left_out: int) -> None:
+    """What was written is read, and no library speaks on stderr."""
+    path = tdms(tmp_path / "run.tdms", {"Distance": 100 * Y}, unit_string="cm", wf_increment=0.01)
+    path.write_bytes(path.read_bytes()[:-left_out])
+    assert "truncated_row" in codes(read(path))
+
+
+def lvm(starts: np.ndarray, size: int = 100) -> str:
+    """Return an LVM file with a segment from each start."""
+    head = ["LabVIEW Measurement", "Separator\tTab", "Multi_Headings\tYes", "X_Columns\tOne", "***End_of_Header***", ""]
+    rows = list(head)
+    for start in starts:
+        t = start + np.arange(size) / 100
+        rows += ["Channels\t1", f"Samples\t{size}", "Y_Unit_Label\tcm", f"X0\t{start:.6f}", "Delta_X\t0.010000"]
+        rows += ["***End_of_Header***\t\t", "X_Value\tDistance\tComment"]
+        rows += [f"{a:.6f}\t{100 * b:.4f}\t" for a, b in zip(t, swing(t, seed=int(start)), strict=True)]
+    return lines(*rows, end="\r\n")
+
+
+def test_segments_that_run_on_are_offered_as_one_run(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
+    """As the first answer to the question; each can still be chosen."""
+    path = tmp_path / "run.lvm"
+    path.write_text(lvm(np.arange(20.0)))
+    asked = cli("analyse", path, "--json")
+    assert asked.code == 3
+    _, *suggested = shlex.split(asked.complaint[asked.complaint.index("? springmass ") + 2 :])
+    assert suggested[-2] == "--run"
+    assert read(path, *suggested[-2:])["input"]["samples"] == 2000
+    assert cli("analyse", path, "--json", "--run", "Segment 2").results[0]["input"]["samples"] == 100
+
+
+def test_a_row_of_joined_segments_is_found_in_its_line(cli: Cli, tmp_path: Path) -> None:
+    """Lines between segments are counted."""
+    content = lvm(np.arange(20.0)).split("\r\n")
+    row = next(at for at, line in enumerate(content) if line.startswith("2.500000"))
+    content[row] = "2.500000\tx\t"
+    path = tmp_path / "run.lvm"
+    path.write_text("\r\n".join(content))
+    assert f"line {row + 1}" in cli("formats", path, "--run", "Segments 1 to 20").out
+
+
+@pytest.mark.parametrize("starts", [np.zeros(4), np.array([0.0, 30.0, 60.0, 90.0])])
+def test_segments_that_do_not_run_on_are_runs_of_their_own(cli: Cli, tmp_path: Path, starts: np.ndarray) -> None:
+    """Each begins anew, or long after the one before."""
+    path = tmp_path / "run.lvm"
+    path.write_text(lvm(starts))
+    assert "Segments 1 to" not in cli("formats", path).out
+
+
+# CASSY
+
+
+def cassy(rows: int = 1500) -> str:
+    """Return a CASSY Lab file that declares six channels and stores four."""
+
+    def channel(name: str, symbol: str, unit: str, numbers: str) -> list[str]:
+        return [name, symbol, unit, numbers]
+
+    table = [
+        f"{i + 1}\t{i / 100:g}\t{10 * (y - 0.219):.4f}\t{12 + 0.001 * (i % 7):.3f}\t" for i, y in enumerate(Y[:rows])
+    ]
+    settings = "1 0.5 0 1 0 0 1 0 0 0 0 0 0 1 1"
+    blocks = [
+        channel("Index", "n", "", "0 3001 500 0 0 0 0 1 0 0 0 0 0 3000 1 1"),
+        channel("Zeit", "t", "s", f"0 {settings}"),
+        channel("Frequenz", "f", "Hz", f"2 {settings}"),
+        channel("Spannung", "U_A1", "V", f"0 {settings}"),
+        channel("Spannung", "U_B1", "V", f"0 {settings}"),
+        ["10 4 0 0", *channel("neue", "f_1", "V", f"0 {settings}")],
+    ]
+    return lines("CL4", "30 0.1", *(line for block in blocks for line in block), f"4 {rows}", *table)
+
+
+# Times
+
+
+@later
+@pytest.mark.parametrize(
+    ("pattern", "heading"),
+    [
+        ("%Y/%m/%d %H:%M:%S::{ms}", "RX Date/Time"),
+        ("%H:%M:%S:{ms}", "time"),
+        ("%d.%m.%Y %H:%M:%S:{ms}", "Zeit"),
+    ],
+)
+def test_colons_before_milliseconds_are_clock_times(read: Callable[..., Any], pattern: str, heading: str) -> None:
+    """Of Serial Studio and of loggers in Java."""
+    read(csv(f"{heading},Distance (cm)", stamps(pattern), rewritten(100 * Y)))
+
+
+@pytest.mark.parametrize("step_s", [0.01, 0.02, 0.05])
+def test_stamps_without_a_fraction_on_whole_seconds_are_read(read: Callable[..., Any], step_s: float) -> None:
+    """As Python's isoformat writes them."""
+    t = np.arange(1500) * step_s
+    begun = datetime.fromisoformat("2025-04-17T17:00:08")
+    clock = [(begun + timedelta(microseconds=round(1e6 * each))).isoformat() for each in t]
+    result = read(csv("timestamp,distance_m", clock, rewritten(swing(t), "{:.5f}")))
+    assert result["input"]["samples"] == 1500
+    assert "malformed_rows" not in codes(result)
+
+
+@later
+@pytest.mark.parametrize("unit", ["d", "day", "days"])
+def test_fractions_of_a_day_are_times(read: Callable[..., Any], unit: str) -> None:
+    """As Excel shows a time that is formatted as a number."""
+    days = rewritten(0.6096 + T / 86400, "{:.12f}")
+    read(csv("Time,Distance (cm)", days, rewritten(100 * Y)), "--time-unit", unit)
+
+
+@later
+def test_fractions_of_a_day_are_asked_about(cli: Cli, tmp_path: Path) -> None:
+    """Not a period of 9 us."""
+    path = tmp_path / "run.csv"
+    path.write_text(csv("Time,Distance (cm)", rewritten(0.6096 + T / 86400, "{:.12f}"), rewritten(100 * Y)))
+    assert "--time-unit d" in cli("analyse", path, "--json").err
+
+
+@later
+def test_two_decimals_of_twelve_thousand_rows_are_certain(read: Callable[..., Any]) -> None:
+    """The step is exact."""
+    t = np.arange(12_000) / 100
+    assert codes(read(csv("Time (s),Distance (cm)", rewritten(t, "{:.2f}"), rewritten(100 * swing(t))))) == set()
+
+
+@later
+@pytest.mark.parametrize(
+    ("heading", "scale", "options"),
+    [
+        ("nanoseconds", 1e9, ["--time", "nanoseconds"]),
+        ("microseconds", 1e6, []),
+        ("ms", 1e3, []),
+        ("us", 1e6, []),
+        ("Sec", 1.0, []),
+        ("Tiempo (seg)", 1.0, []),
+        ("tempo (seg)", 1.0, []),
+        ("millis", 1e3, []),
+    ],
+)
+def test_names_of_units_of_time_are_times(
+    read: Callable[..., Any], heading: str, scale: float, options: list[str]
+) -> None:
+    """In that unit, without a question."""
+    read(csv(f"{heading},Distance (cm)", rewritten(scale * T, "{:g}"), rewritten(100 * Y)), *options)
+
+
+@later
+def test_clock_times_behind_an_apostrophe_are_read(read: Callable[..., Any]) -> None:
+    """As some loggers keep Excel from touching them."""
+    clock = [f"'0:{int(t) // 60}:{t % 60:.2f}" for t in T]
+    read(csv("Time,Distance (cm)", clock, rewritten(100 * Y)))
+
+
+def jump(after_s: float, by_s: float, seconds: float = 30.0) -> str:
+    """Return a run whose clock is set after some seconds."""
+    t = np.arange(round(100 * seconds)) / 100
+    shown = np.where(t < after_s, t, t + by_s)
+    clock = stamps("%Y-%m-%d %H:%M:%S.{ms}", "2025-03-30T01:59:50", shown)
+    return csv("Timestamp,Distance (m)", clock, rewritten(swing(t), "{:.5f}"))
+
+
+@later
+@pytest.mark.parametrize("by_s", [3600.0, 200_000.0])
+def test_a_clock_that_was_set_forward_is_a_jump(
+    cli: Cli, read: Callable[..., Any], tmp_path: Path, by_s: float
+) -> None:
+    """The longest unbroken part is analysed, the jump named with its rows, and the other part offered."""
+    result = read(jump(10.0, by_s))
+    (said,) = [each for each in result["findings"] if f"{by_s:.0f} s" in each["message"].replace(",", "")]
+    assert "--from" in said["message"] + said["advice"] + said["details"]
+    assert "1002" in said["message"] + said["details"]
+    assert 19.0 < result["input"]["duration_s"] < 21.0 or result["quality"]
+    read(tmp_path / "run.csv", "--to", "9.9")
+
+
+@later
+def test_a_clock_that_was_set_back_makes_two_runs(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
+    """The end of summer time."""
+    path = tmp_path / "run.csv"
+    path.write_text(jump(10.0, -3600.0))
+    asked = cli("analyse", path, "--json")
+    assert asked.code == 3
+    assert "--run" in asked.complaint
+    sizes = [read(path, "--run", run)["input"]["samples"] for run in ("1", "2")]
+    assert sorted(sizes) == [1000, 2000]
+
+
+# Separators and headings
+
+
+@later
+@pytest.mark.parametrize(
+    "heading",
+    ["millis,distance_mm", '"millis","distance_mm"', "sep=,\nmillis,distance_mm", "time,dist", "millis, distance_mm"],
+)
+def test_integers_with_commas_are_two_columns(read: Callable[..., Any], heading: str) -> None:
+    """The commonest log of all."""
+    t = np.arange(600) * 0.05
+    table = csv(heading, rewritten(1e3 * t, "{:.0f}"), rewritten(1e3 * swing(t), "{:.0f}"))
+    unit = [] if "mm" in heading else ["--unit", "mm"]
+    read(table, "--time-unit", "ms", *unit)
+
+
+def test_integers_with_commas_and_an_echo_time_are_two_columns(cli: Cli, tmp_path: Path) -> None:
+    """Asked for the units of both."""
+    t = np.arange(600) * 0.05
+    path = tmp_path / "run.csv"
+    path.write_text(csv("millis,echo_us", rewritten(1e3 * t, "{:.0f}"), rewritten(5800 * swing(t), "{:.0f}")))
+    done = cli("analyse", path)
+    assert done.code == 3
+    assert "millis,echo" not in done.err
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        pytest.param("Time, s,Distance, cm", marks=later),
+        pytest.param("Time,s,Distance,cm", marks=later),
+        '"Time, s","Distance, cm"',
+    ],
+)
+def test_a_comma_between_name_and_unit_is_no_column(read: Callable[..., Any], heading: str) -> None:
+    """Names and cells are counted together."""
+    read(csv(heading, rewritten(T, "{:.3f}"), rewritten(100 * Y)))
+
+
+@later
+def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, tmp_path: Path) -> None:
+    """Decimal commas in the times alone."""
+    table = csv("Time(s), Echo", [f"{t:g}".replace(".", ",") for t in T], rewritten(100 * Y, "{:.2f}"))
+    path = tmp_path / "run.csv"
+    path.write_text(lines("; CSV, generated by a logger", "; Channels (1/1)") + table)
+    done = cli("analyse", path)
+    assert done.code == 3
+    assert "decimal comma" in done.complaint
+    assert "export" in done.complaint
+
+
+@later
+@pytest.mark.parametrize(
+    ("content", "options"),
+    [
+        (
+            [f"{a};{b:.2f}".replace(".", ",") for a, b in zip(rewritten(T, "{:.2f}"), 100 * Y, strict=True)],
+            ["--delimiter", ";"],
+        ),
+        ([f"{a:.2f},{b:.2f}" for a, b in zip(T, 100 * Y, strict=True)], ["--delimiter", ",", "--decimal", "."]),
+    ],
+)
+def test_separator_and_decimal_mark_can_be_stated(
+    read: Callable[..., Any], content: list[str], options: list[str]
+) -> None:
+    """What the program would otherwise find out."""
+    read(lines(*content), "--unit", "cm", *options)
+
+
+def test_the_line_above_the_numbers_has_the_names(read: Callable[..., Any]) -> None:
+    """Not the first comment."""
+    rows = [f"{a:.2f} {100 * b:.3f}" for a, b in zip(T, Y, strict=True)]
+    result = read(lines("# x0 = 0 m, v0 = 5 m/s", "# Tiempo Posicion", *rows), "--unit", "cm")
+    assert result["input"]["channel"] == "Posicion"
+
+
+# Channels
+
+
+@later
+def test_row_numbers_and_constants_are_not_proposed(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
+    """Only the unit of the one channel that moves is asked."""
+    path = tmp_path / "run.csv"
+    clock = rewritten(1746967068.1273 + T, "{:.7f}")
+    path.write_text(
+        csv(
+            "seq_num,time,ranger,ranger_user_setpoint",
+            [str(i + 1) for i in range(T.size)],
+            clock,
+            rewritten(Y, "{:.6f}"),
+            ["0.0"] * T.size,
+        )
+    )
+    asked = cli("analyse", path)
+    assert asked.code == 3
+    assert "--channel" not in asked.complaint
+    assert "seq_num" not in asked.complaint[asked.complaint.index("?") :]
+    read(path, "--unit", "m")
+
+
+@later
+def test_a_question_names_at_most_eight_channels_and_one_whole_command(cli: Cli, tmp_path: Path) -> None:
+    """The likely ones first, with an example that is marked as such."""
+    names = [f"raw{i}" for i in range(14)] + ["position"]
+    path = tmp_path / "run.csv"
+    columns = [rewritten(100 * swing(T, seed=i)) for i in range(15)]
+    path.write_text(csv(",".join(["t", *names]), rewritten(T, "{:.2f}"), *columns))
+    asked = cli("analyse", path, "--no-report")
+    question, _, command = asked.complaint.partition("? ")
+    assert len(re.findall(r'"raw\d+"', question)) <= 8
+    assert question.index('"position"') < question.index('"raw0"')
+    assert command.count("springmass") == 1
+
+
+@later
+@pytest.mark.parametrize("typed", ["dist", "DISTANCE", "Distance to"])
+def test_a_unique_beginning_of_a_channels_name_is_enough(read: Callable[..., Any], typed: str) -> None:
+    """In any case."""
+    other = rewritten(100 * swing(T, seed=4))
+    read(csv("Time (s),Height (cm),Distance to bob (cm)", rewritten(T), other, rewritten(100 * Y)), "--channel", typed)
+
+
+@later
+@pytest.mark.parametrize(
+    "line",
+    ["Distance: {cm:.1f} cm", "{cm:.2f}cm", "Time:{ms}\tDist:{cm:.2f}", "{inch:.2f}in, {cm:.2f}cm", "Ping: {cm:.2f}cm"],
+)
+def test_the_words_of_a_sketch_are_read(read: Callable[..., Any], line: str) -> None:
+    """Copied from a serial monitor, with the unit that is printed."""
+    rows = [line.format(cm=100 * y, inch=y / 0.0254, ms=round(1e3 * t)) for t, y in zip(T, Y, strict=True)]
+    options = ["--time-unit", "ms"] if "ms" in line else ["--rate-hz", "100"]
+    read(lines(*rows), *options, name="log.txt")
+
+
+def test_times_and_values_in_turn_are_pairs(cli: Cli, tmp_path: Path) -> None:
+    """Or they are named; not a column with half of its rows missing."""
+    rows = [line for t, y in zip(T, Y, strict=True) for line in (f"{t:.2f}", f"{100 * y:.3f},12")]
+    path = tmp_path / "log.txt"
+    path.write_text(lines(*rows))
+    done = cli("analyse", path, "--unit", "cm", "--json")
+    assert "malformed" not in done.out
+    assert done.code == 0 or "turn" in done.complaint
+
+
+@later
+def test_positions_counted_from_rest_are_ordinary(read: Callable[..., Any]) -> None:
+    """Values of both signs are no distances of a rangefinder, and their rest position is known as well as any."""
+    t = np.arange(900) / 30
+    y = swing(t, noise=1e-3, rest=0.0031)
+    rows = [f"{a:.3f}\t{b:.4E}" for a, b in zip(t, y, strict=True)]
+    result = read(lines("mass A", "t\tx", *rows), "--unit", "m", name="run.txt")
+    assert "implausible_distance" not in codes(result)
+    rest = result["estimates"]["rest_position"]
+    assert abs(rest["value"] - 0.0031) < 5 * rest["u"]
+    assert rest["u"] < 2e-4
+
+
+@pytest.mark.parametrize("between", ["", "0\t0\t0"])
+def test_two_data_sets_below_each_other_are_two_runs(
+    read: Callable[..., Any], cli: Cli, tmp_path: Path, between: str
+) -> None:
+    """In Vernier's format; with a blank line or zeros between them."""
+    content: list[str] = []
+    for run, t in (("Run 1", T), ("Run 2", 0.96 * T)):
+        content += ["Vernier Format 2", "Lab 1/22/2008 2:38:45", run, "Time\tPosition", "Time\tPos", "s\tm", ""]
+        content += [f"{a:.2f}\t{b:.5f}" for a, b in zip(T, swing(t), strict=True)] + [between]
+    path = tmp_path / "run.txt"
+    path.write_text(lines(*content))
+    assert cli("analyse", path).code == 3
+    read(path, "--run", "Run 1")
+    read(path, "--run", "Run 2", period_s=PERIOD_S / 0.96)
+
+
+@later
+def test_channels_that_are_declared_and_not_stored_are_left_out(read: Callable[..., Any]) -> None:
+    """The frequency of the first group, and what is computed from others."""
+    read(cassy(), "--channel", "U_A1", name="run.lab")
