@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.cli.not_recordings import TABLES
+
 Cli = Callable[..., Any]
 
 PERIOD_S = 0.790066
@@ -474,3 +476,15 @@ def test_two_data_sets_below_each_other_are_two_runs(
 def test_channels_that_are_declared_and_not_stored_are_left_out(read: Callable[..., Any]) -> None:
     """The frequency of the first group, and what is computed from others."""
     read(cassy(), "--channel", "U_A1", name="run.lab")
+
+
+@later
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_that_is_no_recording_is_answered_as_such(cli: Cli, tmp_path: Path, name: str) -> None:
+    """One line says what it looks like and what a recording needs; nothing is asked."""
+    path = tmp_path / "table.csv"
+    path.write_text(TABLES[name])
+    done = cli("analyse", path)
+    assert (done.code, done.out) == (3, "")
+    assert "not a recording" in done.complaint
+    assert "?" not in done.complaint
