@@ -36,11 +36,13 @@ _SPELLINGS = {
     "m": ("meter", "metre", "metri", "米"),
     "in": ("inch", "inche"),
     "ft": ("feet", "foot"),
-    "us": ("µs", "μs", "microsecond"),
-    "ms": ("msec", "millisecond", "毫秒"),
-    "s": ("sec", "second", "seconde", "sekunde", "sekunden", "segundo", "secondi", "secondo", "秒"),
+    "ns": ("nanosecond", "nano"),
+    "us": ("µs", "μs", "usec", "microsecond", "micro", "microsegundo", "mikrosekunde", "mikrosekunden"),
+    "ms": ("msec", "millisecond", "milli", "milisegundo", "millisekunde", "millisekunden", "毫秒"),
+    "s": ("sec", "seg", "second", "seconde", "sekunde", "sekunden", "segundo", "secondi", "secondo", "秒"),
     "min": ("minute", "minuten", "minuto", "minuti"),
     "h": ("hr", "hour", "stunde", "stunden", "heure", "hora"),
+    "d": ("day", "tag", "tage", "jour", "día", "dia", "giorni"),
     "rad": ("radian", "radiant", "rads"),
     "deg": ("°", "º", "degree", "grad"),
     "rpm": ("r/min", "rev/min"),
@@ -82,6 +84,7 @@ TIMES = {
     **{unit: Measure("time", unit, power) for unit, power in (("s", 0), ("ms", -3), ("us", -6), ("ns", -9))},
     "min": Measure("time", "min", 0, 60.0),
     "h": Measure("time", "h", 0, 3600.0),
+    "d": Measure("time", "d", 0, 86400.0),
 }
 """The measure of each unit that times may have."""
 NUMBER = MEASURES["1"]

@@ -189,7 +189,6 @@ def cassy(rows: int = 1500) -> str:
 # Times
 
 
-@later
 @pytest.mark.parametrize(
     ("pattern", "heading"),
     [
@@ -214,7 +213,6 @@ def test_stamps_without_a_fraction_on_whole_seconds_are_read(read: Callable[...,
     assert "malformed_rows" not in codes(result)
 
 
-@later
 @pytest.mark.parametrize("unit", ["d", "day", "days"])
 def test_fractions_of_a_day_are_times(read: Callable[..., Any], unit: str) -> None:
     """As Excel shows a time that is formatted as a number."""
@@ -222,7 +220,6 @@ def test_fractions_of_a_day_are_times(read: Callable[..., Any], unit: str) -> No
     read(csv("Time,Distance (cm)", days, rewritten(100 * Y)), "--time-unit", unit)
 
 
-@later
 def test_fractions_of_a_day_are_asked_about(cli: Cli, tmp_path: Path) -> None:
     """Not a period of 9 us."""
     path = tmp_path / "run.csv"
@@ -230,14 +227,12 @@ def test_fractions_of_a_day_are_asked_about(cli: Cli, tmp_path: Path) -> None:
     assert "--time-unit d" in cli("analyse", path, "--json").err
 
 
-@later
 def test_two_decimals_of_twelve_thousand_rows_are_certain(read: Callable[..., Any]) -> None:
     """The step is exact."""
     t = np.arange(12_000) / 100
     assert codes(read(csv("Time (s),Distance (cm)", rewritten(t, "{:.2f}"), rewritten(100 * swing(t))))) == set()
 
 
-@later
 @pytest.mark.parametrize(
     ("heading", "scale", "options"),
     [
@@ -258,7 +253,6 @@ def test_names_of_units_of_time_are_times(
     read(csv(f"{heading},Distance (cm)", rewritten(scale * T, "{:g}"), rewritten(100 * Y)), *options)
 
 
-@later
 def test_clock_times_behind_an_apostrophe_are_read(read: Callable[..., Any]) -> None:
     """As some loggers keep Excel from touching them."""
     clock = [f"'0:{int(t) // 60}:{t % 60:.2f}" for t in T]
@@ -302,7 +296,6 @@ def test_a_clock_that_was_set_back_makes_two_runs(cli: Cli, read: Callable[..., 
 # Separators and headings
 
 
-@later
 @pytest.mark.parametrize(
     "heading",
     ["millis,distance_mm", '"millis","distance_mm"', "sep=,\nmillis,distance_mm", "time,dist", "millis, distance_mm"],
@@ -328,8 +321,8 @@ def test_integers_with_commas_and_an_echo_time_are_two_columns(cli: Cli, tmp_pat
 @pytest.mark.parametrize(
     "heading",
     [
-        pytest.param("Time, s,Distance, cm", marks=later),
-        pytest.param("Time,s,Distance,cm", marks=later),
+        "Time, s,Distance, cm",
+        "Time,s,Distance,cm",
         '"Time, s","Distance, cm"',
     ],
 )
@@ -338,7 +331,6 @@ def test_a_comma_between_name_and_unit_is_no_column(read: Callable[..., Any], he
     read(csv(heading, rewritten(T, "{:.3f}"), rewritten(100 * Y)))
 
 
-@later
 def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, tmp_path: Path) -> None:
     """Decimal commas in the times alone."""
     table = csv("Time(s), Echo", [f"{t:g}".replace(".", ",") for t in T], rewritten(100 * Y, "{:.2f}"))
@@ -378,7 +370,6 @@ def test_the_line_above_the_numbers_has_the_names(read: Callable[..., Any]) -> N
 # Channels
 
 
-@later
 def test_row_numbers_and_constants_are_not_proposed(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
     """Only the unit of the one channel that moves is asked."""
     path = tmp_path / "run.csv"
@@ -413,7 +404,6 @@ def test_a_question_names_at_most_eight_channels_and_one_whole_command(cli: Cli,
     assert command.count("springmass") == 1
 
 
-@later
 @pytest.mark.parametrize("typed", ["dist", "DISTANCE", "Distance to"])
 def test_a_unique_beginning_of_a_channels_name_is_enough(read: Callable[..., Any], typed: str) -> None:
     """In any case."""

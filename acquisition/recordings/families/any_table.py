@@ -31,6 +31,7 @@ from acquisition.recordings.tables.layout import (
     is_aside,
     times_by_name,
     times_by_steps,
+    wrong_commas,
 )
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text, decode
@@ -88,6 +89,9 @@ def header(lines: Sequence[str]) -> Header | None:
             return replace(heading, role="time")
         return replace(heading, role="ignored" if at in ignored else "aside" if at in asides else "channel")
 
+    known = sum(1 for each in table.headings if each.name)
+    problem = f"rows have more cells than the {known} names above them, because the times have decimal commas"
+    remedy = "export with semicolons between the cells, or with decimal points"
     return Header(
         why,
         table.at,
@@ -99,6 +103,7 @@ def header(lines: Sequence[str]) -> Header | None:
         traps=tuple(traps),
         clock=clock,
         brackets=table.brackets,
+        refused=(problem, remedy) if wrong_commas(table) else None,
     )
 
 

@@ -73,7 +73,11 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
             break
     if best is None:
         return Rate(rough, relative_u, None, certain=False)
-    beside = (Grid(best.rate_hz + off, best.origin_s) for off in (-1.0, 1.0) if best.rate_hz + off > 0)
+    beside = (
+        Grid(rate, best.origin_s)
+        for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0)
+        if rate > 0 and abs(rate - rough) <= 1.5 * rough * relative_u
+    )
     certain = all(np.mean(snap(probe, grid, resolution)[1]) < best_share for grid in beside)
     return Rate(best.rate_hz, relative_u, best, certain)
 

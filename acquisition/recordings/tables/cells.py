@@ -30,8 +30,9 @@ _BLOCK = 65536
 _MOST_EXACT, _MOST_TENS = 1e15, 22  # whole numbers and powers of ten up to here are exact in binary
 _TENS = np.array([float(f"1e{power}") for power in range(_MOST_TENS + 1)])
 CLOCK = re.compile(
-    r"(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?"
-    r"(?:(?P<h>\d{1,2}):(?P<m>\d\d)(?::(?P<s>\d\d(?:[.,]\d{1,9})?))?|(?P<m2>\d{1,2}):(?P<s2>\d\d[.,]\d{1,9}))"
+    r"'?(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?"
+    r"(?:(?P<h>\d{1,2}):(?P<m>\d{1,2}):(?P<s>\d{1,2})(?:[.,](?P<part>\d{1,9})|::?(?P<ms>\d{1,3}))?"
+    r"|(?P<h2>\d{1,2}):(?P<m2>\d\d)|(?P<m3>\d{1,2}):(?P<s3>\d\d)[.,](?P<part3>\d{1,9}))"
     r"\s*(?P<half>[aApP]\.?[mM]\.?)?(?:Z|[+-]\d\d:?\d\d)?",
     re.ASCII,
 )
@@ -59,11 +60,12 @@ def clock_s(cell: str) -> tuple[str, float, int] | None:
     match = CLOCK.fullmatch(cell)
     if match is None:
         return None
-    hour = int(match["h"] or 0)
+    hour = int(match["h"] or match["h2"] or 0)
     hour = hour % 12 + 12 * (match["half"][0] in "pP") if match["half"] else hour
-    seconds = (match["s"] or match["s2"] or "0").replace(",", ".")
-    decimals = len(seconds.partition(".")[2])
-    at = hour * 3600 + int(match["m"] or match["m2"]) * 60 + float(seconds)
+    part = f"{match['ms']:0>3}" if match["ms"] else match["part"] or match["part3"] or ""
+    decimals = len(part)
+    seconds = float(f"{match['s'] or match['s3'] or 0}.{part}")
+    at = hour * 3600 + int(match["m"] or match["m2"] or match["m3"]) * 60 + seconds
     return (match["date"] or "").strip(" ,T"), round(at, decimals), decimals
 
 

@@ -20,16 +20,24 @@ from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, t
 
 _SLOW_S = 0.999
 """Time steps of a second or more without a unit may be milliseconds, so their unit must be stated."""
+_DAY_STEPS = (1e-9, 2e-5)
+_LATE = 2e4
+"""Steps without a unit of this size, so many of them after zero, are rather fractions of a day (0.1 ms to 2 s)."""
 _FIRST_ROWS = 50
+_SOME = 20_000
 _SHARE_OF_RESTARTS = 0.2
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Units of times since 1970, each with the minimum of the numbers to which it applies."""
+_POSITION = re.compile(
+    r"dist|pos|abst|weg|ort|height|höhe|altura|range|auslenk|elong|displ|^[xyz](?![^\W_])|angle|winkel|theta|θ|phi|φ"
+)
+_DERIVED = re.compile(r"abs|magnitude|total|betrag|norm|fft|command|setpoint|soll|error|status|sum")
 _LIKELY = (
     (re.compile(r"gyr|omega|ω|ang\w*[ _.]*(vel|speed|ges)|winkelges|^g[xyz](?![^\W_])", re.IGNORECASE), "rad/s"),
     (re.compile(r"acc|beschl|versn|^a[xyz](?![^\W_])|g[-_ ]?f|^ac[xyz]", re.IGNORECASE), "m/s2"),
-    (re.compile(r"vel|speed|^v(?![^\W\d_])|^v[xyz](?![^\W_])|geschw", re.IGNORECASE), "m/s"),
+    (re.compile(r"vel|speed|^(?-i:v)(?![^\W\d_])|^(?-i:v)[xyz](?![^\W_])|geschw", re.IGNORECASE), "m/s"),
     (re.compile(r"theta|θ|phi|φ|ang|winkel|rad|rotat|roll|pitch|yaw", re.IGNORECASE), "rad"),
-    (re.compile(r"volt|spannung|^ch|signal|tens|^ai?\d|ampl", re.IGNORECASE), "V"),
+    (re.compile(r"volt|^V(?![^\W\d_])|spannung|^ch|signal|tens|^ai?\d|ampl", re.IGNORECASE), "V"),
     (re.compile(r"force|kraft|forza|fuerza", re.IGNORECASE), "N"),
 )
 
@@ -106,9 +114,36 @@ def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple
 
 
 def _candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
-    """Return the possible channels if the user names none: the lengths, or else all but auxiliary columns."""
+    """Return the possible channels if the user names none, likely ones first.
+
+    They are the lengths, or else all but auxiliary columns. What counts evenly or never changes does not oscillate.
+    """
     fit = [each for each in channels if not each[1].aside] or channels
-    return [each for each in fit if each[1].is_length] or fit
+    fit = [each for each in fit if _varies(_some_of(each[1]))] or fit
+    fit = [each for each in fit if each[1].is_length] or fit
+    return sorted(fit, key=lambda each: _unlikely(each[1]))
+
+
+def _varies(values: F8) -> bool:
+    """Return whether numbers neither stay the same nor rise or fall in equal steps."""
+    steps = np.diff(values)
+    return not steps.size or bool(np.ptp(steps) > 1e-9 * np.abs(steps).max())
+
+
+def _unlikely(column: Column) -> tuple[bool, bool, float]:
+    """Return a key that puts likely channels first: positions, then by unit, the axis that moves most before others."""
+    plain = column.name.lower()
+    named = column.is_length or bool(_POSITION.search(plain))
+    derived = bool(_DERIVED.search(plain))
+    known = column.measure is not None
+    some = _some_of(column)
+    return derived, not named, -float(np.std(some)) if known and some.size else 0.0
+
+
+def _some_of(column: Column) -> F8:
+    """Return numbers from all over a column."""
+    some = column.values[:: max(1, column.values.size // _SOME)]
+    return some[np.isfinite(some)]
 
 
 def _run_of_name(path: str, runs: Sequence[str], run: str | None) -> str:
@@ -127,6 +162,7 @@ def _index_of_name(path: str, what: Missing, names: Sequence[tuple[str, ...]], w
         lambda forms: wanted in forms,
         lambda forms: _plain(wanted) in map(_plain, forms),
         lambda forms: what is Missing.RUN and number.fullmatch(forms[0]),
+        lambda forms: what is Missing.CHANNEL and wanted.strip() and _plain(forms[-1]).startswith(_plain(wanted)),
     ):
         if alike := [at for at, forms in enumerate(names) if fits(forms)]:
             break
@@ -183,7 +219,7 @@ def _missing_times(columns: Sequence[Column], table: Table, column: Column, answ
     if table.times is None or table.formula is not None or time_unit(table.times.unit) is not None:
         return []
     first = _first_numbers(table.times)
-    if table.times.unit or (first.size > 1 and float(median(np.diff(first))) >= _SLOW_S):
+    if table.times.unit or (first.size > 1 and (float(median(np.diff(first))) >= _SLOW_S or _are_days(first))):
         unit, name = table.times.unit, table.times.name
         return [MissingItem(Missing.TIME_UNIT, tuple(TIMES), _likely_time_unit(first), of=name, stated=unit)]
     return []
@@ -200,8 +236,16 @@ def _likely_time_unit(times: F8) -> str:
     """Return the most likely unit of times, judging by their size and their steps."""
     if times.size < 2:
         return "ms"
+    if _are_days(times):
+        return "d"
     since_1970 = next((unit for from_size, unit in _EPOCHS if times[0] >= from_size), None)
     return since_1970 or ("us" if median(np.diff(times)) >= 1000.0 else "ms")
+
+
+def _are_days(times: F8) -> bool:
+    """Return whether times are rather fractions of a day, as Excel shows a time that is formatted as a number."""
+    step = median(np.diff(times))
+    return bool(_DAY_STEPS[0] < step < _DAY_STEPS[1] and times[0] > _LATE * step)
 
 
 def _restarts(times: Column) -> bool:

@@ -136,6 +136,8 @@ def tables_of_text(
     found = header([line.text for line in head] or [""])
     if found is None or not head:
         raise FormatError(path, f"expected {expected}", "export the run again", line=1)
+    if found.refused is not None:
+        raise FormatError(path, *found.refused, line=found.lines + 1)
     begins = [(head[0], found)]
     if blocks is not None and isinstance(text, Text):
         begins += islice(blocks(text, found), _MOST_RUNS)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from acquisition.recordings.units import measure_of, time_unit
+from acquisition.recordings.units import measure_of, time_unit, unit_words
 
 
 def words(text: str) -> frozenset[str]:
@@ -16,7 +16,8 @@ def words(text: str) -> frozenset[str]:
 
 
 _TIME_WORDS = words(
-    "time times t elapsed timestamp seconds secs millis milliseconds micros zeit tempo tempi temps tiempo tiempos tijd "
+    "time times t elapsed timestamp seconds sec secs seg millis milliseconds ms micros microseconds us µs μs nanos "
+    "nanoseconds ns zeit tempo tempi temps tiempo tiempos tijd "
     "tid czas čas aika idő zaman время 时间 時間 시간"
 )
 _BESIDE_TIME = words(
@@ -89,6 +90,8 @@ def heading_of(cell: str) -> tuple[str, str]:
     name, unit = name_and_unit(cell)
     if unit:
         return name, unit
+    if is_time(name) and time_unit(name) is not None:  # nanoseconds, ms
+        return name, unit_words(name)
     for form in (_SLASH, _TAIL, _IN):
         match = form.fullmatch(name)
         if match and (form is _SLASH or _ends(match["name"], match["unit"])):
@@ -97,8 +100,8 @@ def heading_of(cell: str) -> tuple[str, str]:
 
 
 def _ends(name: str, unit: str) -> bool:
-    """Return whether the end of a name is its unit; h is a unit only for a time."""
-    if unit in _NO_TAIL or (unit == "h" and not is_time(name)):
+    """Return whether the end of a name is its unit; h and d are units only for a time."""
+    if unit in _NO_TAIL or (unit in ("h", "d") and not is_time(name)):
         return False
     return measure_of(unit) is not None or time_unit(unit) is not None
 

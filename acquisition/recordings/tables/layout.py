@@ -31,6 +31,7 @@ _SETTING = re.compile(r"[=]|:(?!\s*$)")
 _LONGEST_NAME = 5  # maximum number of words
 _BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
+_SEP = re.compile(r"[\ufeff\"]*sep=(.)")  # a line of Excel
 _NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
 _FIRST_NUMBERS = 10  # row numbers begin below this; the first may be missing, in rows unlike the others
@@ -75,11 +76,23 @@ def find_table(lines: tuple[str, ...]) -> Layout | None:
     separator gives the earliest rows; among several such separators, it is one that also fits a line of names.
     """
     found = []
-    for order, mark in enumerate(_MARKS):
+    stated = _SEP.match(lines[0]) if lines else None
+    for order, mark in enumerate(stated[1] if stated else _MARKS):
         # Without its mark each line is a single cell, a case that the first separator has covered.
         if (not order or not mark or any(mark in each for each in lines)) and (table := _split_by(lines, mark)):
-            found.append(((table.at, not table.named, order), table))
+            found.append(((table.at, not table.named, not _is_separator(table), order), table))
     return min(found)[1] if found else None
+
+
+def _is_separator(table: Layout) -> bool:
+    """Return whether commas between integers are separators: there are as many names, or the first column counts."""
+    names = [each.name for each in table.headings]
+    if table.mark != "," or len(names) < 2:
+        return False
+    if table.named:
+        return all(names) and len(_with_units(names)) == len(names)
+    first = columns_of(table.rows)[0]
+    return runs_forward(first) and _is_even(first) and bool((first == np.rint(first)).all())
 
 
 def _split_by(lines: Sequence[str], mark: str) -> Layout | None:
@@ -187,6 +200,8 @@ def _splits(line: str, mark: str, width: int) -> Iterator[list[str]]:
     by_mark = split_heading(line) if any(each in line for each in "\t;,") else ([line], "")
     own = [cell.strip().strip('"') for cell in line.split(mark)] if mark and '"' not in line else by_mark[0]
     if mark and mark in line:
+        if len(merged := _with_units(own)) == width < len(own):
+            yield merged
         while len(own) > width and not own[-1]:
             own.pop()
         if len(own) >= width or 2 * len(own) > width > 2:
@@ -202,6 +217,30 @@ def _splits(line: str, mark: str, width: int) -> Iterator[list[str]]:
         yield tokens
 
 
+def _with_units(names: Sequence[str]) -> list[str]:
+    """Return names to which the units behind them were joined: a comma may separate both, as in ``Time, s``."""
+    joined: list[str] = []
+    for name in names:
+        if joined and _is_unit(name) and not _is_unit(joined[-1]):
+            joined[-1] += f" ({name})"
+        else:
+            joined.append(name)
+    return joined
+
+
+def _is_unit(text: str) -> bool:
+    return text != "1" and (measure_of(text) is not None or time_unit(text) is not None)
+
+
+def wrong_commas(table: Layout) -> bool:
+    """Return whether the times alone have decimal commas in rows that commas separate: more cells than names."""
+    names, width = sum(1 for each in table.headings if each.name), len(table.headings)
+    if table.mark != "," or names < 2 or width not in (names + 1, 2 * names) or not table.headings[names - 1].name:
+        return False
+    times = columns_of([[f"{row[0]}.{row[1]}" if row[-1] else row[0]] for row in table.rows])[0]
+    return runs_forward(times) and _is_even(times)
+
+
 def _are_units(cells: Sequence[str]) -> bool:
     """Return whether a line contains units: at least half of its words are units or bracketed, and none means time."""
     filled = [cell for cell in cells if cell]
@@ -211,7 +250,11 @@ def _are_units(cells: Sequence[str]) -> bool:
         if parse_number(cell) is None
         for plain in (cell.strip(" ()[]"),)
     ]
-    return bool(known) and sum(known) * 2 >= len(known) and not any(is_time(cell) for cell in filled)
+    return (
+        bool(known)
+        and sum(known) * 2 >= len(known)
+        and not any(is_time(cell) and not _is_unit(cell.strip(" ()[]")) for cell in filled)
+    )
 
 
 def columns_of(rows: Sequence[Sequence[str]]) -> list[F8]:

@@ -143,6 +143,8 @@ class Header(Stated):
         A column of times of day.
     brackets : bool
         Whether rows are a matrix of MATLAB, in brackets and with semicolons at their ends.
+    refused : tuple of str or None
+        Why the rows cannot be read, and what to do.
     """
 
     why: str
@@ -151,6 +153,7 @@ class Header(Stated):
     headings: Sequence[Heading]
     clock: int | None = None
     brackets: bool = False
+    refused: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

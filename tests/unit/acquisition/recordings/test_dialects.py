@@ -120,8 +120,8 @@ HEADINGS: dict[str, tuple[str, str, float, Said]] = {
     "Tracker": ("masse A\t\nt\tθ\tω\n" + rows("{t:.4f}\t{x:.4f}\t{y}"), "θ", 1.0, {CH: "θ", "--unit": "rad"}),
     "Kinovea": ("Time (ms);X (cm)\n" + commas("{ms};{x}"), "X", 1e-2, {}),
     "units beside the numbers": (rows("{x:.4f} cm"), "column 1", 1e-2, {"--rate-hz": "20"}),
-    "millis and underscores": ("millis\tdist_cm\n" + rows("{ms}\t{x:.4f}"), "dist", 1e-2, {"--time-unit": "ms"}),
-    "micros": ("micros,dist_mm\n" + rows("{us},{x:.4f}"), "dist", 1e-3, {"--time-unit": "us"}),
+    "millis and underscores": ("millis\tdist_cm\n" + rows("{ms}\t{x:.4f}"), "dist", 1e-2, {}),
+    "micros": ("micros,dist_mm\n" + rows("{us},{x:.4f}"), "dist", 1e-3, {}),
     "words of a sketch": (
         "Initialize MPU6050...\nOK\nTime(ms),AccX\n" + rows("{ms},{x:.4f}"),
         *("AccX", 9.80665, {"--unit": "g"}),
@@ -147,7 +147,7 @@ HEADINGS: dict[str, tuple[str, str, float, Said]] = {
     "Physics Toolbox, g": ("time (s);ax (g)\n" + commas("{t:.3f};{x}"), "ax", 9.80665, {}),
     "GoPro": (
         "cts,date,Accelerometer [m/s2],1,2\n" + rows(f"{{ms}}.5,2022-03-04T{CLOCK}Z,{{x}},{{y}},{{y}}"),
-        *("Accelerometer", 1.0, {CH: "Accelerometer"}),
+        *("Accelerometer", 1.0, {}),
     ),
     "MATLAB": ("Var1,Var2\n" + rows("{t:.2f},{x}"), "Var2", 1.0, {"--unit": "m"}),
     "Excel": ("sep=;\nTime (s);Position (m)\n" + rows("{t:.2f};{x}"), "Position", 1.0, {}),
