@@ -462,7 +462,6 @@ def test_two_data_sets_below_each_other_are_two_runs(
     read(path, "--run", "Run 2", period_s=PERIOD_S / 0.96)
 
 
-@later
 def test_channels_that_are_declared_and_not_stored_are_left_out(read: Callable[..., Any]) -> None:
     """The frequency of the first group, and what is computed from others."""
     read(cassy(), "--channel", "U_A1", name="run.lab")

@@ -21,6 +21,7 @@ import re
 import tarfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -187,6 +188,9 @@ def _heading(name: str, symbol: str, unit: str) -> Heading:
     return Heading(f"{name} {symbol}".strip(), unit, role=role)
 
 
+_COMPUTED = re.compile(r"10( -?\d+){3}")
+
+
 def _cassy_text(path: str, text: Text) -> list[Table]:
     lines = text.head(_MOST_HEAD_LINES)
     for at, line in enumerate(lines[:-1]):
@@ -205,14 +209,26 @@ def _cassy_text(path: str, text: Text) -> list[Table]:
 
 
 def _described(path: str, above: Sequence[str], width: int) -> list[Heading]:
-    """Return the headings: three lines of words and one line of sixteen settings describe a channel."""
-    described = [
-        tuple(above[at - back].strip() for back in (3, 2, 1))
+    """Return the headings: three lines of words and one line of sixteen settings describe a channel.
+
+    The axis of the spectrum is described after index and time, but has no column; nor have the channels that are
+    computed, whose description begins with a line like ``10 4 0 0``, if there are fewer columns than channels.
+    """
+    places = [
+        at
         for at, line in enumerate(above)
         if at >= 3 and len(cells := line.split()) == 16 and all(parse_number(cell) is not None for cell in cells)
     ]
-    if len(described) == width + 1 and described[2][2] == "Hz":
-        del described[2]  # the axis of the spectrum is described after index and time, but has no column
+    described = [tuple(above[at - back].strip() for back in (3, 2, 1)) for at in places]
+    computed = [
+        any(_COMPUTED.fullmatch(line.strip()) for line in above[before + 1 : at])
+        for before, at in pairwise([-1, *places])
+    ]
+    if len(described) > width and described[2][2] == "Hz":
+        del described[2], computed[2]
+    for at in [at for at, own in enumerate(computed) if own][::-1]:
+        if len(described) > width:
+            del described[at]
     if len(described) != width:
         raise FormatError(path, f"expected {width} channels above the rows, got {len(described)}", _CASSY_EXPORT)
     return [_heading(*each) for each in described]

@@ -163,6 +163,7 @@ def _index_of_name(path: str, what: Missing, names: Sequence[tuple[str, ...]], w
         lambda forms: _plain(wanted) in map(_plain, forms),
         lambda forms: what is Missing.RUN and number.fullmatch(forms[0]),
         lambda forms: what is Missing.CHANNEL and wanted.strip() and _plain(forms[-1]).startswith(_plain(wanted)),
+        lambda forms: what is Missing.CHANNEL and _plain(wanted) in _plain(forms[0]).split(),
     ):
         if alike := [at for at, forms in enumerate(names) if fits(forms)]:
             break

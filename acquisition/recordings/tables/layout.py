@@ -253,7 +253,7 @@ def _are_units(cells: Sequence[str]) -> bool:
     return (
         bool(known)
         and sum(known) * 2 >= len(known)
-        and not any(is_time(cell) and not _is_unit(cell.strip(" ()[]")) for cell in filled)
+        and not any(is_time(cell) and not re.fullmatch(r"[(\[]?[mnuµμ]?s(ec)?[)\]]?", cell) for cell in filled)
     )
 
 
