@@ -110,18 +110,18 @@ def _recognise(path: str, head: bytes) -> Format:
 
 
 def _loaders() -> dict[str, Callable[[], Format]]:
-    """Return what loads each format, in the order in which they are tried: the user's first, and any table last."""
+    """Return what loads each format, in the order in which they are tried: the user's first, the general ones last."""
     loaders: dict[str, Callable[[], Format]] = {}
     if (folder := dialect_folder()).is_dir():
         for each in import_module("acquisition.recordings.families.declared").dialects():
-            if each.name in (*_MODULES, "table"):
+            if each.name in (*_MODULES, "table", "sketch"):
                 where = folder / f"{each.name}.toml"
                 raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')
             loaders[each.name] = partial(_declared, each)
     loaders |= {name: partial(_built_in, module) for name, module in _MODULES.items()}
     for name, entry in entry_points_of("springmass.formats").items():
         loaders.setdefault(name, partial(load_entry, entry, f'format "{name}"', AcquisitionError))
-    return {**loaders, "table": partial(_built_in, "any_table")}
+    return {**loaders, "table": partial(_built_in, "any_table"), "sketch": partial(_built_in, "sketch")}
 
 
 def _declared(each: Format) -> Format:

@@ -112,13 +112,13 @@ def read_rows(
             own_values[-1], own_decimals[-1] = np.nan, UNREAD
         cut = any(column.values.size == count and column.forms[-1] == UNREAD for column in columns)
     if clock is not None and clock < len(columns):
-        _count_from_first(columns[clock])
+        count_from_first(columns[clock])
     words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
     lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, text.zeros)
     return Table(tuple(columns), lines=lines, traps=traps)
 
 
-def _count_from_first(column: Column) -> None:
+def count_from_first(column: Column) -> None:
     """Make times of day seconds since the first one, in place; midnight may lie between them."""
     known = np.flatnonzero(column.forms >= 0)
     if known.size:
@@ -144,7 +144,7 @@ def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Table:
     filled = np.any([column.forms != EMPTY for column in columns], axis=0)
     columns = [Column("", "", column.values[filled], column.forms[filled]) for column in columns]
     if clock is not None:
-        _count_from_first(columns[clock])
+        count_from_first(columns[clock])
     skipped = np.cumsum(filled)[~filled].astype(np.int64)
     lines = Lines(first, int(filled.sum()), skipped, columns[0].forms == UNREAD)
     return Table(tuple(columns), lines=lines)

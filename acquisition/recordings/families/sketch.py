@@ -1,0 +1,88 @@
+"""What sketches print for people, copied from a serial monitor: ``Distance: 26.9 cm``, ``Time:0<TAB>Dist:26.87``.
+
+The numbers of a line are channels by the words before them and the units behind them, as in
+:mod:`acquisition.line_numbers`. A line without them (``Retrying!``) is a row that could not be read. Of one distance in
+two units, the finer one is read. A time of day at the start of each line is the time.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+
+import numpy as np
+
+from acquisition.errors import FormatError
+from acquisition.line_numbers import UNITS, Number, find_distance, has_decimal_comma, numbers
+from acquisition.recordings.tables.cells import CLOCK, UNREAD, clock_times
+from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.headings import Heading, is_time
+from acquisition.recordings.tables.layout import runs_forward
+from acquisition.recordings.tables.rows import count_from_first
+from acquisition.recordings.tables.table import Column, Lines, Table, side_by_side
+from acquisition.recordings.tables.text import head_lines, text_of
+
+_FEWEST, _SHARE, _MOST = 3, 0.6, 40
+_CLOCK = re.compile(rf"\s*\[?(?:{CLOCK.pattern})(?=[\]\s,;|-])", re.ASCII)
+Kind = tuple[tuple[tuple[str, ...], str], ...]
+"""The words and units of the numbers of a line."""
+
+
+def _usual(lines: list[str]) -> tuple[bool, Kind] | None:
+    """Return whether commas are decimal commas, and the usual kind of line; None without words or units."""
+    lines = [line for line in lines if line.strip()][: _MOST + 1][:-1]  # the last may be cut
+    pairs = [match for line in lines if (match := re.search(r"(\d+),\d", line))]
+    marks = Counter(has_decimal_comma(match.string) for match in pairs).most_common(1)
+    # Nothing but a comma between two groups of digits: a clock before it counts.
+    counts = runs_forward(np.array([float(match[1]) for match in pairs]))
+    comma = bool(marks and (marks[0][0] or (marks[0][0] is None and not counts)))
+    kinds = Counter(kind for line in lines if (kind := _kind(numbers(line, decimal_comma=comma))))
+    ((kind, count),) = kinds.most_common(1) or [((), 0)]
+    worded = any(words or unit for words, unit in kind)
+    return (comma, kind) if worded and count >= max(_FEWEST, _SHARE * len(lines)) else None
+
+
+def _kind(found: list[Number]) -> Kind:
+    return tuple((each.label, each.unit) for each in found)
+
+
+def _evidence(head: bytes) -> str:
+    return "the lines are words with numbers, as a sketch prints them" if _usual(head_lines(head)) else ""
+
+
+def _tables(path: str, data: bytes) -> list[Table]:
+    text = text_of(path, data)
+    usual = _usual([line.text for line in text.head(_MOST + 1)])
+    if usual is None:
+        raise FormatError(path, "expected lines with words and numbers", "export a table of times and positions")
+    comma, kind = usual
+    lines = [(line, numbers(line.text, decimal_comma=comma)) for line in text.lines()]
+    like = [_kind(found) == kind for _, found in lines]
+    first, stop = like.index(True), len(like) - like[::-1].index(True)
+    filled = np.array([bool(line.text.strip()) for line, _ in lines[first:stop]])
+    rows = [(line.text, found if alike else []) for (line, found), alike in zip(lines, like, strict=True)][first:stop]
+    rows = [row for row, own in zip(rows, filled, strict=True) if own]
+    distance = find_distance(*rows[0])
+    headings, columns = [], []
+    for at, (words, unit) in enumerate(kind):
+        name = " ".join(words[:-1] if len(words) > 1 and words[-1] in UNITS else words).capitalize()
+        is_other = distance is not None and rows[0][1][at].start != distance.start
+        headings.append(
+            Heading(
+                name, "" if unit == "other" else unit, role="time" if is_time(name) else "aside" if is_other else ""
+            )
+        )
+        values = np.array([found[at].value if found else np.nan for _, found in rows])
+        forms = [round(-np.log10(found[at].step)) if found else UNREAD for _, found in rows]
+        columns.append(Column("", "", values, np.array(forms, np.int8)))
+    stamps = [match[0].strip(" [").encode() if (match := _CLOCK.match(line)) else b"" for line, _ in rows]
+    if all(stamp or not found for stamp, (_, found) in zip(stamps, rows, strict=True)):
+        columns.insert(0, Column("", "", *clock_times(stamps)[:2]))
+        count_from_first(columns[0])
+        headings.insert(0, Heading("Time", "s", role="time"))
+    number, skipped = lines[first][0].number, np.cumsum(filled)[~filled].astype(np.int64)
+    where = Lines(number, len(rows), skipped, np.zeros(len(rows), bool), zeros=text.zeros)
+    return side_by_side(Table(tuple(columns), lines=where), headings)
+
+
+FORMAT = ColumnFormat("sketch", "lines of words and numbers that a microcontroller's sketch prints", _evidence, _tables)
