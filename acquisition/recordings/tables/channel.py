@@ -22,6 +22,7 @@ from acquisition.source import ClockKind, Kind, SourceInfo
 
 _LONGEST_S = 1e10
 """Times beyond three hundred years are no times."""
+_HOUR_S, _DAY_S, _MOST_JUMPS = 3600.0, 86400.0, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,9 +116,26 @@ def read_samples(
     flags = flags_of(t, value, unread[where], timing.rate_hz)
     if difference and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
+    found += _jumps(t, timing.rate_hz, line)
     zeros = table.lines.zeros if table.lines else 0
     found += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line)]
     return Samples(path, table, column, measured, t, value, flags, timing, rows.resolution, tuple(found), line, ~unread)
+
+
+def _jumps(t: F8, rate_hz: float, line: Callable[[int], int | None]) -> list[Trap]:
+    """Report where a clock was set forward: by full hours, as for summer time, or by more than a day."""
+    traps = []
+    steps = np.diff(t)
+    for row in np.flatnonzero(steps > _HOUR_S - 2.0 / rate_hz)[:_MOST_JUMPS].tolist():
+        step = float(steps[row])
+        if rate_hz * _HOUR_S > _MOST_JUMPS and (
+            step > _DAY_S or abs((step + 1800.0) % _HOUR_S - 1800.0) < 2.0 / rate_hz
+        ):
+            where = f"lines {line(row)} and {line(row + 1)}" if line(row) else f"samples {row + 1} and {row + 2}"
+            perhaps = "for summer time" if round(step) == _HOUR_S else "during the recording"
+            message = f"the times jump by {step:.0f} s between {where}: the clock was perhaps set {perhaps}"
+            traps.append(Trap("time_jump", message, 1, line(row + 1)))
+    return traps
 
 
 def check_values(samples: Samples, *, length: bool) -> Samples:

@@ -14,7 +14,7 @@ from acquisition.recordings.recording import Recording, Trap
 from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.rows import Sheet, read_rows
-from acquisition.recordings.tables.table import Column, Header, Stated, Table, names_apart, side_by_side
+from acquisition.recordings.tables.table import Column, Header, Stated, Table, names_apart, set_back, side_by_side
 from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
 from acquisition.recordings.units import NUMBER
 
@@ -164,4 +164,4 @@ def _tables(path: str, text: Text | Sheet, begin: Line, header: Header, stop: in
     tables = side_by_side(common, header.headings, header.run)
     if not tables:
         raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
-    return tables
+    return [part for table in tables for part in set_back(table)]

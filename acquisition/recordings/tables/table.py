@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,8 @@ from acquisition.recordings.tables.cells import EMPTY, I1
 from acquisition.recordings.tables.headings import Heading, numbered_apart, role_of
 from acquisition.recordings.units import Measure, measure_of
 
+_SET_BACK, _MOST_SET, _FEWEST_ROWS = 50.0, 3, 50
+"""A clock was set back if it steps back by so many usual steps, at most so often, with so many rows in each part."""
 _ACCELERATION = re.compile(r"acc|beschl|versn|g[-_ ]?f|^a(?![^\W\d_])|^a[xyz](?![^\W_])", re.IGNORECASE)
 
 
@@ -71,6 +74,11 @@ class Column:
         """Whether its unit is a length."""
         return self.measure is not None and self.measure.quantity == "length"
 
+    def part(self, start: int, stop: int) -> Column:
+        """Return some of its rows."""
+        decimals = None if self.decimals is None else self.decimals[start:stop]
+        return replace(self, values=self.values[start:stop], decimals=decimals)
+
     def of_size(self, size: int) -> Column:
         """Return the column with empty cells up to a size."""
         more = size - self.values.size
@@ -99,6 +107,20 @@ class Lines(NamedTuple):
     def line(self, row: int) -> int:
         """Return the one-based line number of a row."""
         return self.first + int(row) + int(np.searchsorted(self.skipped, row, side="right"))
+
+    def part(self, start: int, stop: int) -> Lines:
+        """Return where some of the rows stand."""
+        inside = (self.skipped > start) & (self.skipped < stop)
+        last = stop == self.rows
+        return Lines(
+            self.line(start),
+            stop - start,
+            self.skipped[inside] - start,
+            self.words[start:stop],
+            self.ended or not last,
+            self.cut and last,
+            self.zeros if last else 0,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -211,6 +233,31 @@ def side_by_side(table: Table, headings: Sequence[Heading], run: str = "") -> li
             beside=columns,
         )
         for (own_run, time), own in channels.items()
+    ]
+
+
+def set_back(table: Table) -> list[Table]:
+    """Return the parts of a table whose clock was set back, as runs: few steps back with many rows around each."""
+    if table.times is None or table.lines is None:
+        return [table]
+    t = table.times.of_size(table.lines.rows).values
+    steps = np.diff(t)
+    usual = float(np.nanmedian(np.abs(steps))) if steps.size else 0.0
+    back = np.flatnonzero(steps < 0) + 1
+    edges = [0, *back.tolist(), t.size]
+    clear = bool((steps[back - 1] < -_SET_BACK * usual).all())
+    if not 1 <= back.size <= _MOST_SET or not clear or min(np.diff(edges)) < _FEWEST_ROWS:
+        return [table]
+    return [
+        replace(
+            table,
+            columns=tuple(each.part(start, stop) for each in table.columns),
+            times=table.times.part(start, stop),
+            lines=table.lines.part(start, stop),
+            beside=tuple(each.part(start, stop) for each in table.beside),
+            run=f"{table.run}, part {number}" if table.run else f"Part {number}",
+        )
+        for number, (start, stop) in enumerate(pairwise(edges), 1)
     ]
 
 
