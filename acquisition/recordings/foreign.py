@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import PurePath
 
 from acquisition.errors import FormatError, UnknownFormat
-from acquisition.recordings.tables.text import head_lines
+from acquisition.recordings.tables.text import HEAD_BYTES, head_lines, is_text
 
 _TEXT = 'export time and position as text, tab separated, under a line "Time (s)<TAB>Distance (m)"'
 _AS_CSV = "save the sheet as xlsx or CSV"
@@ -71,4 +71,8 @@ def unknown_format(path: str, head: bytes, names: tuple[str, ...]) -> FormatErro
         return UnknownFormat(path, "expected a recording, got binary data or nothing", _TEXT)
     if head.count(b"\n") + head.count(b"\r") == 0 and len(head) > 4096:
         return UnknownFormat(path, "expected lines of text, got one line without end", _TEXT)
-    return UnknownFormat(path, f"no format recognises it (tried {', '.join(names)})", _TEXT)
+    lines = [line.strip() for line in head_lines(head) if line.strip()]
+    if len(head) < HEAD_BYTES and len(lines) > 1 and is_text(head):
+        looks = f'{len(lines)} lines of text, the first "{lines[0][:40]}"'
+        return UnknownFormat(path, f"not a recording: no format recognises it, it looks like {looks}", _TEXT)
+    return UnknownFormat(path, f"not a recording that a format recognises (tried {', '.join(names)})", _TEXT)

@@ -281,7 +281,6 @@ def test_a_clock_that_was_set_forward_is_a_jump(
     read(tmp_path / "run.csv", "--to", "9.9")
 
 
-@later
 def test_a_clock_that_was_set_back_makes_two_runs(cli: Cli, read: Callable[..., Any], tmp_path: Path) -> None:
     """The end of summer time."""
     path = tmp_path / "run.csv"
@@ -464,7 +463,6 @@ def test_channels_that_are_declared_and_not_stored_are_left_out(read: Callable[.
     read(cassy(), "--channel", "U_A1", name="run.lab")
 
 
-@later
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_that_is_no_recording_is_answered_as_such(cli: Cli, tmp_path: Path, name: str) -> None:
     """One line says what it looks like and what a recording needs; nothing is asked."""

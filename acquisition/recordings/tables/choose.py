@@ -25,6 +25,12 @@ _LATE = 2e4
 """Steps without a unit of this size, so many of them after zero, are rather fractions of a day (0.1 ms to 2 s)."""
 _FIRST_ROWS = 50
 _SOME = 20_000
+_FEWEST_ROWS, _FEWEST_TURNS, _MOST_NAMES = 20, 4, 4
+_OSCILLATES = re.compile(
+    r"(?<![^\W\d_])(dist|pos|abst|weg|height|höhe|altura|range|auslenk|elong|displ|angle|winkel|theta|θ|phi|φ|gyr|rot|"
+    r"vel|acc|beschl|versn|force|kraft|volt|spannung|ch\d|signal|ampl|echo|[xyz](?![^\W_]))|column \d",
+    re.IGNORECASE,
+)
 _SHARE_OF_RESTARTS = 0.2
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Units of times since 1970, each with the minimum of the numbers to which it applies."""
@@ -58,6 +64,8 @@ class Answers:
 
 def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Channel:
     """Return the channel to read, in a table with its times, or ask for everything that is missing in one question."""
+    if answers == Answers() and not any(_may_be_a_recording(table) for table in tables):
+        raise _no_recording(path, tables[0])
     needs: list[MissingItem] = []
     runs = tuple(dict.fromkeys(table.run for table in tables))
     if answers.run is None and len(runs) > 1:
@@ -122,6 +130,32 @@ def _candidates(channels: Sequence[Channel]) -> Sequence[Channel]:
     fit = [each for each in fit if _varies(_some_of(each[1]))] or fit
     fit = [each for each in fit if each[1].is_length] or fit
     return sorted(fit, key=lambda each: _unlikely(each[1]))
+
+
+def _may_be_a_recording(table: Table) -> bool:
+    """Return whether a table has times, or enough rows of something that goes up and down and may oscillate."""
+    if table.is_timed:
+        return True
+    rows = max(column.values.size for column in table.columns)
+    return rows >= _FEWEST_ROWS and any(_may_oscillate(each, len(table.columns) == 1) for each in table.columns)
+
+
+def _may_oscillate(column: Column, alone: bool) -> bool:
+    """Return whether a column turns, and names something that may oscillate or is alone and smooth."""
+    values = column.values[np.isfinite(column.values)][:_SOME]
+    steps = np.diff(values)
+    turns = np.count_nonzero(np.diff(np.sign(steps[steps != 0]))) >= _FEWEST_TURNS
+    named = column.measure is not None or _OSCILLATES.search(column.name)
+    return bool(turns and (named or (alone and np.var(steps) < np.var(values))))
+
+
+def _no_recording(path: str, table: Table) -> FormatError:
+    rows = max(column.values.size for column in table.columns)
+    names = [each.name for each in (table.beside or table.columns) if each.name][:_MOST_NAMES]
+    listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+    problem = f"not a recording: it looks like a table of {rows} rows of {listed}"
+    need = "a recording has a column of times, or a rate, and one that goes up and down, in 20 rows or more"
+    return FormatError(path, problem, f"{need}; if this is one, state its rate or its column of times")
 
 
 def _varies(values: F8) -> bool:

@@ -49,9 +49,12 @@ class ColumnFormat:
         """Return whether there is evidence for this family."""
         return bool(self.evidence(head))
 
+    def _runs(self, path: str, data: bytes) -> list[Table]:
+        return [part for table in self.tables(path, data) for part in set_back(table)]
+
     def read(self, path: str, data: bytes, **answers: Any) -> Recording:
         """Read one channel of one run; see :class:`springmass.extend.Format`."""
-        samples = read_channel(path, self.tables(path, data), Answers(**answers))
+        samples = read_channel(path, self._runs(path, data), Answers(**answers))
         length = samples.measured.quantity == "length" and (samples.column.is_length or not samples.column.unit)
         samples, measured = check_values(samples, length=length), samples.measured
         block = Block(0, samples.t, samples.value, samples.flags, quantity=measured.quantity, unit=measured.si)
@@ -59,7 +62,7 @@ class ColumnFormat:
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Return the description of every channel, as far as the file states it."""
-        channels = [(table, each) for table in names_apart(self.tables(path, data)) for each in table.columns]
+        channels = [(table, each) for table in names_apart(self._runs(path, data)) for each in table.columns]
         surveys = tuple(_survey(path, *each) for each in channels)
         if not any(each.samples for each in surveys):
             rows_of(path, *channels[0], NUMBER)  # raises the error
@@ -164,4 +167,4 @@ def _tables(path: str, text: Text | Sheet, begin: Line, header: Header, stop: in
     tables = side_by_side(common, header.headings, header.run)
     if not tables:
         raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
-    return [part for table in tables for part in set_back(table)]
+    return tables

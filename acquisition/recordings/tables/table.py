@@ -12,6 +12,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.nominal import median
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import EMPTY, I1
 from acquisition.recordings.tables.headings import Heading, numbered_apart, role_of
@@ -242,7 +243,7 @@ def set_back(table: Table) -> list[Table]:
         return [table]
     t = table.times.of_size(table.lines.rows).values
     steps = np.diff(t)
-    usual = float(np.nanmedian(np.abs(steps))) if steps.size else 0.0
+    usual = median(np.abs(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
     back = np.flatnonzero(steps < 0) + 1
     edges = [0, *back.tolist(), t.size]
     clear = bool((steps[back - 1] < -_SET_BACK * usual).all())
