@@ -314,9 +314,9 @@ def test_a_real_file_is_of_one_family_alone(recordings: Path, path: str) -> None
     [
         (MATTIA, (Missing.RUN, Missing.RATE_HZ), ("Run #1", "Run #2")),
         (FILO, (Missing.CHANNEL, Missing.UNIT), ("position", "velocity", "acceleration")),
-        (SHM, (Missing.CHANNEL,), ("Acceleration_0", "Acceleration_1", "Untitled")),
+        (SHM, (Missing.CHANNEL,), ("Acceleration_1", "Acceleration_0", "Untitled")),
         (TDMS, (Missing.CHANNEL, Missing.UNIT), ("Amplitude sweep", "Phase sweep")),
-        (PHYPHOX, (Missing.CHANNEL,), ("Gyroscope x", "Gyroscope y")),
+        (PHYPHOX, (Missing.CHANNEL,), ("Gyroscope x", "Gyroscope z")),
         (TRACKER, (Missing.CHANNEL, Missing.UNIT), ("x", "y", "rad")),
     ],
 )

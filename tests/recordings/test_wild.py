@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.errors import NeedsAnswer
+from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import inspect, open_recording
 from acquisition.recordings.questions import Missing
 from pipeline.analyse import analyse
@@ -134,8 +134,8 @@ TABLE = [
     ),
     Row("scope", "table", "1", 2000, 40000, (-0.025, 0.024975), (9724.24598694, 9724.24598694), "voltage"),
     Row(
-        *("tdisp", "table", "column 2", 10142, 13.2, (1.6270253658294678, 767.7529900074005), (0.105, 0.1515)),
-        *("length", (UNIT,), say(unit="cm")),
+        *("tdisp", "table", "column 2", 7343, 9.58, (1.6412410736083984, 767.7529900074005), (0.3708, 0.1515)),
+        *("length", (Missing.RUN, UNIT), say(unit="cm", run="2")),
     ),
     Row("terr", "table", "θ", 9625, 30, (0, 319.91), (-0.156, 0.001), "angle", (UNIT,), say(unit="rad")),
     Row("tnames", "table", "theta", 2376, 30, (0, 79.229), (0.229270, 0.002382), "angle"),
@@ -154,10 +154,10 @@ TABLE = [
     Row("tunit", "table", "θ", 3027, 30, (0, 100.8667), (-18.56635 * DEG, -0.8148416 * DEG), "angle"),
     Row("vernier", "table", "versnelling", 600, 99.83, (0, 6), (0, 0), "acceleration"),
     Row("waveforms", "table", "Channel 1", 2000, 100, (0, 19.99), (2.622803, 1.641071), "voltage"),
-    Row("lab__", "cassy", "s s", 600, 10, (0, 59.901), (0, 0)),
+    Row("lab__", "cassy", "s s", 600, 10, (0, 59.901), (0, 0), "length", (CHANNEL,), say("s s")),
     Row(
         *("lab__", "cassy", "Spannung U_A1", 600, 10, (0, 59.901), (0.807, 0.8115)),
-        *("voltage", (), say("Spannung U_A1")),
+        *("voltage", (CHANNEL,), say("Spannung U_A1")),
     ),
     Row("labx", "cassy", "Weg s_A1", 1335, 5, (0, 266.81870875), (0.232, -0.004)),
     Row(
@@ -250,11 +250,13 @@ def test_a_dialect_can_be_surveyed(recordings: Path, row: Row) -> None:
     assert row.channel in {each.channel for each in found.surveys}
 
 
-def test_a_workbook_of_results_is_asked_about(recordings: Path) -> None:
-    """Row numbers are no times: of a table of results by hand channel, rate or time, and unit are asked."""
-    with pytest.raises(NeedsAnswer) as caught:
+def test_a_workbook_of_results_is_no_recording(recordings: Path) -> None:
+    """Row numbers are no times: a table of results by hand is answered as such, unless a rate is stated."""
+    with pytest.raises(FormatError, match="not a recording"):
         open_recording(only(recordings, "xlsx"))
-    assert caught.value.question.missing == (CHANNEL, RATE, UNIT)
+    with pytest.raises(NeedsAnswer) as caught:
+        open_recording(only(recordings, "xlsx"), rate_hz=1.0)
+    assert caught.value.question.missing == (CHANNEL, UNIT)
 
 
 def test_every_wild_file_has_a_row(recordings: Path) -> None:
@@ -276,14 +278,14 @@ OSCILLATE = (
         "runhead",
         "tracker",
     ),
-    *("trkerr", "tunit", "labx", "trk__", "xyerr", "terr", "tnames", "scope"),
+    *("trkerr", "tunit", "labx", "trk__", "xyerr", "terr", "tnames", "scope", "tdisp"),
 )
 STROKES = ("ecp",)
 BEAT = ("anglelog", "torsione", "waveforms", "xy_", "csvnames")
 """Those whose one sinusoid of the whole record says little: set going, held or driven for a while."""
 DO_NOT = (
     *("capstone", "fluids", "ga-csv", "lvm__spikelucky__test.lvm", "lvm__spikelucky__test2"),
-    *("lvm__spikelucky__hyd", "pendser", "phyphox__tomas", "vernier", "lab__", "cmbl", "tdisp"),
+    *("lvm__spikelucky__hyd", "pendser", "phyphox__tomas", "vernier", "lab__", "cmbl"),
     *("phyphox__Ckenz0", "zip__", "phyphoxfile"),
 )
 
