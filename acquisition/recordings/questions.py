@@ -6,8 +6,11 @@ answer, because a command line and a script give answers in different ways.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+
+_MOST_LISTED = 8
 
 
 class Missing(StrEnum):
@@ -48,8 +51,13 @@ class MissingItem:
     instead: MissingItem | None = None
 
     def __str__(self) -> str:
-        """Return the question without its question mark: ``which channel of "x", "y"``."""
-        listed = ", ".join(f'"{each}"' for each in self.choices)
+        """Return the question without its question mark: ``which channel of "x", "y" (x is an example)``."""
+        example = f"{self.example:g}" if isinstance(self.example, float) else self.example
+        return f"{self._question} ({example} is an example)"
+
+    @property
+    def _question(self) -> str:
+        listed = _listed(self.choices)
         match self.what:
             case Missing.RUN:
                 return f"which of the {len(self.choices)} runs {listed}"
@@ -122,7 +130,11 @@ class Question:
     def sentence(self) -> str:
         """The question in one sentence."""
         times = f'"{self.times}"' if isinstance(self.times, str) and self.times else str(self.times)
-        *others, last = [*([times] if times else []), *(f'"{each}"' for each in self.columns)] or [""]
+        # The question lists the channels itself if it asks for one.
+        shown = () if Missing.CHANNEL in self.missing else self.columns[:_MOST_LISTED]
+        more = len(self.columns) - len(shown) if shown else 0
+        named = [*([times] if times else []), *(f'"{each}"' for each in shown), *([f"{more} more"] if more else [])]
+        *others, last = named or [""]
         columns = f"columns {', '.join(others)} and {last}" if others else last and f"column {last}"
         about = ", ".join(each for each in (self.reason, columns) if each)
         questions = ", and ".join(str(need) for need in self.needs)
@@ -132,6 +144,13 @@ class Question:
     def remedy(self) -> str:
         """The instruction to the user, in words that do not depend on the interface."""
         return f"state {', and '.join(_stated(need) for need in self.needs)}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return at most eight names in quotes, and how many there are besides."""
+    more = len(names) - _MOST_LISTED
+    shown = ", ".join(f'"{each}"' for each in names[:_MOST_LISTED])
+    return f"{shown} and {more} more" if more > 0 else shown
 
 
 def _stated(need: MissingItem) -> str:

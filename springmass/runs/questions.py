@@ -6,7 +6,7 @@ import re
 import shlex
 from collections.abc import Mapping, Sequence
 
-from acquisition.recordings.questions import Missing, Question
+from acquisition.recordings.questions import Question
 
 __all__ = ["as_arguments", "as_options", "for_command", "for_course", "for_python", "option_of", "quoted"]
 
@@ -74,7 +74,7 @@ def for_command(question: Question, words: Sequence[str], given: Mapping[str, ob
 
     Examples
     --------
-    >>> from acquisition.recordings.questions import MissingItem
+    >>> from acquisition.recordings.questions import Missing, MissingItem
     >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
     >>> for_command(question, ["springmass", "convert", "run.csv", "run.h5"], {"channel": "theta"})
     'springmass convert run.csv run.h5 --channel theta --unit rad'
@@ -84,13 +84,13 @@ def for_command(question: Question, words: Sequence[str], given: Mapping[str, ob
         # Options follow, so ``./`` is put before a file name that begins with a minus sign.
         at = list(words).index("--")
         words = [*words[:at], *(f"./{word}" if word.startswith("-") else word for word in words[at + 1 :])]
-    return " ".join(each for each in (*map(quoted, words), kept, _examples_as_options(question)) if each)
+    return " ".join(each for each in (*map(quoted, words), kept, as_options(question.examples)) if each)
 
 
 def for_course(question: Question) -> str:
     """Return how to answer a question about one recording of a course: in the table of runs, or for all recordings."""
     columns = ", ".join(question.missing)
-    return f"fill in {columns} in the table of runs, or give batch {_examples_as_options(question)} for all recordings"
+    return f"fill in {columns} in the table of runs, or give batch {as_options(question.examples)} for all recordings"
 
 
 def for_python(question: Question, function: str, given: Mapping[str, object]) -> str:
@@ -106,25 +106,14 @@ def for_python(question: Question, function: str, given: Mapping[str, object]) -
 
     Examples
     --------
-    >>> from acquisition.recordings.questions import MissingItem
+    >>> from acquisition.recordings.questions import Missing, MissingItem
     >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
     >>> for_python(question, "springmass.load", {"channel": "theta"})
     'springmass.load("run.csv", channel="theta", unit="rad")'
     """
     kept = as_arguments(_without(given, question))
-    examples = ", ".join(
-        f"{name}=R" if name == Missing.RATE_HZ else as_arguments({name: value})
-        for name, value in question.examples.items()
-    )
+    examples = as_arguments(question.examples)
     return f"{function}({', '.join(each for each in (_literal(question.path), kept, examples) if each)})"
-
-
-def _examples_as_options(question: Question) -> str:
-    # The placeholder R is used because an example rate would be copied as if it were the file's own.
-    return " ".join(
-        f"{option_of(name)} R" if name == Missing.RATE_HZ else as_options({name: value})
-        for name, value in question.examples.items()
-    )
 
 
 def _without(given: Mapping[str, object], question: Question) -> dict[str, object]:

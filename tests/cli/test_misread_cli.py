@@ -389,7 +389,6 @@ def test_row_numbers_and_constants_are_not_proposed(cli: Cli, read: Callable[...
     read(path, "--unit", "m")
 
 
-@later
 def test_a_question_names_at_most_eight_channels_and_one_whole_command(cli: Cli, tmp_path: Path) -> None:
     """The likely ones first, with an example that is marked as such."""
     names = [f"raw{i}" for i in range(14)] + ["position"]
