@@ -7,8 +7,8 @@ The module of a format is imported on demand. Another package adds a format with
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from typing import Any, cast
@@ -18,7 +18,7 @@ from acquisition.extensions import entry_points_of, load_entry
 from acquisition.recordings.base import Format, Survey, SurveyFormat, dialect_folder, read_bytes
 from acquisition.recordings.foreign import unknown_format
 from acquisition.recordings.recording import Recording
-from acquisition.recordings.tables.text import HEAD_BYTES
+from acquisition.recordings.tables.text import HEAD_BYTES, restated
 
 _MODULES = {
     "motion-sensor": "motion_sensor",
@@ -71,14 +71,23 @@ def open_recording(
     *,
     format: str | None = None,
     velocity_path: str | os.PathLike[str] | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
     **answers: Any,
 ) -> Recording:
     """Read a recording of another program; if anything is missing or faulty, the error says so in one line.
 
     By default the format is identified by content. The answers are what the file does not state or leaves open; see
-    :meth:`springmass.extend.Format.read`. A velocity file is joined with the position file by time.
+    :meth:`springmass.extend.Format.read`. A velocity file is joined with the position file by time. The separator of
+    cells and the decimal mark of a text are found out unless they are stated.
     """
     name = os.fspath(path)
+    if delimiter or decimal:
+        original = read_bytes(path)
+        data = restated(name, original, delimiter, decimal)
+        reader = get_format(format) if format else _recognise(name, data[:HEAD_BYTES])
+        recording = _read(reader, name, data, answers)
+        return replace(recording, originals=(replace(recording.originals[0], data=original), *recording.originals[1:]))
     reader = get_format(format) if format else _recognise(name, read_bytes(path, HEAD_BYTES))
     data = read_bytes(path)
     if velocity_path is not None:
@@ -88,16 +97,24 @@ def open_recording(
             raise UnknownFormat(name, problem, "leave the velocity file out")
         velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
         return cast(Recording, read_pair((name, data), velocity, rate_hz=answers.get("rate_hz")))
+    return _read(reader, name, data, answers)
+
+
+def _read(reader: Format, name: str, data: bytes, answers: Mapping[str, Any]) -> Recording:
     return reader.read(name, data, **{name: answer for name, answer in answers.items() if answer is not None})
 
 
-def inspect(path: str | os.PathLike[str]) -> Inspection:
+def inspect(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None) -> Inspection:
     """Return the format and the content of a file, before a channel is chosen."""
-    head = read_bytes(path, HEAD_BYTES)
+    if delimiter or decimal:
+        data = restated(os.fspath(path), read_bytes(path), delimiter, decimal)
+        head = data[:HEAD_BYTES]
+    else:
+        data, head = b"", read_bytes(path, HEAD_BYTES)
     reader = _recognise(os.fspath(path), head)
     if not isinstance(reader, SurveyFormat):
         return Inspection(reader.name, reader.title, "", ())
-    surveys = reader.survey(os.fspath(path), read_bytes(path))
+    surveys = reader.survey(os.fspath(path), data or read_bytes(path))
     return Inspection(reader.name, reader.title, reader.evidence(head), surveys)
 
 

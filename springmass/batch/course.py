@@ -24,7 +24,20 @@ from springmass.values import ANY_LAW
 
 __all__ = ["Course", "Entry", "join", "read_course", "template"]
 
-ANSWERS = ("velocity", "channel", "run", "rate_hz", "unit", "time", "time_unit", "from_s", "to_s", "clock_ppm")
+ANSWERS = (
+    "velocity",
+    "channel",
+    "run",
+    "rate_hz",
+    "unit",
+    "time",
+    "time_unit",
+    "delimiter",
+    "decimal",
+    "from_s",
+    "to_s",
+    "clock_ppm",
+)
 NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
 POSITION = "sensor_position"
 LAW = "law"

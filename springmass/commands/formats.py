@@ -95,7 +95,7 @@ def _describe(path: Path, read: ReadOptions, *, as_json: bool) -> dict[str, Any]
         samples = loaded.samples
         survey = Survey("", loaded.channel, samples.unit, len(samples), loaded.info.rate_hz, loaded.traps)
         return {**_file(path, Inspection(kind, OURS[kind], _WHY[kind], (survey,))), **_facts(loaded)}
-    found = inspect(path)
+    found = inspect(path, delimiter=read.delimiter, decimal=read.decimal)
     facts = _file(path, found)
     try:
         return {**facts, **_facts(load(path, read))}

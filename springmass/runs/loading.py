@@ -39,7 +39,7 @@ __all__ = ["Loaded", "between", "cut", "kind_of", "load", "sample_data"]
 
 UNVERIFIED = "unverified"
 NAMED = 5  # maximum number of differences that a message names
-_OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", "time_unit"})
+_OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", "time_unit", "delimiter", "decimal"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +160,8 @@ def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
                 run=options.run,
                 time=options.time,
                 time_unit=options.time_unit,
+                delimiter=options.delimiter,
+                decimal=options.decimal,
                 velocity_path=options.velocity,
             ),
         )

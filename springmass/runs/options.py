@@ -29,6 +29,8 @@ class ReadOptions:
     channel, rate_hz, unit, run, time, time_unit : optional
         What the file leaves out or leaves open. Of a wire log of several sensors ``channel`` names one, by its number
         or its port.
+    delimiter, decimal : str or None
+        Separator of the cells and decimal mark of a text, which are found out unless they are stated.
     from_s, to_s : float or None
         Use samples of these seconds only; the others stay in the file.
     unverified : bool
@@ -55,8 +57,13 @@ class ReadOptions:
         str | None, Parameter(metavar="NAME", help="column with the times if the file does not state it")
     ] = None
     time_unit: Annotated[
-        str | None, Parameter(metavar="U", help="unit of the times if the file does not state it: s, ms, us, ns, min")
+        str | None, Parameter(metavar="U", help="unit of the times if the file does not state it: s, ms, us, min, h, d")
     ] = None
+    delimiter: Annotated[
+        str | None,
+        Parameter(metavar="C", help="separator of a text's cells, else found out: comma, tab, space, ';' ..."),
+    ] = None
+    decimal: Annotated[str | None, Parameter(metavar="C", help="decimal mark of a text, else found out: . or ,")] = None
     unverified: Annotated[bool, Parameter(help="read a run file despite a checksum mismatch")] = False
     from_s: Annotated[Finite | None, Parameter(name="--from", metavar="S", help="use samples from this time on, s")] = (
         None

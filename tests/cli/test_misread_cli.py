@@ -341,7 +341,6 @@ def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, t
     assert "export" in done.complaint
 
 
-@later
 @pytest.mark.parametrize(
     ("content", "options"),
     [

@@ -12,6 +12,7 @@ from acquisition.errors import FormatError
 
 HEAD_BYTES = 8192
 """Number of bytes at the start of a file from which a format recognises it."""
+_DELIMITERS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n\r\f\x1a")
 _FOREIGN = re.compile(rb"[\x80-\xff]+[\x21-\x7e]?")
 _HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
@@ -99,6 +100,29 @@ class Text:
                 end = whole
             yield self.data[start:end]
             start = end
+
+
+def restated(path: str, data: bytes, delimiter: str | None, decimal: str | None) -> bytes:
+    """Return a text with tabs between its cells and decimal points, given its separator and its decimal mark.
+
+    If only a decimal point is given, commas separate the cells unless tabs or semicolons do.
+    """
+    mark = _DELIMITERS.get((delimiter or "").lower(), delimiter or "")
+    allowed = len(mark) < 2 and not mark.isalnum() and mark not in tuple('.+-"') and (not mark or mark != decimal)
+    if not allowed or decimal not in (None, ".", ","):
+        problem = f"delimiter must be one mark like , ; tab or space, and decimal . or , (got {delimiter}, {decimal})"
+        raise FormatError(path, problem, "state those of the file")
+    own = text_of(path, data)
+    text = re.sub("\r\n?", "\n", decode(own.data[own.start : own.stop]))
+    if not mark and decimal == "." and not re.search("[\t;]", text):
+        mark = ","
+    lines = text.split("\n")
+    if mark:
+        cells = rf'{re.escape(mark)}(?=(?:[^"]*"[^"]*")*[^"]*$)' if mark != " " else r"\s+"
+        lines = ["\t".join(re.split(cells, line.strip(" "))) for line in lines]
+    if decimal == ",":
+        lines = [re.sub(r"(?<=\d),(?=\d)", ".", line) for line in lines]
+    return "\n".join(lines).encode()
 
 
 def text_of(path: str, data: bytes) -> Text:
