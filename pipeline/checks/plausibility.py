@@ -24,6 +24,7 @@ MOST_GRAVITIES = 1.2
 LONGEST_SAG_M = 25.0  # maximum extension of the spring by the bob at rest, m: 25 m correspond to a period of 10 s
 # Minimum number of samples per period: below two the frequency is aliased, and below four noise decides.
 FEWEST_PER_PERIOD = 4.0
+COUNTED = 0.1  # minimum share of negative values in positions counted from a place in the midst of the motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,10 @@ def check_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase
     if track.unit == "m" and y.size and track.y[0] != 0.0:
         low_m, high_m = float(np.min(y)), float(np.max(y))
         mean = abs(float(np.mean(demodulated.offset)))
-        if out_of_range := low_m <= 0.0 or high_m > FARTHEST_M or amplitude > mean:
+        # Positions counted from rest have both signs; no sensor of distances gives many negative ones.
+        counted = float(np.mean(y < 0.0)) >= COUNTED
+        impossible = max(high_m, -low_m) > FARTHEST_M
+        if out_of_range := impossible or (not counted and (low_m <= 0.0 or amplitude > mean)):
             misfits.append(Misfit(name="implausible_distance", offset_m=max(amplitude, mean)))
     return Plausibility(
         per_period < FEWEST_PER_PERIOD,

@@ -35,9 +35,11 @@ def test_times_in_another_unit() -> None:
     assert codes(0.05, 1.0 / 9.0, rate_hz=10.0, seconds=200.0) == set()
 
 
-def test_velocity_read_as_distance() -> None:
-    """What is negative half of the time is no distance."""
-    assert "implausible_distance" in codes(0.4, 1.32, rest=0.0)
+def test_positions_of_both_signs_are_counted_from_rest() -> None:
+    """They are ordinary in files of videos and of zeroed sensors, unless they are out of all range."""
+    assert codes(0.05, 1.32, rest=0.0) == set()
+    assert "implausible_distance" in codes(0.05, 1.32, rest=0.049)
+    assert "implausible_distance" in codes(13.0, 1.32, rest=0.0)
 
 
 def test_what_cannot_be_is_uncertain_by_as_much() -> None:
