@@ -68,9 +68,12 @@ def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Chan
         raise _no_recording(path, tables[0])
     needs: list[MissingItem] = []
     runs = tuple(dict.fromkeys(table.run for table in tables))
-    if answers.run is None and len(runs) > 1:
-        needs.append(MissingItem(Missing.RUN, runs, runs[0]))
-    run = _run_of_name(path, runs, answers.run)
+    sizes = {run: max(_rows(table) for table in tables if table.run == run) for run in runs}
+    run = max(runs, key=lambda each: sizes[each])  # the first of the longest
+    if answers.run is not None:
+        run = _run_of_name(path, runs, answers.run)
+    elif len(runs) > 1:
+        needs.append(MissingItem(Missing.RUN, runs, run))
     channels = [(table, column) for table in tables if table.run == run for column in table.columns]
     if answers.channel is not None:
         names = [(each.name, each.label) for _, each in channels]
@@ -136,8 +139,11 @@ def _may_be_a_recording(table: Table) -> bool:
     """Return whether a table has times, or enough rows of something that goes up and down and may oscillate."""
     if table.is_timed:
         return True
-    rows = max(column.values.size for column in table.columns)
-    return rows >= _FEWEST_ROWS and any(_may_oscillate(each, len(table.columns) == 1) for each in table.columns)
+    return _rows(table) >= _FEWEST_ROWS and any(_may_oscillate(each, len(table.columns) == 1) for each in table.columns)
+
+
+def _rows(table: Table) -> int:
+    return max(column.values.size for column in table.columns)
 
 
 def _may_oscillate(column: Column, alone: bool) -> bool:
@@ -150,10 +156,9 @@ def _may_oscillate(column: Column, alone: bool) -> bool:
 
 
 def _no_recording(path: str, table: Table) -> FormatError:
-    rows = max(column.values.size for column in table.columns)
     names = [each.name for each in (table.beside or table.columns) if each.name][:_MOST_NAMES]
     listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
-    problem = f"not a recording: it looks like a table of {rows} rows of {listed}"
+    problem = f"not a recording: it looks like a table of {_rows(table)} rows of {listed}"
     need = "a recording has a column of times, or a rate, and one that goes up and down, in 20 rows or more"
     return FormatError(path, problem, f"{need}; if this is one, state its rate or its column of times")
 
@@ -180,10 +185,8 @@ def _some_of(column: Column) -> F8:
     return some[np.isfinite(some)]
 
 
-def _run_of_name(path: str, runs: Sequence[str], run: str | None) -> str:
-    if run is None or run == runs[0]:
-        return runs[0]
-    if runs == ("",):
+def _run_of_name(path: str, runs: Sequence[str], run: str) -> str:
+    if runs == ("",) and run:
         raise FormatError(path, f'the file has one run without a name, got run "{run}"', "leave run out")
     return runs[_index_of_name(path, Missing.RUN, [(each,) for each in runs], run)]
 
