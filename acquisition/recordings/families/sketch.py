@@ -23,6 +23,7 @@ from acquisition.recordings.tables.table import Column, Lines, Table, side_by_si
 from acquisition.recordings.tables.text import head_lines, text_of
 
 _FEWEST, _SHARE, _MOST = 3, 0.6, 40
+_BRACKETS = re.compile(r"\s*[(\[]")  # as Python prints tuples and lists
 _CLOCK = re.compile(rf"\s*\[?(?:{CLOCK.pattern})(?=[\]\s,;|-])", re.ASCII)
 Kind = tuple[tuple[tuple[str, ...], str], ...]
 """The words and units of the numbers of a line."""
@@ -38,7 +39,7 @@ def _usual(lines: list[str]) -> tuple[bool, Kind] | None:
     comma = bool(marks and (marks[0][0] or (marks[0][0] is None and not counts)))
     kinds = Counter(kind for line in lines if (kind := _kind(numbers(line, decimal_comma=comma))))
     ((kind, count),) = kinds.most_common(1) or [((), 0)]
-    worded = any(words or unit for words, unit in kind)
+    worded = any(words or unit for words, unit in kind) or all(_BRACKETS.match(line) for line in lines[-_FEWEST:])
     return (comma, kind) if worded and count >= max(_FEWEST, _SHARE * len(lines)) else None
 
 
@@ -65,7 +66,8 @@ def _tables(path: str, data: bytes) -> list[Table]:
     distance = find_distance(*rows[0])
     headings, columns = [], []
     for at, (words, unit) in enumerate(kind):
-        name = " ".join(words[:-1] if len(words) > 1 and words[-1] in UNITS else words).capitalize()
+        printed = re.findall(r"[^\W\d_]+", rows[0][1][at].before)
+        name = " ".join(printed[:-1] if len(words) > 1 and words[-1] in UNITS else printed)
         is_other = distance is not None and rows[0][1][at].start != distance.start
         headings.append(
             Heading(

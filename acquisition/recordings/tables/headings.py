@@ -16,8 +16,8 @@ def words(text: str) -> frozenset[str]:
 
 
 _TIME_WORDS = words(
-    "time times t elapsed timestamp seconds sec secs seg millis milliseconds ms micros microseconds us µs μs nanos "
-    "nanoseconds ns zeit tempo tempi temps tiempo tiempos tijd "
+    "time times t elapsed timestamp seconds sec secs seg millis milliseconds ms msec micros microseconds us µs μs "
+    "usec nanos nanoseconds ns zeit tempo tempi temps tiempo tiempos tijd "
     "tid czas čas aika idő zaman время 时间 時間 시간"
 )
 _BESIDE_TIME = words(
@@ -90,7 +90,7 @@ def heading_of(cell: str) -> tuple[str, str]:
     name, unit = name_and_unit(cell)
     if unit:
         return name, unit
-    if is_time(name) and time_unit(name) is not None:  # nanoseconds, ms
+    if name in ("mm", "cm") or (is_time(name) and time_unit(name) is not None):  # nanoseconds, ms
         return name, unit_words(name)
     for form in (_SLASH, _TAIL, _IN):
         match = form.fullmatch(name)

@@ -31,6 +31,7 @@ _SETTING = re.compile(r"[=]|:(?!\s*$)")
 _LONGEST_NAME = 5  # maximum number of words
 _BRACKETED = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
 _TOKEN = re.compile(r"[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?")
+_QUANTITY = re.compile(r"[-+]?\d+(?:[.,]\d*)? ?([^\W\d_]+)")  # 26.9 cm, as sketches print it
 _SEP = re.compile(r"[\ufeff\"]*sep=(.)")  # a line of Excel
 _NUMBERED = re.compile(r".*(index|sample|frame|number|count|row|seq)s?", re.IGNORECASE)
 _INDEX = frozenset(("", "n", "i", "nr", "no", "index", "sample", "samples", "frame", "row", "step", "id", "count", "#"))
@@ -133,6 +134,8 @@ def _kind(cell: str) -> str:
         return ""
     if parse_number(cell) is not None:
         return "number"
+    if (quantity := _QUANTITY.fullmatch(cell)) and measure_of(quantity[1]) is not None:
+        return "mixed"
     if CLOCK.fullmatch(cell):
         return "clock"
     if _DATE.fullmatch(cell):
@@ -221,15 +224,18 @@ def _with_units(names: Sequence[str]) -> list[str]:
     """Return names to which the units behind them were joined: a comma may separate both, as in ``Time, s``."""
     joined: list[str] = []
     for name in names:
-        if joined and _is_unit(name) and not _is_unit(joined[-1]):
+        if joined and _is_unit_of(name, joined[-1]):
             joined[-1] += f" ({name})"
         else:
             joined.append(name)
     return joined
 
 
-def _is_unit(text: str) -> bool:
-    return text != "1" and (measure_of(text) is not None or time_unit(text) is not None)
+def _is_unit_of(unit: str, name: str) -> bool:
+    """Return whether a word is the unit of the name before it: a unit of time of a time, another one of the rest."""
+    if unit in ("1", "d", "h") or heading_of(name)[1]:
+        return False
+    return time_unit(unit) is not None if is_time(name) else measure_of(unit) is not None and len(name) > 1
 
 
 def wrong_commas(table: Layout) -> bool:
