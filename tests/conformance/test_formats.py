@@ -180,6 +180,11 @@ def columns_with_units(t: Any, x: Any) -> bytes:
     return "\n".join(["Zeit (s);Abstand (mm)", *rows(t, x * 1000, "{t:.3f};{x:.2f}")]).replace(".", ",").encode()
 
 
+def sketch(t: Any, x: Any) -> bytes:
+    """Write what a sketch prints for people."""
+    return "".join(f"{row}\n" for row in rows(t, 100 * x, "Time: {t:.9f} s, Distance: {x:.3f} cm")).encode()
+
+
 def bare(t: Any, x: Any, mark: str = " ") -> bytes:
     """Write numbers alone."""
     return "\n".join([*rows(t, x * 100, f"{{t:.3f}}{mark}{{x:.3f}}"), ""]).encode()
@@ -407,6 +412,7 @@ CASES = [
     Case("table", "preamble", preamble),
     Case("table", "clock", clock),
     Case("table", "bare-blanks", bare, options={"unit": "cm"}),
+    Case("sketch", "words", sketch, text=False),
     Case("table", "bare-tabs", lambda t, x: bare(t, x, "\t"), options={"unit": "cm"}),
 ]
 
