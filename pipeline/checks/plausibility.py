@@ -24,7 +24,7 @@ MOST_GRAVITIES = 1.2
 LONGEST_SAG_M = 25.0  # maximum extension of the spring by the bob at rest, m: 25 m correspond to a period of 10 s
 # Minimum number of samples per period: below two the frequency is aliased, and below four noise decides.
 FEWEST_PER_PERIOD = 4.0
-COUNTED = 0.1  # minimum share of negative values in positions counted from a place in the midst of the motion
+COUNTED = 0.02  # minimum share of negative values in positions counted from a place in the midst of the motion
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,9 @@ rows. What is easy to get wrong:
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -38,6 +39,7 @@ _END = "***End_of_Header***"
 _SEPARATOR = "Separator"
 _MOST_HEADER_LINES = 500
 _MOST_SEGMENTS = 10_000
+_DECIMALS = 9  # of times that are computed from headers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,34 +166,36 @@ def _joined(passes: list[list[Table]]) -> list[Table]:
         return []
     tables = []
     for parts in zip(*passes, strict=True):
-        first = parts[0]
-        columns = [_one([each.columns[0] for each in parts])]
-        beside = [_one(list(each)) for each in zip(*(part.beside for part in parts), strict=True)]
+        formula = _one_formula(parts)
         tables.append(
             replace(
-                first,
-                columns=tuple(columns),
-                times=None if first.times is None else _one([part.times for part in parts if part.times is not None]),
-                formula=_one_formula([part.formula for part in parts], [part.columns[0].values.size for part in parts]),
+                parts[0],
+                columns=(_one([each.columns[0] for each in parts]),),
+                times=None if formula and parts[0].times is None else _one([_times(each) for each in parts]),
+                formula=formula,
                 run=f"Segments 1 to {len(parts)}",
                 lines=_one_lines([part.lines for part in parts if part.lines is not None]),
-                beside=tuple(beside),
+                beside=tuple(_one(list(each)) for each in zip(*(part.beside for part in parts), strict=True)),
             )
         )
     return tables
 
 
+def _times(table: Table) -> Column:
+    """Return the times of a segment, from its header if it has no column of them."""
+    if table.times is not None:
+        return table.times
+    start_s, step_s = (0.0, math.nan) if table.formula is None else (table.formula.start_s, table.formula.step_s)
+    t = start_s + step_s * np.arange(table.columns[0].values.size)
+    return Column("X_Value", "s", np.round(t, _DECIMALS), np.full(t.size, _DECIMALS, np.int8))
+
+
 def _runs_on(before: Table, after: Table) -> bool:
-    """Return whether a segment begins at most one step late behind the segment before it."""
-    if len(before.beside) != len(after.beside):
+    """Return whether a segment begins behind the segment before it, after at most half of its length."""
+    t, begin = _times(before).values, _times(after).values[:1]
+    if len(before.beside) != len(after.beside) or t.size < 2 or not begin.size:
         return False
-    if before.times is not None and after.times is not None:
-        t = before.times.values[np.isfinite(before.times.values)]
-        begins = after.times.values[:1]
-        return bool(t.size > 1 and begins.size and 0.0 < begins[0] - t[-1] < 2.5 * (t[-1] - t[0]) / (t.size - 1))
-    if before.times is not None or after.times is not None:
-        return False
-    return _one_formula([before.formula, after.formula], [before.columns[0].values.size, 0]) is not None
+    return bool(0.0 < begin[0] - t[-1] < max(0.5, 2.5 / (t.size - 1)) * (t[-1] - t[0]))  # false for a NaN
 
 
 def _one(parts: list[Column]) -> Column:
@@ -202,15 +206,15 @@ def _one(parts: list[Column]) -> Column:
     )
 
 
-def _one_formula(parts: list[Formula | None], sizes: list[int]) -> Formula | None:
-    """Return the formula of segments with these numbers of rows; None if a start differs from the end before it."""
-    first, rows = parts[0], 0
-    for part, size in zip(parts, sizes, strict=True):
-        if first is None or part is None or not abs(part.step_s - first.step_s) <= 1e-9 * first.step_s:
+def _one_formula(parts: Sequence[Table]) -> Formula | None:
+    """Return the formula of all segments; None if one has none or does not begin where the one before it ends."""
+    first, rows = parts[0].formula, 0
+    for part in parts:
+        if first is None or part.formula is None or part.formula.step_s != first.step_s:
             return None
-        if not abs(part.start_s - (first.start_s + rows * first.step_s)) < 0.01 * first.step_s:
+        if not abs(part.formula.start_s - (first.start_s + rows * first.step_s)) < 0.01 * first.step_s:
             return None
-        rows += size
+        rows += part.columns[0].values.size
     return None if first is None else replace(first, samples=rows)
 
 

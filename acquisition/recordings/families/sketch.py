@@ -20,18 +20,18 @@ from acquisition.recordings.tables.headings import Heading, is_time
 from acquisition.recordings.tables.layout import runs_forward
 from acquisition.recordings.tables.rows import count_from_first
 from acquisition.recordings.tables.table import Column, Lines, Table, side_by_side
-from acquisition.recordings.tables.text import head_lines, text_of
+from acquisition.recordings.tables.text import Line, Text, is_text, text_of
 
-_FEWEST, _SHARE, _MOST = 3, 0.6, 40
+_FEWEST, _SHARE, _MOST, _HEAD, _TURNS = 3, 0.6, 40, 120, 10
 _BRACKETS = re.compile(r"\s*[(\[]")  # as Python prints tuples and lists
 _CLOCK = re.compile(rf"\s*\[?(?:{CLOCK.pattern})(?=[\]\s,;|-])", re.ASCII)
 Kind = tuple[tuple[tuple[str, ...], str], ...]
 """The words and units of the numbers of a line."""
 
 
-def _usual(lines: list[str]) -> tuple[bool, Kind] | None:
+def _usual(of: list[Line]) -> tuple[bool, Kind] | None:
     """Return whether commas are decimal commas, and the usual kind of line; None without words or units."""
-    lines = [line for line in lines if line.strip()][: _MOST + 1][:-1]  # the last may be cut
+    lines = [line.text for line in of[: _MOST + 1][:-1]]  # the last may be cut
     pairs = [match for line in lines if (match := re.search(r"(\d+),\d", line))]
     marks = Counter(has_decimal_comma(match.string) for match in pairs).most_common(1)
     # Nothing but a comma between two groups of digits: a clock before it counts.
@@ -43,26 +43,38 @@ def _usual(lines: list[str]) -> tuple[bool, Kind] | None:
     return (comma, kind) if worded and count >= max(_FEWEST, _SHARE * len(lines)) else None
 
 
+def _joined(lines: list[Line]) -> list[Line]:
+    """Return lines without blank ones; lines of two kinds in turn (the time, then the distance) are joined."""
+    lines = [line for line in lines if line.text.strip()]
+    kinds = [_kind(numbers(line.text)) for line in lines[:_MOST]]
+    first = next((at for at, kind in enumerate(kinds) if kind), 0)
+    one, two = kinds[first::2], kinds[first + 1 :: 2]
+    if len(two) < _TURNS or len({*one[:_TURNS]}) > 1 or len({*two[:_TURNS]}) > 1 or one[0] == two[0] or not two[0]:
+        return lines
+    pairs = list(zip(lines[first::2], lines[first + 1 :: 2], strict=False))
+    return [a._replace(next=b.next, text=f"{a.text}\t{b.text}") for a, b in pairs]
+
+
 def _kind(found: list[Number]) -> Kind:
     return tuple((each.label, each.unit) for each in found)
 
 
 def _evidence(head: bytes) -> str:
-    return "the lines are words with numbers, as a sketch prints them" if _usual(head_lines(head)) else ""
+    lines = _joined(Text.of(head).head(_HEAD)) if is_text(head) else []
+    return "the lines are words with numbers, as a sketch prints them" if _usual(lines) else ""
 
 
 def _tables(path: str, data: bytes) -> list[Table]:
     text = text_of(path, data)
-    usual = _usual([line.text for line in text.head(_MOST + 1)])
+    joined = _joined(list(text.lines()))
+    usual = _usual(joined)
     if usual is None:
         raise FormatError(path, "expected lines with words and numbers", "export a table of times and positions")
     comma, kind = usual
-    lines = [(line, numbers(line.text, decimal_comma=comma)) for line in text.lines()]
+    lines = [(line, numbers(line.text, decimal_comma=comma)) for line in joined]
     like = [_kind(found) == kind for _, found in lines]
     first, stop = like.index(True), len(like) - like[::-1].index(True)
-    filled = np.array([bool(line.text.strip()) for line, _ in lines[first:stop]])
-    rows = [(line.text, found if alike else []) for (line, found), alike in zip(lines, like, strict=True)][first:stop]
-    rows = [row for row, own in zip(rows, filled, strict=True) if own]
+    rows = [(line.text, found if _kind(found) == kind else []) for line, found in lines[first:stop]]
     distance = find_distance(*rows[0])
     headings, columns = [], []
     for at, (words, unit) in enumerate(kind):
@@ -75,15 +87,16 @@ def _tables(path: str, data: bytes) -> list[Table]:
             )
         )
         values = np.array([found[at].value if found else np.nan for _, found in rows])
-        forms = [round(-np.log10(found[at].step)) if found else UNREAD for _, found in rows]
+        forms = [max(0, round(-np.log10(found[at].step))) if found else UNREAD for _, found in rows]
         columns.append(Column("", "", values, np.array(forms, np.int8)))
     stamps = [match[0].strip(" [").encode() if (match := _CLOCK.match(line)) else b"" for line, _ in rows]
     if all(stamp or not found for stamp, (_, found) in zip(stamps, rows, strict=True)):
         columns.insert(0, Column("", "", *clock_times(stamps)[:2]))
         count_from_first(columns[0])
         headings.insert(0, Heading("Time", "s", role="time"))
-    number, skipped = lines[first][0].number, np.cumsum(filled)[~filled].astype(np.int64)
-    where = Lines(number, len(rows), skipped, np.zeros(len(rows), bool), zeros=text.zeros)
+    numbered = np.array([line.number for line, _ in lines[first:stop]])
+    skipped = np.repeat(np.arange(1, len(rows)), np.diff(numbered) - 1)
+    where = Lines(int(numbered[0]), len(rows), skipped, np.zeros(len(rows), bool), zeros=text.zeros)
     return side_by_side(Table(tuple(columns), lines=where), headings)
 
 

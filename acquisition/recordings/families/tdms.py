@@ -94,6 +94,8 @@ def _of_group(path: str, group: Any, several: bool, size: int) -> Iterator[Table
         if column in times and len(columns) > 1:
             continue
         stated = "wf_increment" in each.properties
+        if stated and clocks and _number(each.properties["wf_increment"], 0.0) == 1.0:
+            stated = False  # LabVIEW's placeholder
         own_time = times[0] if times and times[0].values.size == column.values.size and column not in times else None
         yield Table(
             (column,),

@@ -38,7 +38,7 @@ def test_times_in_another_unit() -> None:
 def test_positions_of_both_signs_are_counted_from_rest() -> None:
     """They are ordinary in files of videos and of zeroed sensors, unless they are out of all range."""
     assert codes(0.05, 1.32, rest=0.0) == set()
-    assert "implausible_distance" in codes(0.05, 1.32, rest=0.049)
+    assert "implausible_distance" in codes(0.05, 1.32, rest=0.05)
     assert "implausible_distance" in codes(13.0, 1.32, rest=0.0)
 
 
