@@ -94,7 +94,7 @@ def _even_step(samples: Conditioned) -> float | None:
     if t.size < 2 or np.mean(samples.used) < USED:
         return None
     step_s = float(t[-1] - t[0]) / (t.size - 1)
-    return step_s if np.abs(np.diff(t) / step_s - 1.0).max() <= EVEN else None
+    return step_s if step_s > 0.0 and np.abs(np.diff(t) / step_s - 1.0).max() <= EVEN else None
 
 
 def _counted(samples: Conditioned, lost: NDArray[np.int64]) -> Conditioned:
