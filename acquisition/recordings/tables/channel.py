@@ -124,7 +124,9 @@ def read_samples(
 
 def _jumps(t: F8, rate_hz: float, line: Callable[[int], int | None]) -> list[Trap]:
     """Report where a clock was set forward: by full hours, as for summer time, or by more than a day."""
-    traps = []
+    traps: list[Trap] = []
+    if not t.size or float(t.max() - t.min()) < _HOUR_S / 2:
+        return traps
     steps = np.diff(t)
     for row in np.flatnonzero(steps > _HOUR_S - 2.0 / rate_hz)[:_MOST_JUMPS].tolist():
         step = float(steps[row])

@@ -148,7 +148,7 @@ def _rows(table: Table) -> int:
 
 def _may_oscillate(column: Column, alone: bool) -> bool:
     """Return whether a column turns, and names something that may oscillate or is alone and smooth."""
-    values = column.values[np.isfinite(column.values)][:_SOME]
+    values = column.values[:_SOME][np.isfinite(column.values[:_SOME])]
     steps = np.diff(values)
     turns = np.count_nonzero(np.diff(np.sign(steps[steps != 0]))) >= _FEWEST_TURNS
     named = column.measure is not None or _OSCILLATES.search(column.name)

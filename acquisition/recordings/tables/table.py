@@ -242,6 +242,8 @@ def set_back(table: Table) -> list[Table]:
     if table.times is None or table.lines is None:
         return [table]
     t = table.times.of_size(table.lines.rows).values
+    if not (t[1:] < t[:-1]).any():
+        return [table]
     steps = np.diff(t)
     usual = median(np.abs(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
     back = np.flatnonzero(steps < 0) + 1
