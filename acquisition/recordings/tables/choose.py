@@ -35,14 +35,14 @@ _SHARE_OF_RESTARTS = 0.2
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 """Units of times since 1970, each with the minimum of the numbers to which it applies."""
 _POSITION = re.compile(
-    r"dist|pos|abst|weg|ort|height|höhe|altura|range|auslenk|elong|displ|^[xyz](?![^\W_])|angle|winkel|theta|θ|phi|φ"
+    r"(?<![^\W\d_])(dist|pos|abst|weg|height|höhe|altura|rang|auslenk|elong|displ|[xyz](?![^\W_])|ang)|winkel|theta|θ|phi|φ"
 )
 _DERIVED = re.compile(r"abs|magnitude|total|betrag|norm|fft|command|setpoint|soll|error|status|sum")
 _LIKELY = (
     (re.compile(r"gyr|omega|ω|ang\w*[ _.]*(vel|speed|ges)|winkelges|^g[xyz](?![^\W_])", re.IGNORECASE), "rad/s"),
     (re.compile(r"acc|beschl|versn|^a[xyz](?![^\W_])|g[-_ ]?f|^ac[xyz]", re.IGNORECASE), "m/s2"),
     (re.compile(r"vel|speed|^(?-i:v)(?![^\W\d_])|^(?-i:v)[xyz](?![^\W_])|geschw", re.IGNORECASE), "m/s"),
-    (re.compile(r"theta|θ|phi|φ|ang|winkel|rad|rotat|roll|pitch|yaw", re.IGNORECASE), "rad"),
+    (re.compile(r"theta|θ|phi|φ|(?<![^\W\d_])(ang|rad)|winkel|rotat|roll|pitch|yaw", re.IGNORECASE), "rad"),
     (re.compile(r"volt|^V(?![^\W\d_])|spannung|^ch|signal|tens|^ai?\d|ampl", re.IGNORECASE), "V"),
     (re.compile(r"force|kraft|forza|fuerza", re.IGNORECASE), "N"),
 )
