@@ -88,7 +88,7 @@ def has_decimal_comma(text: str, separator: str = "") -> bool | None:
     """Return whether commas between digits are decimal commas; None if nothing shows it.
 
     They are if something else separates the numbers, and they are not in a line with decimal points. Two groups of
-    digits with nothing but a comma between them are one number behind a name.
+    digits with nothing but a comma between them are one number behind a name or a clock time.
     """
     if separator == "," or not re.search(r"[0-9],[0-9]", text):
         return False
@@ -102,7 +102,7 @@ def has_decimal_comma(text: str, separator: str = "") -> bool | None:
     found = list(_NUMBER[","].finditer(bare))
     if len(found) > 1:
         return True
-    return True if found and re.search(r"[^\W\d_]", bare[: found[0].start()]) else None
+    return True if found and bare[: found[0].start()].strip() else None
 
 
 def numbers(text: str, *, decimal_comma: bool = False, colon_separates: bool = False) -> list[Number]:

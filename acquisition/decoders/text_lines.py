@@ -27,7 +27,8 @@ SEPARATORS = {"tab": "\t", "space": " ", "comma": ",", "semicolon": ";", None: "
 _FARTHEST_M = 20.0  # no rangefinder in air receives an echo from this distance
 _LATEST_US = 38_000.0  # an HC-SR04 reports this value if there was no echo
 _ECHO_M_PER_US = 172e-6
-_COUNTS, _EVEN = 50, 0.02  # so many steps in a row of a lone number, equal to this share, are those of a counter
+# So many steps in a row of a lone number, equal to this share, are those of a counter, or suspect at the beginning.
+_COUNTS, _EVEN, _SUSPECT = 50, 0.02, 12
 _NAME = re.compile(r"[A-Za-z_][\w .-]{0,31}", re.ASCII)
 _NO_TARGET = re.compile(
     r"out of range|fuera de|fora d[eo]|au(?:ß|ss)er|hors de|no (?:echo|target)|kein (?:echo|ziel)|timed? ?out",
@@ -82,8 +83,10 @@ class TextLinesDecoder(FramedDecoder):
             self._count("bad_frame" if noise else "blank_line", len(frame) + 1 if noise else 0)
             return None
         line = self._found(text)
+        # Before the first distance nothing shows that such lines stand for one.
         silent = self._column is None and _NO_TARGET.search(text) is not None
         number = None if silent else self._distance(line)
+        silent = silent and self.resolution_m is not None
         sequence = _whole(self._sequence, line, 1.0)
         device_us = _whole(self._time, line, None if self._time_unit is None else TIMES_US[self._time_unit])
         if sequence is None or device_us is None or (number is None and not silent):
@@ -103,9 +106,19 @@ class TextLinesDecoder(FramedDecoder):
                 self.resolution_m = min(step_m, self.resolution_m or step_m)
         return Reading(host_ns, sequence, device_us, echo_us, distance_m, warm)
 
+    @property
+    def undecided(self) -> bool:
+        """Whether the numbers so far may still be those of a counter."""
+        return 1 < self._steps <= _SUSPECT
+
+    @property
+    def counts(self) -> bool:
+        """Whether the numbers count evenly, as no distance does for long."""
+        return self._steps > _SUSPECT
+
     def unread(self, data: bytes) -> str:
         """Return what the lines look like that gave no reading, and which option would read them."""
-        lines = [line.strip() for line in data.decode("utf-8", "replace").splitlines()[1:]]
+        lines = [line.strip() for line in data.rpartition(b"\n")[0].decode("utf-8", "replace").splitlines()[1:]]
         lines = [line for line in lines if line]
         found = [line for line in map(self._found, lines) if not all(number.is_other for number in line[1])]
         if not found:
@@ -127,6 +140,8 @@ class TextLinesDecoder(FramedDecoder):
             )
         even = {cell for cell in (_cell(each, cells) for each in known) if _counts(cell, found)}
         likely = [each for each in known if not each.is_other and _cell(each, cells) not in even] or known
+        if len(known) == 1 and even:
+            return f"{quoted} that count evenly: a clock or a counter; let the sketch print the distance"
         time = f", --option time={min(even)} --option time_unit=ms for the one that counts evenly" if even else ""
         example = f"--option column={_cell(likely[0], cells)}" + ("" if likely[0].unit else " --option unit=cm")
         return f"{quoted}: state the column of the distance, counted from 0, and its unit: for example {example}{time}"

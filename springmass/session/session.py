@@ -143,17 +143,21 @@ class Session:
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
         due_ns: int | None = self._clock.now_ns() + SAY_NS
-        while self._waits_for_word():
+        while self._waits_for_word() or any(getattr(chain.decoder, "undecided", False) for chain in self._chains):
             mute = next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)
             if mute is not None and due_ns is not None and self._clock.now_ns() > due_ns:
                 say(f"{self.sensors[mute].port.name}: nothing readable so far; check power, wiring and --baud")
                 due_ns = None
             if self._clock.now_ns() > deadline:
                 if mute is None:
-                    return
+                    break
                 self.stop()
                 raise ProgramError(self._not_heard(mute), SENSOR)
             self._wait_until(self._clock.now_ns() + 50_000_000)
+        for channel, chain in enumerate(self._chains):
+            if getattr(chain.decoder, "counts", False):
+                self.stop()
+                raise ProgramError(self._not_heard(channel), SENSOR)
 
     def _waits_for_word(self) -> bool:
         """Return whether a sensor has not been heard yet, or may still report its identity."""

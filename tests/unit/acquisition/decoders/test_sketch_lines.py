@@ -50,6 +50,7 @@ READ: list[tuple[str, float]] = [
     ("Hauteur : 26,9 cm", 0.269),
     ("12:34:56.789 -> 26.9 cm", 0.269),
     ("12:34:56.789 -> Distance: 26,9 cm", 0.269),
+    ("12:34:56.789 -> 26,87 cm", 0.2687),
     ("2024-05-03T12:34:56.789Z,26.9", 0.269),
     ("Sensor 1: 26.9 cm", 0.269),
     ("Reading 12: 26.9 cm", 0.269),
@@ -88,8 +89,10 @@ STATED: list[tuple[dict[str, Any], str, float]] = [
 @pytest.mark.parametrize(("options", "line", "distance"), [*(({}, *each) for each in READ), *STATED], ids=str)
 def test_the_distance_of_a_line_is_read(options: dict[str, Any], line: str, distance: float) -> None:
     """By its name, by its unit, because it is alone, or because its column is stated."""
-    readings = get_family("text-lines").decoder(**options).feed(0, f"begun before\r\n{line}\r\n".encode())
-    np.testing.assert_allclose(readings.distance_m, [distance], rtol=1e-12)
+    data = f"begun before\r\nDistance: 1 m\r\n{line}\r\n".encode() if math.isnan(distance) else f"\n{line}\r\n".encode()
+    readings = get_family("text-lines").decoder(**options).feed(0, data)
+    np.testing.assert_allclose(readings.distance_m[-1:], [distance], rtol=1e-12)
+    assert len(readings) == 1 + math.isnan(distance)
 
 
 def lines(template: str) -> bytes:
