@@ -97,7 +97,7 @@ def has_decimal_comma(text: str, separator: str = "") -> bool | None:
         return False
     if separator or any(mark in text for mark in ";|\t"):
         return True
-    if re.search(r"[0-9],[0-9]+,[0-9]", bare):
+    if re.search(r"[0-9],[0-9]+,[0-9]|(?<![0-9]),(?=\S)|,(?=[^\s0-9])", bare):
         return False
     found = list(_NUMBER[","].finditer(bare))
     if len(found) > 1:
