@@ -34,15 +34,14 @@ from acquisition.recordings.tables.layout import (
     wrong_commas,
 )
 from acquisition.recordings.tables.table import Header
-from acquisition.recordings.tables.text import Text, decode
+from acquisition.recordings.tables.text import Text, decode, in_turn
 from acquisition.recordings.units import measure_of, time_unit
 
-_ABOVE = 6
 _MONITOR = re.compile(
     r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",
     re.MULTILINE,
 )
-_FEWEST, _SHARE, _TURNS = 3, 0.8, 10
+_FEWEST, _SHARE, _HEAD = 3, 0.8, 40
 
 
 def header(lines: Sequence[str]) -> Header | None:
@@ -168,18 +167,17 @@ def prepared(text: Text) -> Text:
     A sketch may print the time on one line and the values on the next. The line numbers stay as they are.
     """
     text = without_monitor(text)
-    head = [line.text for line in text.head(2 * _TURNS + _ABOVE)]
+    head = [line.text for line in text.head(_HEAD)]
     mark = next((mark for mark in "\t;," if any(mark in line for line in head)), " ")
     widths = [_width(line, mark) for line in head]
-    first = next((at for at, width in enumerate(widths) if width), len(widths))
-    odd, even = widths[first : first + 2 * _TURNS : 2], widths[first + 1 : first + 2 * _TURNS : 2]
-    if len(even) < _TURNS or len({*odd}) != 1 or len({*even}) != 1 or odd[0] == even[0] or not even[0]:
+    first = in_turn(widths)
+    if first is None:
         return text
     lines = decode(text.data[text.start : text.stop]).splitlines()
     joined, at = lines[:first], first
     while at < len(lines):
         pair = lines[at : at + 2]
-        whole = [_width(line, mark) for line in pair] == [odd[0], even[0]]
+        whole = [_width(line, mark) for line in pair] == widths[first : first + 2]
         joined += [mark.join(line.strip() for line in pair), ""] if whole else pair[:1]
         at += 2 if whole else 1
     ended = text.data[text.stop - 1 : text.stop] in (b"\n", b"\r")

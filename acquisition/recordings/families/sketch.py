@@ -20,9 +20,9 @@ from acquisition.recordings.tables.headings import Heading, is_time
 from acquisition.recordings.tables.layout import runs_forward
 from acquisition.recordings.tables.rows import count_from_first
 from acquisition.recordings.tables.table import Column, Lines, Table, side_by_side
-from acquisition.recordings.tables.text import Line, Text, is_text, text_of
+from acquisition.recordings.tables.text import Line, Text, in_turn, is_text, text_of
 
-_FEWEST, _SHARE, _MOST, _HEAD, _TURNS = 3, 0.6, 40, 120, 10
+_FEWEST, _SHARE, _MOST, _HEAD = 3, 0.6, 40, 120
 _BRACKETS = re.compile(r"\s*[(\[]")  # as Python prints tuples and lists
 _CLOCK = re.compile(rf"\s*\[?(?:{CLOCK.pattern})(?=[\]\s,;|-])", re.ASCII)
 Kind = tuple[tuple[tuple[str, ...], str], ...]
@@ -46,10 +46,8 @@ def _usual(of: list[Line]) -> tuple[bool, Kind] | None:
 def _joined(lines: list[Line]) -> list[Line]:
     """Return lines without blank ones; lines of two kinds in turn (the time, then the distance) are joined."""
     lines = [line for line in lines if line.text.strip()]
-    kinds = [_kind(numbers(line.text)) for line in lines[:_MOST]]
-    first = next((at for at, kind in enumerate(kinds) if kind), 0)
-    one, two = kinds[first::2], kinds[first + 1 :: 2]
-    if len(two) < _TURNS or len({*one[:_TURNS]}) > 1 or len({*two[:_TURNS]}) > 1 or one[0] == two[0] or not two[0]:
+    first = in_turn([_kind(numbers(line.text)) for line in lines[:_MOST]])
+    if first is None:
         return lines
     pairs = list(zip(lines[first::2], lines[first + 1 :: 2], strict=False))
     return [a._replace(next=b.next, text=f"{a.text}\t{b.text}") for a, b in pairs]

@@ -22,7 +22,7 @@ from acquisition.source import ClockKind, Kind, SourceInfo
 
 _LONGEST_S = 1e10
 """Times beyond three hundred years are no times."""
-_HOUR_S, _DAY_S, _MOST_JUMPS = 3600.0, 86400.0, 10
+_HOUR_S, _DAY_S, _MOST_JUMPS, _SLOWEST_HZ = 3600.0, 86400.0, 10, 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,14 +125,12 @@ def read_samples(
 def _jumps(t: F8, rate_hz: float, line: Callable[[int], int | None]) -> list[Trap]:
     """Report where a clock was set forward: by full hours, as for summer time, or by more than a day."""
     traps: list[Trap] = []
-    if not t.size or float(t.max() - t.min()) < _HOUR_S / 2:
+    if rate_hz < _SLOWEST_HZ or float(t.max() - t.min()) < 0.5 * _HOUR_S:
         return traps
     steps = np.diff(t)
     for row in np.flatnonzero(steps > _HOUR_S - 2.0 / rate_hz)[:_MOST_JUMPS].tolist():
         step = float(steps[row])
-        if rate_hz * _HOUR_S > _MOST_JUMPS and (
-            step > _DAY_S or abs((step + 1800.0) % _HOUR_S - 1800.0) < 2.0 / rate_hz
-        ):
+        if step > _DAY_S or abs((step + 0.5 * _HOUR_S) % _HOUR_S - 0.5 * _HOUR_S) < 2.0 / rate_hz:
             where = f"lines {line(row)} and {line(row + 1)}" if line(row) else f"samples {row + 1} and {row + 2}"
             perhaps = "for summer time" if round(step) == _HOUR_S else "during the recording"
             message = f"the times jump by {step:.0f} s between {where}: the clock was perhaps set {perhaps}"

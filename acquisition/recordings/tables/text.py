@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from acquisition.errors import FormatError
 
 HEAD_BYTES = 8192
 """Number of bytes at the start of a file from which a format recognises it."""
+_TURNS = 10
 _DELIMITERS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
 _CONTROL = bytes(c for c in range(32) if c not in b"\t\n\r\f\x1a")
 _FOREIGN = re.compile(rb"[\x80-\xff]+[\x21-\x7e]?")
@@ -123,6 +124,15 @@ def restated(path: str, data: bytes, delimiter: str | None, decimal: str | None)
     if decimal == ",":
         lines = [re.sub(r"(?<=\d),(?=\d)", ".", line) for line in lines]
     return "\n".join(lines).encode()
+
+
+def in_turn(kinds: Sequence[object]) -> int | None:
+    """Return the first of lines of two kinds that come in turn, given the kinds of lines (false for no row)."""
+    first = next((at for at, kind in enumerate(kinds) if kind), 0)
+    one, two = kinds[first : first + 2 * _TURNS : 2], kinds[first + 1 : first + 2 * _TURNS : 2]
+    if len(two) < _TURNS or len({*one}) > 1 or len({*two}) > 1:
+        return None
+    return first if two[0] and one[0] != two[0] else None
 
 
 def text_of(path: str, data: bytes) -> Text:
