@@ -75,7 +75,7 @@ def analyse(
     **completions
         ``unit`` and ``time_unit`` of arrays, or options for reading a recording, as :func:`springmass.load` takes
         them: velocity, channel, rate_hz, unit, run,
-        time, time_unit, clock_ppm, unverified.
+        time, time_unit, delimiter, decimal, clock_ppm, unverified.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def load(path: str | os.PathLike[str], **options: Any) -> Loaded:
     path : path
     **options
         The fields of :class:`springmass.runs.options.ReadOptions`: information that the file may lack (velocity,
-        channel, run, rate_hz, unit, time, time_unit), and from_s, to_s, clock_ppm, unverified.
+        channel, run, rate_hz, unit, time, time_unit, delimiter, decimal), and from_s, to_s, clock_ppm, unverified.
 
     Raises
     ------
