@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from acquisition.recordings.identify import inspect, open_recording
 from acquisition.recordings.questions import Missing
 from pipeline.analyse import analyse
 from pipeline.track import UNUSABLE
+from springmass.cli import main
 from springmass.runs.tracks import to_track
 from tests.sampling import sampled
 
@@ -427,3 +430,22 @@ def test_what_does_not_oscillate_has_no_period(recordings: Path, row: Row) -> No
     """
     recording = open_recording(only(recordings, row.start), **row.given)
     assert "period" not in analyse(to_track(recording.samples, recording.info)).estimates
+
+
+MOVE = ("tdisp", "phyphoxfile", "plasduino", *OSCILLATE, *BEAT, *STROKES)
+"""Files in which something oscillates."""
+
+
+@pytest.mark.parametrize("start", sampled(dict.fromkeys(each for each in MOVE if each != "Pos B"), 5))
+def test_who_types_what_the_message_says_gets_a_period(
+    recordings: Path, start: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two commands at most: the plain one, and the one that its question ends in."""
+    code = main(["analyse", str(only(recordings, start)), "--json"])
+    said = capsys.readouterr()
+    if code == 3:
+        _, *words = shlex.split(said.err[said.err.index("? springmass ") + 2 :])
+        code = main(words)
+        said = capsys.readouterr()
+    assert code == 0
+    assert "period" in json.loads(said.out.splitlines()[0])["estimates"]
