@@ -22,9 +22,9 @@ import lmfit
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
+from pipeline.options import options_for
 from pipeline.track import Track
 from springmass import load, sample_data
 from springmass.runs.scenes import read_scene
@@ -136,13 +136,13 @@ def cases() -> Iterator[Case]:
 
 def tier(accuracy: str, limit: float, name: str, track: Track, scene: Scene) -> Case:
     """Return the case of one accuracy on one record: the analysis from track to findings, against one lmfit fit."""
-    params = params_for(accuracy)
+    options = options_for(accuracy)
     there = np.isfinite(track.t) & np.isfinite(track.y)
     return pair(
         f"analyse(), {accuracy}, {len(track)} samples, {name}",
         "lmfit damped sine, same samples",
         limit,
-        lambda: analyse(track, scene, params),
+        lambda: analyse(track, scene, options),
         damped_sine(track.t[there], track.y[there]),
         20,
     )

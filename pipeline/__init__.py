@@ -3,7 +3,7 @@
 The packages are listed in the order of the data flow; each imports only from those above it::
 
     track, errors   one run as arrays; the errors that stages raise
-    numerics/       least squares, regression, spectra, random walks, estimates; independent of springs
+    numerics/       least squares, regression, spectra, estimates; independent of springs
     registry/       the names of estimates, budget inputs, effects and laws
     bench/          scene, air and instrument: what is known before the analysis
     samples/        which samples a fit may use

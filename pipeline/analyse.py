@@ -7,13 +7,12 @@ module. If a stage must run again, on fewer samples or after a disturbance was r
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
-from pipeline.analysis import Analysis, Motion, Oscillation, Overdamped, Still
+from pipeline.analysis import Analysis, Motion, Oscillation, Still
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
@@ -21,10 +20,10 @@ from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.harmonics import find_harmonics
 from pipeline.checks.misfit import Misfit
 from pipeline.checks.model import check_model
-from pipeline.checks.oscillation import check_coherence, check_sinusoid, typical_miss
+from pipeline.checks.oscillation import check_sinusoid, typical_miss
 from pipeline.checks.plausibility import check_plausibility
 from pipeline.checks.residuals import residuals_of
-from pipeline.checks.sensor import find_held, find_joined, find_smoothing, held_count, matters
+from pipeline.checks.sensor import find_smoothing, held, held_count
 from pipeline.damping.select import Damping, fit_damping
 from pipeline.errors import AnalysisError
 from pipeline.findings.damping import damping_findings
@@ -41,16 +40,16 @@ from pipeline.findings.motion import (
 from pipeline.findings.parts import part_findings
 from pipeline.findings.samples import COARSE, clock_findings, held_findings, sample_findings
 from pipeline.findings.scene import scene_findings
+from pipeline.motion import overdamped
 from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equation
 from pipeline.motion.fitted import Fitted, fit_by_equation, fit_by_windows, fit_waveform
-from pipeline.motion.overdamped import find_overdamped, spring_constant
+from pipeline.motion.overdamped import Overdamped, find_overdamped, spring_constant
 from pipeline.motion.two_modes import TwoModes, find_two_modes
-from pipeline.motion.waveform_fit import Params as WaveformParams
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import median
 from pipeline.numerics.threads import one_thread
-from pipeline.params import STANDARD, Params
+from pipeline.options import Options
 from pipeline.results.derive import derive
 from pipeline.results.effects import Effect, tabulate
 from pipeline.samples.condition import Conditioned, coarsest_step, condition
@@ -58,25 +57,32 @@ from pipeline.samples.stopping import moving_part
 from pipeline.track import Quality, Track
 from pipeline.windows.clipping import find_cuts
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
-from pipeline.windows.demodulate import Demodulated, demodulate, model_error
+from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated, demodulate, model_error
 from pipeline.windows.disturbances import separate
-from pipeline.windows.part import before_release, before_trigger, long_after_stop
-from pipeline.windows.segments import Segments, SpanKind, find_free_part
+from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part, long_after_stop
 
-__all__ = ["STANDARD", "Analysis", "Oscillation", "Overdamped", "Params", "Still", "analyse"]
+__all__ = ["Analysis", "Oscillation", "Overdamped", "Still", "analyse"]
+
+
+MOST_PARTS = 4  # maximum number of times that a freely moving part is sought within the part found before
+# Share of the amplitude by which typical periods differ from the fitted oscillation, above which two modes are fitted:
+# the difference if one mode is a third of the other.
+BEATING = 0.3
+LEAST_HALVED = 128  # minimum number of samples of which the later half may show a motion
+CLEAR = 0.05  # maximum noise over the amplitude for a motion that only the later half shows
 
 
 @one_thread
-def analyse(track: Track, scene: Scene | None = None, params: Params | None = None) -> Analysis:
+def analyse(track: Track, scene: Scene | None = None, options: Options | None = None) -> Analysis:
     """Turn a track into estimates, laws, effects and findings.
 
     Parameters
     ----------
     track : Track
     scene : Scene, optional
-        What is known about the bench; by default nothing. Its damping law counts as the stated law unless ``params``
-        states another.
-    params : Params, optional
+        What is known about the bench; by default nothing. Its damping law counts as the stated law unless ``options``
+        state another.
+    options : Options, optional
 
     Returns
     -------
@@ -95,46 +101,42 @@ def analyse(track: Track, scene: Scene | None = None, params: Params | None = No
     >>> print(analyse(Track.from_arrays(t, y)).estimates["period"])  # 2 pi / 8.3 = 0.757010
     0.757010 +- 0.000022 s
     """
-    scene, params = scene or Scene(), params or STANDARD
-    if params.damping.stated is None and params.damping.from_scene and scene.damping_law is not None:
-        params = replace(params, damping=replace(params.damping, stated=scene.damping_law))
+    scene, options = scene or Scene(), options or Options()
+    if options.stated is None and scene.damping_law is not None:
+        options = replace(options, stated=scene.damping_law)
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
-    samples = condition(track, params.condition)
-    part = _free_part(samples, params)
+    samples = condition(track)
+    part = _free_part(samples, options)
     if isinstance(part, NoOscillation):
-        return _without_period(samples, part, scene, params)
+        return _without_period(samples, part, scene, options)
 
     samples, cycles = part.samples, part.cycles
-    windows = demodulate(samples, cycles, params.demodulate)
+    windows = demodulate(samples, cycles)
     if (cut := find_cuts(samples, cycles, windows)) is not None:
-        samples, windows = cut, demodulate(cut, cycles, params.demodulate)
+        samples, windows = cut, demodulate(cut, cycles)
     if (why := check_sinusoid(samples, windows)) is not None:
-        return _without_period(samples, why, scene, params)
+        return _without_period(samples, why, scene, options)
 
-    windows, disturbances = separate(samples, cycles, windows, params.disturbances, params.demodulate)
-    damping = fit_damping(windows, _start_s(samples, windows.angular_frequency), params.damping)
+    windows, disturbances = separate(samples, cycles, windows, modes=options.modes)
+    damping = fit_damping(windows, _start_s(samples, windows.angular_frequency), options.laws, options.known_law)
 
     # For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.
-    solved = fit_equation(samples, windows, damping, params.motion, params.damping, stopped=part.stopped)
-    if _may_be_overdamped(windows, damping, solved, params):
-        relaxed = find_overdamped(samples, params.relaxation)
+    solved = fit_equation(samples, windows, damping, stopped=part.stopped)
+    if _may_be_overdamped(windows, damping, solved):
+        relaxed = find_overdamped(samples)
         if isinstance(relaxed, Overdamped):
-            return _overdamped(samples, relaxed, scene, params)
+            return _overdamped(samples, relaxed, scene, options)
     if isinstance(solved, EquationFit):
         fitted = fit_by_equation(solved, samples, windows)
     else:
-        fitted = fit_by_windows(windows, disturbances, damping, params.phase)
-        if params.full is not None:
-            fitted = fit_waveform(fitted, samples, params.full)
-        missed = typical_miss(fitted)
-        incoherent = check_coherence(fitted, samples.track, missed)
-        two = find_two_modes(samples) if incoherent is not None or missed > params.beating else None
+        fitted = fit_by_windows(windows, disturbances, damping)
+        if options.rows == "samples":
+            fitted = fit_waveform(fitted, samples)
+        two = find_two_modes(samples) if typical_miss(fitted) > BEATING else None
         if two is not None:
-            return _two_modes(samples, two, scene, params)
-        if incoherent is not None:
-            return _still(samples, incoherent, scene, params)
-    return _oscillation(samples, part, fitted, solved, scene, params)
+            return _two_modes(samples, two, scene, options)
+    return _oscillation(samples, part, fitted, solved, scene, options)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,41 +153,51 @@ class _FreePart:
     stopped: bool
 
 
-def _free_part(samples: Conditioned, params: Params) -> _FreePart | NoOscillation:
-    """Find the part that oscillates freely, without the time before the release and long after the stop.
+def _free_part(samples: Conditioned, options: Options) -> _FreePart | NoOscillation:
+    """Find the part that oscillates freely.
 
-    The time before the trigger, the time before the release, the time long after the stop, and all but one free part
-    are left out in this order. The samples are conditioned again after each step, because the part left out may have
-    hidden the plateaus and the noise of the rest.
+    The time before the trigger, the time long after the stop and all but one free part are left out. The samples are
+    conditioned again after each step, because the part left out may have hidden the noise of the rest.
     """
-    segments = None
-    release = partial(before_release, periods=params.segments.held_periods)
-    for outside_of in (before_trigger, release, partial(long_after_stop, share=params.early)):
-        if (outside := outside_of(samples)) is not None:
-            samples = condition(outside.flagged(samples.track), params.condition)
-            segments = outside.within(segments)
-    rests = segments is not None and any(span.kind is SpanKind.AT_REST for span in segments.left_out)
-    cycles, stopped = _cycles(samples, params, params.late if rests else params.early)
+    segments: Segments | None = None
+    for outside in (before_trigger(samples), long_after_stop(samples, options.early)):
+        if outside is not None:
+            samples, segments = condition(outside.flagged(samples.track)), outside.within(segments)
+    cycles, stopped = _cycles(samples, options, options.early)
     if isinstance(cycles, NoOscillation):
-        return cycles
-    for _ in range(params.most_parts):
-        windows = demodulate(samples, cycles, params.demodulate)
-        outside = find_free_part(samples, cycles, windows, params.segments)
+        # A long time in the hand hides the motion after it, which the later half may show.
+        t = samples.track.t[samples.used]
+        if t.size < LEAST_HALVED:
+            return cycles
+        half_s = float(np.median(t))
+        later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
+        trial = condition(later.flagged(samples.track))
+        trimmed, stopped = _cycles(trial, options, options.early)
+        if isinstance(trimmed, NoOscillation):
+            return cycles
+        windows = demodulate(trial, trimmed)
+        if windows.noise_m > CLEAR * median(windows.amplitude) or check_sinusoid(trial, windows) is not None:
+            return cycles
+        samples, segments = trial, later.within(segments)
+        cycles = trimmed
+    for _ in range(MOST_PARTS):
+        windows = demodulate(samples, cycles)
+        outside = find_free_part(samples, windows)
         if outside is None:
             break
-        shorter = condition(outside.flagged(samples.track), params.condition)
-        trimmed, stops = _cycles(shorter, params, params.early)
+        shorter = condition(outside.flagged(samples.track))
+        trimmed, stops = _cycles(shorter, options, options.early)
         if isinstance(trimmed, NoOscillation):
             break
         samples, segments, cycles, stopped = shorter, outside.within(segments), trimmed, stops
     return _FreePart(samples, segments, cycles, stopped)
 
 
-def _cycles(samples: Conditioned, params: Params, share: float) -> tuple[Cycles | NoOscillation, bool]:
+def _cycles(samples: Conditioned, options: Options, share: float) -> tuple[Cycles | NoOscillation, bool]:
     """Return the cycles and whether the bob stops before a share of the samples; if so, those of the moving part."""
-    cycles = find_cycles(samples, params.cycles)
-    moving = moving_part(samples, params.late if isinstance(cycles, NoOscillation) else share)
-    if moving is None or isinstance(trimmed := find_cycles(moving, params.cycles), NoOscillation):
+    cycles = find_cycles(samples)
+    moving = moving_part(samples, options.late if isinstance(cycles, NoOscillation) else share)
+    if moving is None or isinstance(trimmed := find_cycles(moving), NoOscillation):
         return cycles, False
     return trimmed, True
 
@@ -205,12 +217,10 @@ def _start_s(samples: Conditioned, omega: float) -> float:
     return begin if first - begin < 2.0 * math.pi / omega else first
 
 
-def _may_be_overdamped(
-    windows: Demodulated, damping: Damping, solved: EquationFit | EquationMisfit | None, params: Params
-) -> bool:
+def _may_be_overdamped(windows: Demodulated, damping: Damping, solved: EquationFit | EquationMisfit | None) -> bool:
     """Return whether the damping is strong and, if the equation of motion was fitted, linear."""
     linear = not isinstance(solved, EquationFit) or solved.damping.best is solved.damping.of_powers(1)
-    return linear and damping.best.rate_at_start() / windows.angular_frequency > params.relaxation.least_damping
+    return linear and damping.best.rate_at_start() / windows.angular_frequency > overdamped.LEAST_DAMPING
 
 
 def _oscillation(
@@ -219,52 +229,44 @@ def _oscillation(
     fitted: Fitted,
     solved: EquationFit | EquationMisfit | None,
     scene: Scene,
-    params: Params,
+    options: Options,
 ) -> Analysis:
     """Run checks, results and findings, in this order, for an oscillation fitted by any method."""
     track, unit = samples.track, samples.track.unit
     fitted = fitted.in_unit(unit)
     windows, damping, phase, disturbances = fitted.demodulated, fitted.damping, fitted.phase, fitted.disturbances
-    rest, waveform = fitted.rest.stepping(disturbances.steps), fitted.waveform.with_disturbances(disturbances)
-    instrument = Instrument.of(track, u_crystal=params.derive.u_clock_nominal)
+    rest, waveform = fitted.rest, fitted.waveform.with_disturbances(disturbances)
+    instrument = Instrument.of(track)
     smoothing = SensorFilter.of(scene, track.rate_hz)
     by_windows = not isinstance(solved, EquationFit)
 
     misfits: list[Misfit] = []
     found: list[Found] = []
-    plausible = check_plausibility(samples, windows, phase, params.checks.plausibility)
+    plausible = check_plausibility(samples, windows, phase)
     misfits += plausible.misfits
     found += plausibility_findings(plausible)
     # Strong damping distorts every period, which would look like harmonics; its fit describes the whole motion anyway.
+    rounding_m = median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
     residuals = residuals_of(samples, windows, disturbances, phase) if by_windows else None
-    unexplained = residuals
+    unexplained, shortest = residuals, 1
     if residuals is not None:
-        rounding_m = median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
-        shape = find_harmonics(residuals, max(0.5 * (samples.quantum_m or 0.0), rounding_m), params.checks.harmonics)
+        shape = find_harmonics(residuals, max(0.5 * (samples.quantum_m or 0.0), rounding_m))
         if shape is not None:
             misfits.append(shape.misfit)
             found += harmonics_findings(shape)
             unexplained = residuals = residuals.less(shape.at_samples)
-        if (held := find_held(samples, residuals)) is not None:
-            misfits.append(held.misfit)
-            found += held_findings(held.count, held.interval_s)
+        if (misfit := held(samples, residuals)) is not None:
+            misfits.append(misfit)
+            found += held_findings(held_count(samples), residuals.interval_s)
             unexplained = None
         elif not windows.noise_m > max(rounding_m, (samples.quantum_m or 0.0) / COARSE):
             unexplained = None  # rounding, or coarse steps, which the finding "quantised" reports
-        elif (
-            smoothed := find_joined(samples, residuals, params.checks.sensor)
-            or find_smoothing(residuals, params.checks.sensor)
-        ) is not None:
-            if smoothed.certain:
-                unexplained = None
-            if matters(smoothed, residuals, damping.best.joint["A0"].u, smoothing, params.checks.sensor):
-                misfits.append(smoothed.misfit)
-                if smoothed.certain:
-                    found += smoothing_findings(smoothed)
+        elif (smoothed := find_smoothing(residuals, damping.best.joint["A0"].u, smoothing)) is not None:
+            shortest = math.ceil(2.0 * smoothed.samples)
+            misfits.append(smoothed.misfit)
+            found += smoothing_findings(smoothed)
     if by_windows:
-        model = check_model(fitted, unexplained, _settling_fit(fitted, samples, params), params.checks.model)
-        misfits += model.misfits
-        found += model_findings(model)
+        found += model_findings(check_model(fitted, unexplained, shortest, rounding_m))
 
     effects = tabulate(
         scene, damping, phase, rest, noise_m=windows.noise_m, instrument=instrument, disturbances=disturbances
@@ -277,7 +279,6 @@ def _oscillation(
         scene,
         effects,
         instrument=instrument,
-        params=params.derive,
         misfits=tuple(misfits),
         smoothing=smoothing,
     )
@@ -286,7 +287,7 @@ def _oscillation(
         unit,
         part_findings(part.segments, float(track.t[0]), float(track.t[-1])),
         motion_findings(part.cycles, fitted, rest),
-        damping_findings(damping, derived.coefficients),
+        damping_findings(damping),
         found,
         sample_findings(
             samples,
@@ -294,52 +295,44 @@ def _oscillation(
             windows.noise_m,
             find_clusters(track, windows, phase),
             swing_m,
-            by_chance=echoes_by_chance(samples.flags, windows, params.demodulate.clip_sigmas),
+            by_chance=echoes_by_chance(samples.flags, windows, CLIP_SIGMAS),
         ),
         scene_findings(scene, effects),
         fit_findings(fitted.full, solved),
         clock_findings(track, instrument),
     )
     motion = Oscillation(windows, disturbances, damping, phase, rest, waveform, fitted.full, part.cycles, derived)
-    return Analysis(track, scene, params, samples, motion, effects, findings, derived.estimates)
+    return Analysis(track, scene, options, samples, motion, effects, findings, derived.estimates)
 
 
-def _settling_fit(fitted: Fitted, samples: Conditioned, params: Params) -> Callable[[], Fitted] | None:
-    """Return a function that fits the whole waveform if the halves disagree; None if it was fitted or is too long."""
-    if not params.settle or fitted.full is not None or len(samples.track) > params.most_settled:
-        return None
-    # Only the selected law is fitted: the comparison needs amplitude and phase, but no selection among laws.
-    return lambda: fit_waveform(fitted, samples, WaveformParams(besides=())).in_unit(samples.track.unit)
-
-
-def _without_period(samples: Conditioned, why: NoOscillation, scene: Scene, params: Params) -> Analysis:
+def _without_period(samples: Conditioned, why: NoOscillation, scene: Scene, options: Options) -> Analysis:
     """Classify a recording without a clear period: a relaxation, two modes of similar strength, or a bob at rest."""
-    relaxed = find_overdamped(samples, params.relaxation)
+    relaxed = find_overdamped(samples)
     if isinstance(relaxed, Overdamped):
-        return _overdamped(samples, relaxed, scene, params)
+        return _overdamped(samples, relaxed, scene, options)
     if (two := find_two_modes(samples)) is not None:
-        return _two_modes(samples, two, scene, params)
-    return _still(samples, relaxed or why, scene, params)
+        return _two_modes(samples, two, scene, options)
+    return _still(samples, relaxed or why, scene, options)
 
 
-def _overdamped(samples: Conditioned, found: Overdamped, scene: Scene, params: Params) -> Analysis:
+def _overdamped(samples: Conditioned, found: Overdamped, scene: Scene, options: Options) -> Analysis:
     """Return the analysis of a motion that damping ends within a few cycles, or before one cycle is complete."""
     estimates = {**_at_rest(samples), **found.estimates, **spring_constant(found, scene)}
-    return _ended(samples, found, overdamped_findings(found), estimates, scene, params)
+    return _ended(samples, found, overdamped_findings(found), estimates, scene, options)
 
 
-def _two_modes(samples: Conditioned, two: TwoModes, scene: Scene, params: Params) -> Analysis:
+def _two_modes(samples: Conditioned, two: TwoModes, scene: Scene, options: Options) -> Analysis:
     """Return the analysis of a recording of two oscillations, neither of which is the main one."""
     finding = Found("two_modes", {name: x.value for name, x in two.estimates.items()} | {"why": two.why})
-    return _ended(samples, Still(two.why), (finding,), {**_at_rest(samples), **two.estimates}, scene, params)
+    return _ended(samples, Still(two.why), (finding,), {**_at_rest(samples), **two.estimates}, scene, options)
 
 
-def _still(samples: Conditioned, why: NoOscillation, scene: Scene, params: Params) -> Analysis:
+def _still(samples: Conditioned, why: NoOscillation, scene: Scene, options: Options) -> Analysis:
     """Return the analysis of a recording without a motion to fit."""
     findings = [Found("no_oscillation", {"why": why.why})]
-    if (held := held_count(samples)) > 1:
-        findings += held_findings(held, held / samples.track.rate_hz)
-    return _ended(samples, Still(why.why), findings, _at_rest(samples), scene, params)
+    if (count := held_count(samples)) > 1:
+        findings += held_findings(count, 1.0 / samples.track.rate_hz)
+    return _ended(samples, Still(why.why), findings, _at_rest(samples), scene, options)
 
 
 def _ended(
@@ -348,7 +341,7 @@ def _ended(
     first: Iterable[Found],
     estimates: Mapping[str, Estimate],
     scene: Scene,
-    params: Params,
+    options: Options,
 ) -> Analysis:
     track = samples.track
     findings = worded(
@@ -358,7 +351,7 @@ def _ended(
         clock_findings(track, Instrument.of(track)),
     )
     none: tuple[Effect, ...] = ()
-    return Analysis(track, scene, params, samples, motion, none, findings, estimates)
+    return Analysis(track, scene, options, samples, motion, none, findings, estimates)
 
 
 def _at_rest(samples: Conditioned) -> dict[str, Estimate]:

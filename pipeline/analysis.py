@@ -11,18 +11,16 @@ from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
 from pipeline.motion.fitted import Fitted
 from pipeline.motion.overdamped import Overdamped
-from pipeline.motion.smoother import Smoothed, smooth
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
-from pipeline.params import Params
+from pipeline.options import Options
 from pipeline.registry.quantities import check_quantity
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
+from pipeline.results.kinematics import Smoothed, kinematics
 from pipeline.samples.condition import Conditioned
 from pipeline.track import U8, Track
 from pipeline.windows.cycles import Cycles
-
-__all__ = ["Analysis", "Motion", "Oscillation", "Overdamped", "Still"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +61,7 @@ class Analysis:
     ----------
     track : Track
     scene : Scene
-    params : Params
+    options : Options
     conditioned : Conditioned
     motion : Oscillation, Overdamped or Still
         For an overdamped motion, ``estimates`` contains the relaxation rates. For a still bob it contains only the
@@ -82,7 +80,7 @@ class Analysis:
 
     track: Track
     scene: Scene
-    params: Params
+    options: Options
     conditioned: Conditioned
     motion: Motion
     effects: tuple[Effect, ...]
@@ -105,7 +103,7 @@ class Analysis:
 
     @one_thread
     def smoothed(self) -> Smoothed:
-        """Return position, velocity and acceleration at every sample, with their uncertainties.
+        """Return position, velocity and acceleration at every sample from the fit, with their uncertainties.
 
         Raises
         ------
@@ -123,7 +121,6 @@ class Analysis:
         >>> bool(np.std(error) < 0.002 * 0.05 * 8.3)
         True
         """
-        motion = self.motion
-        if not isinstance(motion, Oscillation):
-            raise AnalysisError(f"there is no oscillation to smooth: {motion.why}")
-        return smooth(self.track, motion.demodulated, motion.phase, motion.rest, motion.disturbances)
+        if not isinstance(self.motion, Oscillation):
+            raise AnalysisError(f"there is no oscillation to smooth: {self.motion.why}")
+        return kinematics(self.track, self.motion, self.motion.derived.laws)

@@ -13,8 +13,6 @@ Every message is one line. It says where the error is, what is wrong, which valu
 
 from __future__ import annotations
 
-__all__ = ["AnalysisError", "DynamicsError", "PipelineError", "SceneError", "TrackError"]
-
 
 class PipelineError(Exception):
     """Base class of all errors that the pipeline raises; the message is a single line for the user."""

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.analyse import Oscillation, Params, analyse
+from pipeline.analyse import Oscillation, analyse
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.options import Options
 from pipeline.track import F8, U8, Track
-
-__all__ = ["LiveMotion", "MotionAccumulator", "NotYet"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +58,7 @@ class MotionAccumulator:
         Nominal samples per second, Hz.
     window_s : float
         Duration of the stored samples, s.
-    params : pipeline.analyse.Params, optional
+    options : pipeline.options.Options, optional
     quantity, unit : str
         Recorded quantity and its unit.
 
@@ -73,7 +72,7 @@ class MotionAccumulator:
         self,
         rate_hz: float,
         window_s: float = 10.0,
-        params: Params | None = None,
+        options: Options | None = None,
         *,
         quantity: str = "length",
         unit: str = "m",
@@ -81,7 +80,7 @@ class MotionAccumulator:
         if not (rate_hz > 0 and window_s > 0):
             raise ValueError(f"rate_hz and window_s must be positive, got {rate_hz} and {window_s}")
         self._rate_hz = rate_hz
-        self._params, self._quantity, self._unit = params, quantity, unit
+        self._options, self._quantity, self._unit = options, quantity, unit
         self._room = max(int(rate_hz * window_s), 16)
         self.clear()
 
@@ -128,7 +127,7 @@ class MotionAccumulator:
             return NotYet(f"{len(self)} samples so far")
         track = self.track()
         try:
-            analysis = analyse(track, params=self._params)
+            analysis = analyse(track, options=self._options)
         except AnalysisError as error:
             return NotYet(str(error))
         if not isinstance(analysis.motion, Oscillation):

@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipeline.errors import TrackError
 
-__all__ = ["F8", "U8", "UNITS", "Quality", "Track"]
-
 F8 = NDArray[np.float64]
 U8 = NDArray[np.uint8]
 

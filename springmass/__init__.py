@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from acquisition.replay import Replay
-    from pipeline.analyse import Params
     from pipeline.bench.scene import Scene
     from pipeline.damping.laws import LAWS
     from pipeline.damping.laws.of_function import make_law
     from pipeline.numerics.estimate import Estimate
+    from pipeline.options import Options
     from pipeline.results.classic import classic
     from pipeline.results.compare import SpringRun, compare_springs
     from pipeline.track import Track
@@ -42,7 +42,7 @@ __all__ = [
     "Comparison",
     "Estimate",
     "Loaded",
-    "Params",
+    "Options",
     "Replay",
     "Run",
     "Scene",
@@ -70,7 +70,7 @@ _WHERE = {
     "Estimate": "pipeline.numerics.estimate",
     "LAWS": "pipeline.damping.laws",
     "Loaded": "springmass.runs.loading",
-    "Params": "pipeline.analyse",
+    "Options": "pipeline.options",
     "Replay": "acquisition.replay",
     "Run": "springmass.api.opening",
     "Scene": "pipeline.bench.scene",

@@ -33,12 +33,13 @@ if TYPE_CHECKING:
     from acquisition.recordings.tables.headings import Heading
     from acquisition.recordings.tables.table import Column, Formula, Table
     from acquisition.source import SourceInfo
-    from pipeline.damping.laws.law import Law, Unit
+    from pipeline.damping.laws.law import Law
     from pipeline.damping.laws.of_function import make_law
     from pipeline.dynamics import Equation, Integrator, Problem, Trajectory, get_integrator
     from pipeline.dynamics.halving import auto
     from pipeline.dynamics.methods import OneStep, acceleration
     from pipeline.errors import AnalysisError, DynamicsError
+    from pipeline.numerics.quantity import Unit
 
 __all__ = [
     "AnalysisError",
@@ -106,12 +107,13 @@ _WHERE = {
     "acquisition.recordings.tables.headings": ("Heading",),
     "acquisition.recordings.tables.table": ("Column", "Formula", "Table"),
     "acquisition.source": ("SourceInfo",),
-    "pipeline.damping.laws.law": ("Law", "Unit"),
+    "pipeline.damping.laws.law": ("Law",),
     "pipeline.damping.laws.of_function": ("make_law",),
     "pipeline.dynamics": ("Equation", "Integrator", "Problem", "Trajectory", "get_integrator"),
     "pipeline.dynamics.halving": ("auto",),
     "pipeline.dynamics.methods": ("OneStep", "acceleration"),
     "pipeline.errors": ("AnalysisError", "DynamicsError"),
+    "pipeline.numerics.quantity": ("Unit",),
 }
 
 

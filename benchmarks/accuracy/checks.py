@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.accuracy.trials import QUANTITIES, Case, Outcome, bounds, evaluate, record, synthetic
-from pipeline.accuracy import TIERS
+from pipeline.options import TIERS
 from pipeline.results.classic import classic
 
 __all__ = ["CHECKS", "Bench", "Line"]

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Oscillation, analyse
 from pipeline.errors import PipelineError
+from pipeline.options import options_for
 from pipeline.track import Track
 from tests import synthetic
 
@@ -78,7 +78,7 @@ def evaluate(job: tuple[Case, str, int]) -> Outcome:
     truth, track = record(case, seed)
     nothing = np.full(4, np.nan)
     try:
-        analysis = analyse(track, params=params_for(tier))
+        analysis = analyse(track, options=options_for(tier))
     except PipelineError as error:
         return Outcome(str(error), nothing, nothing)
     except Exception as error:  # count a defect like a refusal, so that the other records are still measured

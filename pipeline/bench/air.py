@@ -23,19 +23,6 @@ import math
 
 from pipeline.numerics.estimate import Estimate
 
-__all__ = [
-    "TYPICAL_HUMIDITY",
-    "TYPICAL_PRESSURE",
-    "TYPICAL_TEMPERATURE",
-    "U_DENSITY",
-    "U_SOUND",
-    "U_VISCOSITY",
-    "air_density",
-    "air_viscosity",
-    "saturation_pressure",
-    "speed_of_sound",
-]
-
 # Relative standard uncertainties of the three equations for a laboratory's air.
 U_DENSITY = 2e-4  # equation: 22 ppm [1]_; carbon dioxide of a lecture room, 400 to 1500 ppm: up to 0.04 %
 U_VISCOSITY = 5e-3  # equation: 1 % at k = 2 [3]_; humidity, which it ignores: up to 0.3 %

@@ -9,8 +9,6 @@ from pipeline.errors import TrackError
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import Track
 
-__all__ = ["U_CRYSTAL", "Instrument"]
-
 U_CRYSTAL = 50e-6 / math.sqrt(3.0)
 """Relative standard uncertainty of a crystal's rate: 50 ppm as the half-width of a rectangular distribution."""
 HOST_LIMIT = 500e-6

@@ -12,8 +12,6 @@ from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.laws import LAW_NAMES
 
-__all__ = ["PLACES", "Scene"]
-
 POSITIONS = ("below", "above")
 _CHOICES = {("sensor", "position"): ("sensor_position", POSITIONS), ("damping", "law"): ("damping_law", LAW_NAMES)}
 """Keys of a scene file with text values: the attribute for each key, and the allowed texts."""
@@ -30,8 +28,6 @@ class _Quantity(NamedTuple):
     unit: str
     least: float
     greatest: float
-    usual: tuple[float, float] = (-math.inf, math.inf)  # usual range at a bench; other values are queried
-    mistaken: tuple[tuple[str, float, float], ...] = ()  # units used by mistake: name, zero, size
 
     def allowed(self) -> str:
         """Return the range in words."""
@@ -40,40 +36,26 @@ class _Quantity(NamedTuple):
             return f"more than 0{unit}, from {self.least:g} to {self.greatest:g}"
         return f"at least {self.least:g}{unit} and at most {self.greatest:g}"
 
-    def meant(self, number: float) -> str:
-        """Return a question naming the other units in which a number would be usual; empty if there are none."""
-        low, high = max(self.usual[0], self.least), min(self.usual[1], self.greatest)
-        likely = [(name, (number - zero) * size) for name, zero, size in self.mistaken]
-        suggestions = [f"{name}: {value:.6g}" for name, value in likely if low <= value <= high]
-        return f" (did you mean {' or '.join(suggestions)}?)" if suggestions else ""
 
-
-_GRAMS = (("grams", 0.0, 1e-3),)
-_LENGTHS = (("centimetres", 0.0, 1e-2), ("millimetres", 0.0, 1e-3))
-_SPEEDS = (("cm/s", 0.0, 1e-2), ("mm/s", 0.0, 1e-3))
-_STIFFNESSES = (("N/mm", 0.0, 1e3), ("N/cm", 0.0, 1e2), ("dyn/cm", 0.0, 1e-3))
-_DEGREES = (("fahrenheit", 32.0, 5 / 9), ("kelvin", 273.15, 1.0))
-_PRESSURES = (("hectopascals", 0.0, 1e2), ("kilopascals", 0.0, 1e3), ("mm of mercury", 0.0, 133.322))
-_PERCENT = (("percent", 0.0, 1e-2),)
+USUAL_BOB_KG = (1e-3, 20.0)  # a bob of a bench; a mass beyond is probably in grams
 
 _QUANTITIES: dict[tuple[str, str], _Quantity] = {
-    ("bob", "mass_kg"): _Quantity("bob_mass_kg", "kg", 1e-12, 1e6, (1e-3, 20.0), _GRAMS),
-    ("spring", "mass_kg"): _Quantity("spring_mass_kg", "kg", 0.0, 1e6, (0.0, 2.0), _GRAMS),
-    ("spring", "constant_n_per_m"): _Quantity("spring_constant_n_per_m", "N/m", 1e-12, 1e12, (0.1, 1e4), _STIFFNESSES),
-    ("spring", "cubic_n_per_m3"): _Quantity("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18, (-1e9, 1e9)),
-    ("disc", "diameter_m"): _Quantity("disc_diameter_m", "m", 1e-6, 1e3, (5e-3, 2.0), _LENGTHS),
-    ("air", "temperature_c"): _Quantity("air_temperature_c", "degC", -100.0, 200.0, (-20.0, 50.0), _DEGREES),
-    ("air", "pressure_pa"): _Quantity("air_pressure_pa", "Pa", 1e-3, 1e7, (5e4, 1.1e5), _PRESSURES),
-    ("air", "relative_humidity"): _Quantity("air_relative_humidity", "", 0.0, 1.0, mistaken=_PERCENT),
-    ("sensor", "sigma_m"): _Quantity("sensor_sigma_m", "m", 1e-12, 1e3, (1e-8, 0.05), _LENGTHS),
-    ("sensor", "mean_samples"): _Quantity("sensor_mean_samples", "", 1.0, 1e4, (1.0, 1e3)),
-    ("sensor", "median_samples"): _Quantity("sensor_median_samples", "", 1.0, 1e4, (1.0, 1e3)),
-    ("sensor", "lag_s"): _Quantity("sensor_lag_s", "s", 0.0, 1e3, (0.0, 2.0), (("milliseconds", 0.0, 1e-3),)),
-    ("start", "displacement_m"): _Quantity("start_displacement_m", "m", -1e3, 1e3, (-1.0, 1.0), _LENGTHS),
-    ("start", "velocity_m_per_s"): _Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6, (-20.0, 20.0), _SPEEDS),
-    ("damping", "gamma_per_s"): _Quantity("gamma_per_s", "1/s", 0.0, 1e6, (0.0, 100.0)),
-    ("damping", "beta_per_m_s"): _Quantity("beta_per_m_s", "1/(m s)", 0.0, 1e6, (0.0, 1e3)),
-    ("damping", "mu_m_per_s"): _Quantity("mu_m_per_s", "m/s", 0.0, 1e6, (0.0, 1.0), _SPEEDS),
+    ("bob", "mass_kg"): _Quantity("bob_mass_kg", "kg", 1e-12, 1e6),
+    ("spring", "mass_kg"): _Quantity("spring_mass_kg", "kg", 0.0, 1e6),
+    ("spring", "constant_n_per_m"): _Quantity("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
+    ("spring", "cubic_n_per_m3"): _Quantity("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
+    ("disc", "diameter_m"): _Quantity("disc_diameter_m", "m", 1e-6, 1e3),
+    ("air", "temperature_c"): _Quantity("air_temperature_c", "degC", -100.0, 200.0),
+    ("air", "pressure_pa"): _Quantity("air_pressure_pa", "Pa", 1e-3, 1e7),
+    ("air", "relative_humidity"): _Quantity("air_relative_humidity", "", 0.0, 1.0),
+    ("sensor", "sigma_m"): _Quantity("sensor_sigma_m", "m", 1e-12, 1e3),
+    ("sensor", "mean_samples"): _Quantity("sensor_mean_samples", "", 1.0, 1e4),
+    ("sensor", "lag_s"): _Quantity("sensor_lag_s", "s", 0.0, 1e3),
+    ("start", "displacement_m"): _Quantity("start_displacement_m", "m", -1e3, 1e3),
+    ("start", "velocity_m_per_s"): _Quantity("start_velocity_m_per_s", "m/s", -1e6, 1e6),
+    ("damping", "gamma_per_s"): _Quantity("gamma_per_s", "1/s", 0.0, 1e6),
+    ("damping", "beta_per_m_s"): _Quantity("beta_per_m_s", "1/(m s)", 0.0, 1e6),
+    ("damping", "mu_m_per_s"): _Quantity("mu_m_per_s", "m/s", 0.0, 1e6),
 }
 
 PLACES = {quantity.attribute: place for place, quantity in _QUANTITIES.items()}
@@ -101,7 +83,6 @@ class Scene:
     sensor_sigma_m: Estimate | None = None
     sensor_position: str | None = None
     sensor_mean_samples: Estimate | None = None
-    sensor_median_samples: Estimate | None = None
     sensor_lag_s: Estimate | None = None
     start_displacement_m: Estimate | None = None
     start_velocity_m_per_s: Estimate | None = None
@@ -174,16 +155,14 @@ class Scene:
         return tables
 
     def unusual(self) -> tuple[str, ...]:
-        """Return a clause for every implausible value or uncertainty, with the unit that may be mistaken."""
+        """Return a clause for every implausible mass of the bob, and for values no larger than their uncertainties."""
         clauses = []
+        if (bob := self.bob_mass_kg) is not None and not USUAL_BOB_KG[0] <= bob.value <= USUAL_BOB_KG[1]:
+            usual = f"{USUAL_BOB_KG[0]:g} to {USUAL_BOB_KG[1]:g} kg"
+            clauses.append(f"[bob] mass_kg = {bob.value:g} is beyond {usual}: did you mean grams?")
         for (table, key), q in _QUANTITIES.items():
             found: Estimate | None = getattr(self, q.attribute)
-            if found is None:
-                continue
-            if not q.usual[0] <= found.value <= q.usual[1]:
-                usual = f"{q.usual[0]:g} to {q.usual[1]:g} {q.unit}"
-                clauses.append(f"[{table}] {key} = {found.value:g} is beyond {usual}{q.meant(found.value)}")
-            elif q.least > 0.0 and found.u >= found.value:
+            if found is not None and q.least > 0.0 and found.u >= found.value:
                 clauses.append(
                     f"[{table}] {key} = {found.value:g} has an uncertainty as large as the value, u = {found.u:g}"
                 )
@@ -228,7 +207,7 @@ def _quantity(table: str, key: str, given: object, where: str) -> Estimate:
         value, u = given["value"], given.get("u", 0.0)
     number, spread = _number(value, name), _number(u, f"{name}, its u")
     if not quantity.least <= number <= quantity.greatest:
-        raise SceneError(f"{name} must be {quantity.allowed()}, got {number:g}{quantity.meant(number)}")
+        raise SceneError(f"{name} must be {quantity.allowed()}, got {number:g}")
     if spread < 0:
         raise SceneError(f"{name}: its u must not be negative, got {spread:g}")
     if spread > quantity.greatest:

@@ -7,8 +7,6 @@ import math
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 
-__all__ = ["GRAVITY_M_PER_S2", "HEAVIEST_SHARE", "oscillating_mass_kg", "unstated_spring_kg"]
-
 GRAVITY_M_PER_S2 = 9.80665  # standard gravity, by definition (3rd CGPM, 1901)
 HEAVIEST_SHARE = 0.3
 """Maximum mass of an unweighed spring over the bob's; laboratory springs have 5 to 50 g for bobs of 0.1 to 0.5 kg."""

@@ -11,8 +11,6 @@ from pipeline.motion.phase import PhaseFit
 from pipeline.track import U8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["Clusters", "count_quality", "echoes_by_chance", "find_clusters"]
-
 LEAST = 3  # minimum number of false echoes in a cluster
 BRIDGED = 2  # maximum number of good samples between two false echoes of one cluster
 CHANCE = 1e-3  # probability of a finding for a record whose noise is normal

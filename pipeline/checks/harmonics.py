@@ -12,28 +12,10 @@ from pipeline.checks.misfit import Misfit
 from pipeline.checks.residuals import Residuals
 from pipeline.track import F8
 
-__all__ = ["Harmonics", "Params", "find_harmonics"]
-
 BINS = 64  # phase bins per period; the eighth harmonic keeps sin(pi 8/64)/(pi 8/64) = 0.97 of its amplitude
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`find_harmonics`.
-
-    Parameters
-    ----------
-    false_alarm : float
-        Probability that white noise shows a given harmonic.
-    highest : int
-        Highest order of harmonics that are sought.
-    parts : int
-        Number of parts of the run that must agree on a harmonic.
-    """
-
-    false_alarm: float = 1e-6
-    highest: int = 8
-    parts: int = 16
+FALSE_ALARM = 1e-6  # probability that white noise shows a given harmonic
+HIGHEST = 8  # highest order of harmonics that are sought
+PARTS = 16  # number of parts of the run that must agree on a harmonic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +48,7 @@ class Harmonics:
     misfit: Misfit
 
 
-def find_harmonics(residuals: Residuals, least_m: float, params: Params | None = None) -> Harmonics | None:
+def find_harmonics(residuals: Residuals, least_m: float) -> Harmonics | None:
     """Return the harmonics that are significant in the residuals; None if there are none.
 
     Parameters
@@ -74,7 +56,6 @@ def find_harmonics(residuals: Residuals, least_m: float, params: Params | None =
     residuals : Residuals
     least_m : float
         Maximum of a wave that rounding and the decay within a period explain, m.
-    params : Params, optional
 
     Notes
     -----
@@ -92,22 +73,21 @@ def find_harmonics(residuals: Residuals, least_m: float, params: Params | None =
     :math:`\\cos^3\\varphi = (3\\cos\\varphi + \\cos 3\\varphi)/4`. If this contribution decays as the square of the
     amplitude, the relative error of the damping rate is twice that of the amplitude.
     """
-    params = params or Params()
     turns = residuals.phase * (1.0 / (2.0 * math.pi))
     bins = ((turns - np.floor(turns)) * BINS).astype(np.int64)
     np.minimum(bins, BINS - 1, out=bins)
-    orders = np.arange(2, min(params.highest, int(math.pi / residuals.radians_per_sample) - 1) + 1)
+    orders = np.arange(2, min(HIGHEST, int(math.pi / residuals.radians_per_sample) - 1) + 1)
     if not orders.size:
         return None
-    steady = _folded(residuals, bins, orders, np.ones((orders.size, residuals.values.size)), params.parts)
+    steady = _folded(residuals, bins, orders, np.ones((orders.size, residuals.values.size)), PARTS)
     mean, chance = steady
     falls = False
     if residuals.relative is not None:
         powers = residuals.relative ** orders[:, None]
-        falling = _folded(residuals, bins, orders, powers, params.parts)
+        falling = _folded(residuals, bins, orders, powers, PARTS)
         if falls := float(np.min(falling[1])) < float(np.min(chance)):
             mean, chance = falling
-    stands = np.flatnonzero(chance < params.false_alarm)
+    stands = np.flatnonzero(chance < FALSE_ALARM)
     if not stands.size:
         return None
     waves = np.exp(1j * orders[:, None] * _CENTRES)[stands]

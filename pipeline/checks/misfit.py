@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from pipeline.registry.quantities import check_input
 
-__all__ = ["Misfit"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:

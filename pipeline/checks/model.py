@@ -9,19 +9,26 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.checks.misfit import Misfit
 from pipeline.checks.residuals import Residuals
-from pipeline.damping.average import average_over_laws
 from pipeline.motion.fitted import Fitted
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
+from pipeline.windows.demodulate import ROUNDING
 
-__all__ = ["Contradiction", "ModelCheck", "Params", "check_model"]
+# Maximum ratio of the residuals of the whole model to the noise within a period. Above it the model counts as
+# incomplete, because the part that it does not describe is about as large as the noise.
+EXCESS = 1.5
+FALSE_ALARM = 1e-4  # probability that the phases, or the halves, of a run that follows its model contradict it
+COLOUR = 0.5  # correlation of the residuals, at any lag, above which they are not noise
+LEAST_SHARE = 0.01  # minimum of the predictable part of the residuals, over the amplitude: users can act on one percent
+LEAST_WINDOWS = 8  # minimum number of windows in a half for the halves to be compared
+# Minimum number of samples in a window for the correlation of residuals to be tested. With fewer samples, the fit of
+# five parameters correlates the residuals.
+LEAST_SAMPLES = 20
 
 
 class Contradiction(enum.Enum):
@@ -31,36 +38,6 @@ class Contradiction(enum.Enum):
     PHASE = "phase"
     HALVES = "halves"
     COLOUR = "colour"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`check_model`.
-
-    Parameters
-    ----------
-    excess : float
-        Maximum ratio of the residuals of the whole model to the noise within a period. Above it the model counts as
-        incomplete, because the part that it does not describe is about as large as the noise.
-    false_alarm : float
-        Probability that the phases, or the halves, of a run that follows its model contradict it.
-    colour : float
-        Correlation of the residuals, at any lag, above which they are not noise.
-    least_share : float
-        Minimum of the predictable part of the residuals, over the amplitude: users can act on one percent.
-    least_windows : int
-        Minimum number of windows in a half for the halves to be compared.
-    least_samples : int
-        Minimum number of samples in a window for the correlation of residuals to be tested. With fewer samples, the
-        fit of five parameters correlates the residuals.
-    """
-
-    excess: float = 1.5
-    false_alarm: float = 1e-4
-    colour: float = 0.5
-    least_share: float = 0.01
-    least_windows: int = 8
-    least_samples: int = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +59,6 @@ class ModelCheck:
         Difference between the halves, in standard uncertainties.
     correlation, lag_s : float
         The strongest correlation of the residuals and its lag; 0 if it is below the limit.
-    misfits : tuple of Misfit
-        Difference to a fit of the whole waveform if the halves disagree; otherwise empty.
     """
 
     contradictions: tuple[Contradiction, ...]
@@ -94,14 +69,13 @@ class ModelCheck:
     halves: float
     correlation: float
     lag_s: float
-    misfits: tuple[Misfit, ...]
 
 
 def check_model(
     fitted: Fitted,
     residuals: Residuals | None,
-    fit_waveform: Callable[[], Fitted] | None,
-    params: Params | None = None,
+    shortest: int,
+    least_m: float,
 ) -> ModelCheck:
     """Return how far a run contradicts the model that was fitted to it.
 
@@ -111,39 +85,32 @@ def check_model(
         The fit by windows.
     residuals : Residuals or None
         The residuals that no other check explains; None if another check explains all of them.
-    fit_waveform : callable or None
-        Function that fits the whole waveform; it is called if the halves disagree. None if this fit was done already,
-        or takes too long.
-    params : Params, optional
+    shortest : int
+        Shortest lag at which correlations of the residuals are not explained by another check.
+    least_m : float
+        Error of the sinusoidal model, m, which is larger than the noise of computed records.
 
     Notes
     -----
     The residuals of amplitudes and phases, over their standard uncertainties, are fitted by a straight line in each
     half. If the model is correct, the differences in level and slope are four standard normal numbers, of which the
-    largest is tested. If it is not, the fits by windows and by the whole waveform weight its error differently, and
-    neither is known to be better. So the values of the windows are kept, and their differences from those of the
-    waveform are standard uncertainties.
+    largest is tested.
     """
     from scipy.special import ndtri
 
-    params = params or Params()
     demodulated, phase, noise_m = fitted.demodulated, fitted.phase, fitted.demodulated.noise_m
     found = []
-    if noise_m > 0.0 and fitted.waveform.rms_m > params.excess * noise_m:
+    if fitted.waveform.rms_m > EXCESS * max(noise_m, least_m):
         found.append(Contradiction.RESIDUALS)
     free = (demodulated.t.size - phase.coefficients.size) / phase.correlation
-    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - params.false_alarm, free) / free:
+    if free >= 1.0 and phase.reduced_chi2 > chi2_quantile(1.0 - FALSE_ALARM, free) / free:
         found.append(Contradiction.PHASE)
-    correlation, lag_s = (0.0, 0.0) if residuals is None else _colour(residuals, params)
+    correlation, lag_s = (0.0, 0.0) if residuals is None else _colour(residuals, shortest)
     if correlation:
         found.append(Contradiction.COLOUR)
-    halves = _halves(fitted, params.least_windows)
-    misfits: tuple[Misfit, ...] = ()
-    if halves > -float(ndtri(params.false_alarm / 8.0)):
+    halves = _halves(fitted, LEAST_WINDOWS)
+    if halves > -float(ndtri(FALSE_ALARM / 8.0)):
         found.append(Contradiction.HALVES)
-        whole = None if fit_waveform is None else fit_waveform()
-        if whole is not None and whole.full is not None and whole.full.converged:
-            misfits = (_difference(fitted, whole),)
     return ModelCheck(
         tuple(found),
         fitted.waveform.rms_m,
@@ -153,11 +120,10 @@ def check_model(
         halves,
         correlation,
         lag_s,
-        misfits,
     )
 
 
-def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
+def _colour(residuals: Residuals, shortest: int) -> tuple[float, float]:
     """Return the strongest correlation of the residuals and its lag, s; 0 and 0 if it is below the limits.
 
     The correlations of n samples of white noise have a standard deviation of :math:`n^{-1/2}`. With the probability
@@ -166,7 +132,7 @@ def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
     from scipy.fft import irfft, next_fast_len, rfft
     from scipy.special import ndtri
 
-    if residuals.samples_per_window < params.least_samples:
+    if residuals.samples_per_window < LEAST_SAMPLES:
         return 0.0, 0.0
     lags = residuals.used.size // 2
     size = next_fast_len(residuals.used.size + lags, real=True)
@@ -179,12 +145,14 @@ def _colour(residuals: Residuals, params: Params) -> tuple[float, float]:
         return 0.0, 0.0
     enough = pairs > 0.25 * pairs[0]
     correlation = np.where(enough, sums / np.maximum(pairs, 1.0), 0.0) / (sums[0] / pairs[0])
-    lag = 1 + int(np.argmax(np.abs(correlation[1:])))
-    white = -float(ndtri(params.false_alarm / (2.0 * lags))) / math.sqrt(pairs[lag] or 1.0)
+    if shortest > lags:
+        return 0.0, 0.0
+    lag = shortest + int(np.argmax(np.abs(correlation[shortest:])))
+    white = -float(ndtri(FALSE_ALARM / (2.0 * lags))) / math.sqrt(pairs[lag] or 1.0)
     # With fewer pairs than samples the estimate may exceed 1, which a correlation cannot.
     strongest = max(-1.0, min(float(correlation[lag]), 1.0))
     predictable_m = math.sqrt(abs(strongest) * sums[0] / pairs[0])
-    if abs(strongest) <= max(params.colour, white) or predictable_m < params.least_share * residuals.amplitude_m:
+    if abs(strongest) <= max(COLOUR, white) or predictable_m < LEAST_SHARE * residuals.amplitude_m:
         return 0.0, 0.0
     return strongest, lag * residuals.interval_s
 
@@ -196,7 +164,7 @@ def _halves(fitted: Fitted, least_windows: int) -> float:
         return 0.0
     amplitudes = demodulated.amplitude - damping.best.amplitude(demodulated.t - damping.t0)
     phases = demodulated.phase - phase.total(demodulated.t)
-    u_phase = np.sqrt(demodulated.covariance[:, 1, 1])
+    u_phase = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), ROUNDING)
     half = demodulated.t.size // 2
     return max(_apart(part[:half], part[-half:]) for part in (amplitudes / damping.scatter.u, phases / u_phase))
 
@@ -212,26 +180,3 @@ def _apart(first: F8, second: F8) -> float:
     level = abs(float(change.sum())) / math.sqrt(2.0 * n)
     slope = abs(float(x @ change)) / math.sqrt(2.0 * float(x @ x))
     return max(level, slope)
-
-
-def _difference(fitted: Fitted, whole: Fitted) -> Misfit:
-    """Return the differences between the estimates by windows and by the whole waveform."""
-    omega = fitted.phase.angular_frequency.value
-    size_m, rate = (b - a for a, b in zip(_at_start(fitted), _at_start(whole), strict=True))
-    return Misfit(
-        name="choice_of_fit",
-        amplitude_m=abs(size_m),
-        offset_m=abs(whole.rest.mean.value - fitted.rest.mean.value),
-        phase_rad=abs(math.remainder(whole.phase.phase.value - fitted.phase.phase.value, 2.0 * math.pi)),
-        damping_rate=abs(rate),
-        clock=abs(whole.phase.angular_frequency.value / omega - 1.0),
-    )
-
-
-def _at_start(fitted: Fitted) -> tuple[float, float]:
-    """Return amplitude, m, and damping rate, 1/s, at the start, averaged over the laws."""
-    laws = average_over_laws(fitted.damping, math.sqrt(float(np.mean(fitted.demodulated.amplitude**2))))
-    return (
-        sum(one.weight * float(one.fit.joint.values[0]) for one in laws),
-        sum(one.weight * one.fit.rate_at_start() for one in laws),
-    )

@@ -9,19 +9,15 @@ import numpy as np
 from pipeline.motion.fitted import Fitted
 from pipeline.numerics.quantity import amount, noun
 from pipeline.samples.condition import Conditioned
-from pipeline.track import UNUSABLE, Track
+from pipeline.track import UNUSABLE
 from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import Demodulated
-
-__all__ = ["check_coherence", "check_sinusoid", "typical_miss"]
 
 MOST_BENT = 0.25  # maximum residual over the amplitude: parabolas leave 0.19, a motion seen mostly as plateaus 0.35
 FOLDED = 32  # phase bins per period
 ALIKE = 0.25  # maximum share of the residual's variance by which similar periods may differ
 WANDERING = 0.3  # maximum residual beyond white noise, over the amplitude
 MANY = 8  # number of windows from which a motion with residuals below MOST_BENT is judged by its coherence instead
-FEWEST, ASTRAY = 4, 0.8  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
-ALONE, SEEN = 1e-6, 0.5  # probability of a spectral line in white noise, and share of its evidence that the fit needs
 
 
 def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
@@ -63,41 +59,6 @@ def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
     bins = ((turns - np.floor(turns)) * FOLDED).astype(np.int64) % FOLDED
     means = np.bincount(bins, left, FOLDED) / np.maximum(np.bincount(bins, minlength=FOLDED), 1)
     return demodulated.t.size >= 4 and float(np.var(left - means[bins])) < ALIKE * float(np.var(left))
-
-
-def check_coherence(fitted: Fitted, track: Track, typical: float) -> NoOscillation | None:
-    """Return why a motion is no oscillation, although single periods look like one; None if it is one.
-
-    Parameters
-    ----------
-    fitted : Fitted
-    track : Track
-        The record.
-    typical : float
-        Result of :func:`typical_miss`.
-
-    Notes
-    -----
-    Amplitude and phase of a window form a phasor, which the damping law and the fit of the phase predict. Random
-    phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
-    differ from it by less than :data:`ASTRAY` times their length. The oscillation must also explain part of the
-    variance: a significant spectral line in n samples of white noise reduces the sum of squares by
-    :math:`(2/n)\\ln(n/\\alpha)` of the remaining sum.
-    """
-    demodulated = fitted.demodulated
-    if demodulated.t.size < FEWEST:
-        return None
-    used = (demodulated.flags & UNUSABLE) == 0
-    left = fitted.waveform.residual[used]
-    swing = left + (fitted.waveform.position - fitted.rest.at(track.t))[used]
-    gain = 0.5 * left.size * (float(swing @ swing) / max(float(left @ left), 1e-300) - 1.0)
-    if gain < SEEN * math.log(left.size / ALONE):
-        return NoOscillation("the oscillation explains no more of the variance than noise would")
-    if typical < ASTRAY:
-        return None
-    return NoOscillation(
-        f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"
-    )
 
 
 def typical_miss(fitted: Fitted) -> float:

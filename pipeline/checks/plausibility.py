@@ -15,31 +15,15 @@ from pipeline.samples.condition import Conditioned
 from pipeline.track import UNUSABLE
 from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["Params", "Plausibility", "check_plausibility"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`check_plausibility`.
-
-    Parameters
-    ----------
-    farthest_m : float
-        Maximum distance that an ultrasonic rangefinder measures, m: the longest range is 10 m (MaxBotix XL-MaxSonar),
-        and a tenth is added.
-    most_gravities : float
-        Maximum acceleration over that of gravity. A bob on a spring that can only pull reaches 1, and little more if
-        the spring goes slack.
-    longest_sag_m : float
-        Maximum extension of the spring by the bob at rest, m: 25 m correspond to a period of 10 s.
-    fewest_per_period : float
-        Minimum number of samples per period: below two the frequency is aliased, and below four noise decides.
-    """
-
-    farthest_m: float = 11.0
-    most_gravities: float = 1.2
-    longest_sag_m: float = 25.0
-    fewest_per_period: float = 4.0
+# Maximum distance that an ultrasonic rangefinder measures, m: the longest range is 10 m (MaxBotix XL-MaxSonar), and a
+# tenth is added.
+FARTHEST_M = 11.0
+# Maximum acceleration over that of gravity. A bob on a spring that can only pull reaches 1, and little more if the
+# spring goes slack.
+MOST_GRAVITIES = 1.2
+LONGEST_SAG_M = 25.0  # maximum extension of the spring by the bob at rest, m: 25 m correspond to a period of 10 s
+# Minimum number of samples per period: below two the frequency is aliased, and below four noise decides.
+FEWEST_PER_PERIOD = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,16 +56,13 @@ class Plausibility:
     misfits: tuple[Misfit, ...]
 
 
-def check_plausibility(
-    conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit, params: Params | None = None
-) -> Plausibility:
+def check_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit) -> Plausibility:
     """Compare a motion with the limits for a bob on a spring and for a distance sensor.
 
     Parameters
     ----------
     conditioned, demodulated, phase
         Outputs of the stages with the same names.
-    params : Params, optional
 
     Notes
     -----
@@ -91,7 +72,6 @@ def check_plausibility(
     uncertainty is :math:`1 - 1/n`. If a distance is impossible, the uncertainty of the rest position is as large as the
     rest position. The bob at rest extends its spring by :math:`g/\\omega^2`.
     """
-    params = params or Params()
     track = conditioned.track
     used = (demodulated.flags & UNUSABLE) == 0
     t, y = track.t[used], track.y[used]
@@ -102,7 +82,7 @@ def check_plausibility(
     per_value = {"m": omega**2, "m/s": omega, "m/s^2": 1.0}.get(track.unit, math.nan)
     gravities = amplitude * per_value / GRAVITY_M_PER_S2
     sag_m = GRAVITY_M_PER_S2 / omega**2 if math.isfinite(gravities) else math.nan
-    too_fast = gravities > params.most_gravities
+    too_fast = gravities > MOST_GRAVITIES
     misfits = []
     if too_fast:
         misfits.append(Misfit(name="implausible_motion", amplitude_m=amplitude * (1.0 - 1.0 / gravities)))
@@ -111,12 +91,12 @@ def check_plausibility(
     if track.unit == "m" and y.size and track.y[0] != 0.0:
         low_m, high_m = float(np.min(y)), float(np.max(y))
         mean = abs(float(np.mean(demodulated.offset)))
-        if out_of_range := low_m <= 0.0 or high_m > params.farthest_m or amplitude > mean:
+        if out_of_range := low_m <= 0.0 or high_m > FARTHEST_M or amplitude > mean:
             misfits.append(Misfit(name="implausible_distance", offset_m=max(amplitude, mean)))
     return Plausibility(
-        per_period < params.fewest_per_period,
+        per_period < FEWEST_PER_PERIOD,
         too_fast,
-        sag_m > params.longest_sag_m,
+        sag_m > LONGEST_SAG_M,
         out_of_range,
         per_period,
         f,

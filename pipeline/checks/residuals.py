@@ -13,8 +13,6 @@ from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
 
-__all__ = ["Residuals", "residuals_of"]
-
 FEWEST = 64  # minimum number of samples: four in each of the sixteen parts in which harmonics are compared
 
 

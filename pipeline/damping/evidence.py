@@ -19,8 +19,6 @@ from pipeline.damping.laws import LAWS, Law
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 
-__all__ = ["BARE_MENTION", "NEGATIVE", "Weighed", "choose", "least_chi2", "weigh"]
-
 # Difference of BIC below which evidence is "not worth more than a bare mention": Kass and Raftery, J. Am. Stat. Assoc.
 # 90 (1995) 773.
 BARE_MENTION = 2.0

@@ -10,47 +10,29 @@ from typing import Literal
 import numpy as np
 
 from pipeline.damping.evidence import NEGATIVE, choose
-from pipeline.damping.law_fit import rates_of
-from pipeline.damping.laws import LAWS, Law, in_units, words_of
-from pipeline.damping.select import Damping, Params
+from pipeline.damping.law_fit import LawFit, rates_of
+from pipeline.damping.laws import Law, words_of
+from pipeline.damping.select import EVIDENCE, REJECTION, Damping
 from pipeline.errors import AnalysisError
-from pipeline.numerics import least_squares
-from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.regression import chi2_quantile, covariance_of
+from pipeline.numerics.estimate import Joint
+from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
-from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["JointDamping", "JointFit", "fit_joint"]
-
-Rejection = Literal["", "misfit", "differ", "negative", "not converged"]
+Rejection = Literal["", "misfit", "differ", "negative"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointFit:
-    """The fit of one law to all runs, with common coefficients.
+    """One law with coefficients that all runs share; ``chi2`` and ``dof`` are reduced for the correlation of points.
 
-    Parameters
-    ----------
-    law : Law
-    coefficients : Joint
-        The common coefficients; empty for the law "none".
-    amplitudes : tuple of Estimate
-        Amplitude at the start of each run, m.
-    chi2, dof : float
-        Chi-square and degrees of freedom of all runs together, reduced for the correlation between points.
-    bic : float
-        Bayesian information criterion, up to a constant that is the same for all laws.
-    excess_chi2, excess_dof : float
-        The increase of chi-square over separate fits of the runs, and the number of coefficients saved.
-    rejection : {"", "misfit", "differ", "negative", "not converged"}
-        Why the law does not describe all runs, if it does not: chi-square is improbable; each run follows the law but
-        the coefficients differ; a parameter is negative by more than two standard uncertainties; the fit did not
-        converge.
+    ``excess_chi2`` is the increase of chi-square over separate coefficients, and ``excess_dof`` their number saved.
+    The law is rejected if chi-square is improbable, if the coefficients differ or if one is negative.
     """
 
     law: Law
     coefficients: Joint
-    amplitudes: tuple[Estimate, ...]
+    largest_m: float
+    smallest_m: float
     chi2: float
     dof: float
     bic: float
@@ -76,31 +58,10 @@ class JointFit:
         covariance[1:, 1:] = self.coefficients.covariance
         return rates_of(self.law, amplitude, theta, covariance)
 
-    def span(self, times: Sequence[F8]) -> F8:
-        """Return the largest and the smallest amplitude of all runs, m, at times since the start of each run."""
-        ends = [
-            self.law.curve(np.array([0.0, float(t[-1])]), np.concatenate([[a.value], self.coefficients.values]))[0]
-            for t, a in zip(times, self.amplitudes, strict=True)
-        ]
-        return np.array([np.max(ends), np.min(ends)])
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointDamping:
-    """The damping laws fitted to several runs together, and which of them the runs admit.
-
-    Parameters
-    ----------
-    runs : tuple of str
-        Names of the runs.
-    fits : mapping of str to JointFit
-    selected : str
-        As in :class:`pipeline.damping.select.Damping`.
-    admissible : tuple of str
-        Laws that describe all runs, from best to worst; empty if none does.
-    message : str
-        The result in one sentence.
-    """
+    """The damping laws of several runs together; ``admissible`` laws describe all runs, from best to worst."""
 
     runs: tuple[str, ...]
     fits: Mapping[str, JointFit]
@@ -119,158 +80,54 @@ class JointDamping:
         return bool(self.admissible)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Points:
-    """The amplitudes of all runs, concatenated; ``parts`` are the slices of the runs."""
+def join(runs: Sequence[tuple[str, Damping, float]]) -> JointDamping:
+    """Combine the laws of at least two runs of one bob and disc: name, damping and last time since t0, s.
 
-    t: tuple[F8, ...]
-    y: F8
-    u: F8
-    parts: tuple[slice, ...]
-
-
-def fit_joint(runs: Sequence[tuple[str, Demodulated, Damping]], params: Params | None = None) -> JointDamping:
-    """Fit each damping law with coefficients that all runs share and one amplitude for each run.
-
-    Parameters
-    ----------
-    runs : sequence of (name, Demodulated, Damping)
-        At least two runs with the same bob and disc, because the coefficients are inversely proportional to the mass.
-    params : Params, optional
-        Options of :func:`pipeline.damping.select.fit_damping`. Laws without a fit to every run are left out.
-
-    Returns
-    -------
-    JointDamping
-
-    Raises
-    ------
-    AnalysisError
-        If fewer than two runs are given, or no law was fitted to every run.
-
-    Notes
-    -----
-    The points and their uncertainties, including excess scatter, are those of the separate fits. The chi-square of each
-    run is divided by its correlation length. The chi-square of the joint fit, less the sum of those of the separate
-    fits, tests whether the coefficients of the runs are equal. If they are, the difference follows a chi-square
-    distribution whose degrees of freedom are (runs - 1) times the number of coefficients.
+    The coefficients :math:`\\theta_i` of the runs, with the covariances :math:`C_i`, have the generalised least-squares
+    mean :math:`\\bar\\theta`. If they are equal, :math:`\\sum_i (\\theta_i - \\bar\\theta)^T C_i^{-1}
+    (\\theta_i - \\bar\\theta)` has a chi-square distribution with (runs - 1) times their number of degrees of freedom.
     """
-    params = params or Params()
     if len(runs) < 2:
         raise AnalysisError(f"a joint fit needs two runs at least, got {len(runs)}")
-    laws = {name: fit.law for _, _, damping in runs for name, fit in damping.fits.items()}
-    # User-defined laws are always included if they were fitted.
-    allowed = {law if isinstance(law, str) else law.name for law in params.laws}
-    wanted = [name for name in laws if name in allowed or name not in LAWS]
-    shared = [name for name in wanted if all(name in damping.fits for _, _, damping in runs)]
+    shared = [name for name in runs[0][1].fits if all(name in damping.fits for _, damping, _ in runs)]
     if not shared:
-        raise AnalysisError("no damping law was fitted to every run; a joint fit has nothing to join")
-    points = _points(runs)
-    fits = {name: _fit(laws[name], runs, points, params) for name in shared}
-    # As for one run, a law is left out if the windows do not determine its parameters.
-    fits = {name: fit for name, fit in fits.items() if math.isfinite(fit.chi2) and _determined(fit)}
-    if not fits:
-        raise AnalysisError("no damping law could be fitted to the runs together; fit them one by one")
-    ends = points.t
-    selected, admissible = choose(fits, params.evidence, lambda name: fits[name].span(ends))
+        raise AnalysisError("no damping law was fitted to every run; compare runs of the same bob")
+    last_s = [seconds for _, _, seconds in runs]
+    fits = {name: _joined([damping.fits[name] for _, damping, _ in runs], last_s) for name in shared}
+
+    def span(name: str) -> F8:
+        return np.array([fits[name].largest_m, fits[name].smallest_m])
+
+    selected, admissible = choose(fits, EVIDENCE, span)
     names = tuple(name for name, _, _ in runs)
     return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
 
 
-def _determined(fit: JointFit) -> bool:
-    coefficients = bool(np.isfinite(fit.coefficients.covariance).all())
-    return coefficients and all(math.isfinite(amplitude.u) for amplitude in fit.amplitudes)
-
-
-def _points(runs: Sequence[tuple[str, Demodulated, Damping]]) -> _Points:
-    times, values, errors, parts = [], [], [], []
-    at = 0
-    for _, demodulated, damping in runs:
-        spread = damping.scatter
-        kept = spread.kept
-        times.append((demodulated.t - damping.t0)[kept])
-        values.append(demodulated.amplitude[kept])
-        # Correlated points count as fewer points, so their uncertainties are increased.
-        errors.append(spread.u[kept] * math.sqrt(spread.correlation))
-        parts.append(slice(at, at + int(np.count_nonzero(kept))))
-        at = parts[-1].stop
-    return _Points(tuple(times), np.concatenate(values), np.concatenate(errors), tuple(parts))
-
-
-def _curve(law: Law, points: _Points, theta: F8) -> F8:
-    """Return the amplitudes (n,) of all runs; ``theta`` contains the start amplitudes, then the coefficients."""
-    count = len(points.t)
-    return np.concatenate([law.curve(t, np.append(theta[run], theta[count:]))[0] for run, t in enumerate(points.t)])
-
-
-def _slopes(law: Law, points: _Points, theta: F8) -> F8:
-    """Return the derivatives (n, p) of the amplitudes of all runs by the parameters."""
-    count = len(points.t)
-    slopes = np.zeros((points.y.size, theta.size))
-    for run, (t, part) in enumerate(zip(points.t, points.parts, strict=True)):
-        _, by = law.curve(t, np.append(theta[run], theta[count:]))
-        slopes[part, run], slopes[part, count:] = by[:, 0], by[:, 1:]
-    return slopes
-
-
-def _fit(law: Law, runs: Sequence[tuple[str, Demodulated, Damping]], points: _Points, params: Params) -> JointFit:
-    count, shared = len(runs), len(law.parameters) - 1
-    own = [damping.fits[law.name] for _, _, damping in runs]
-    length = float(np.sqrt(np.mean(points.y**2))) or 1.0
-    theta = _scaled(law, _start([fit.joint for fit in own]), length, count)
-    y, u = points.y / length, points.u / length
-    end = least_squares.minimise(
-        lambda at: (_curve(law, points, at) - y) / u,
-        theta,
-        lambda at: _slopes(law, points, at) / u[:, None],
-    )
-    values = _scaled(law, end.values, 1.0 / length, count)
-    with np.errstate(all="ignore"):
-        covariance = covariance_of(_slopes(law, points, values) / points.u[:, None])
-    chi2 = end.cost
-    size = sum(float(t.size) / damping.scatter.correlation for t, (_, _, damping) in zip(points.t, runs, strict=True))
-    dof = max(size - values.size, 0.0)
-    separate = sum(
-        _chi2(fit.reduced_chi2, t.size - len(law.parameters)) / damping.scatter.correlation
-        for fit, t, (_, _, damping) in zip(own, points.t, runs, strict=True)
-    )
-    units = own[0].joint.units
-    excess, saved = max(chi2 - separate, 0.0), float((count - 1) * shared)
-    deviation = np.sqrt(np.diag(covariance))
+def _joined(each: Sequence[LawFit], last_s: Sequence[float]) -> JointFit:
+    law, units = each[0].law, each[0].joint.units
+    theta = np.array([fit.joint.values[1:] for fit in each])
+    # A law that chi-square rejects has a wider covariance, which must not hide that the coefficients differ.
+    known = [np.linalg.pinv(fit.joint.covariance[1:, 1:] / fit.widening, hermitian=True) for fit in each]
+    covariance = np.linalg.pinv(np.sum(known, axis=0), hermitian=True)
+    mean = covariance @ np.sum([weight @ own for weight, own in zip(known, theta, strict=True)], axis=0)
+    excess = float(sum((own - mean) @ weight @ (own - mean) for weight, own in zip(known, theta, strict=True)))
+    saved = float((len(each) - 1) * mean.size)
+    chi2 = sum(fit.reduced_chi2 * fit.dof for fit in each if fit.dof > 0) + excess
+    dof = sum(fit.dof for fit in each) + saved
     rejection: Rejection = ""
-    if dof >= 1.0 and chi2 > chi2_quantile(1.0 - params.rejection, dof):
+    if dof >= 1.0 and chi2 > chi2_quantile(1.0 - REJECTION, dof):
         rejection = "misfit"
-    elif saved and excess > chi2_quantile(1.0 - params.rejection, saved):
+    elif saved and excess > chi2_quantile(1.0 - REJECTION, saved):
         rejection = "differ"
-    elif np.any(values < -NEGATIVE * deviation):
+    elif np.any(mean < -NEGATIVE * np.sqrt(np.diag(covariance))):
         rejection = "negative"
-    elif not end.converged:
-        rejection = "not converged"
-    amplitudes = tuple(
-        Estimate(float(a), float(u), units[0]) for a, u in zip(values[:count], deviation[:count], strict=True)
+    ends = [fit.amplitude(np.array([0.0, seconds])) for fit, seconds in zip(each, last_s, strict=True)]
+    count = len(each) + mean.size
+    bic = chi2 + count * math.log(max(dof + count, 2.0))
+    coefficients = Joint(tuple(law.parameters)[1:], mean, covariance, units[1:])
+    return JointFit(
+        law, coefficients, float(np.max(ends)), float(np.min(ends)), chi2, dof, bic, excess, saved, rejection
     )
-    joint = Joint(tuple(law.parameters)[1:], values[count:], covariance[count:, count:], units[1:])
-    bic = chi2 + values.size * math.log(max(size, 2.0))
-    return JointFit(law, joint, amplitudes, chi2, dof, bic, excess, saved, rejection)
-
-
-def _start(joints: Sequence[Joint]) -> F8:
-    """Return start values: the amplitudes of the separate fits, and the weighted means of their coefficients."""
-    amplitudes = [joint.values[0] for joint in joints]
-    coefficients = np.array([joint.values[1:] for joint in joints])
-    weights = 1.0 / np.maximum([np.diag(joint.covariance)[1:] for joint in joints], 1e-300)
-    return np.concatenate([amplitudes, (coefficients * weights).sum(axis=0) / weights.sum(axis=0)])
-
-
-def _scaled(law: Law, theta: F8, length_m: float, count: int) -> F8:
-    """Return all parameters in units of length of ``length_m`` metres."""
-    coefficients = in_units(law, np.concatenate([[1.0], theta[count:]]), length_m=length_m)[1:]
-    return np.concatenate([theta[:count] / length_m, coefficients])
-
-
-def _chi2(reduced: float, free: int) -> float:
-    """Return the chi-square of the fit to one run; 0 if no degree of freedom is left."""
-    return reduced * free if free > 0 else 0.0
 
 
 def _message(names: tuple[str, ...], fits: Mapping[str, JointFit], selected: str, admissible: tuple[str, ...]) -> str:

@@ -15,8 +15,6 @@ from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.numerics.regression import covariance_of, solve_weighted
 from pipeline.track import F8
 
-__all__ = ["LawFit", "Minimum", "Rejection", "joint_of", "mean_squared_rate", "minimum_of", "rates_of"]
-
 Rejection = Literal["", "misfit", "negative", "not converged"]
 
 

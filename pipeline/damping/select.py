@@ -15,52 +15,16 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import ROUNDING, Demodulated
 
-__all__ = ["Damping", "LawFit", "Params", "fit_damping", "select_law"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`fit_damping`.
-
-    Parameters
-    ----------
-    rejection : float
-        Probability with which chi-square rejects a true law.
-    evidence : float
-        A law is not admissible if its BIC exceeds the lowest BIC by more than this; 6 is "strong" [1]_.
-    laws : tuple of str or Law
-        The laws to try: names in :data:`pipeline.damping.laws.LAWS`, or user-defined laws, for example from
-        :func:`pipeline.damping.laws.of_function.make_law`.
-    stated : str, Law or None
-        The law that the damping follows, if the user knows it. It is tried in addition to ``laws`` and selected however
-        well other laws fit, and results are stated by it alone. The record may still contradict it.
-    from_scene : bool
-        Whether a law from the scene counts as stated if ``stated`` is None.
-    otherwise : tuple of str or Law
-        The laws to try instead if the record rejects all of ``laws``, needs both linear and quadratic drag, or fails a
-        test at the level ``doubt``. So no wrong law is stated if only a few laws are tried to save time.
-    doubt : float
-        Probability with which a record that follows one of ``laws`` still causes ``otherwise`` to be tried. The tests
-        are chi-square, and whether a coefficient of linear and quadratic drag together is negative.
-    loosest_power : float
-        Maximum standard uncertainty of a free power that is stated: known powers lie between 0 and 2.
-
-    References
-    ----------
-    .. [1] R. E. Kass, A. E. Raftery, "Bayes factors", J. Am. Stat. Assoc. 90 (1995) 773,
-       doi:10.1080/01621459.1995.10476572.
-    """
-
-    rejection: float = 1e-3
-    evidence: float = 6.0
-    laws: tuple[str | Law, ...] = tuple(LAWS)
-    stated: str | Law | None = None
-    from_scene: bool = True
-    otherwise: tuple[str | Law, ...] = ()
-    doubt: float = 0.01
-    loosest_power: float = 3.0
+REJECTION = 1e-3  # probability with which chi-square rejects a true law
+# A law is not admissible if its BIC exceeds the lowest by more than this, which is "strong" evidence: R. E. Kass,
+# A. E. Raftery, J. Am. Stat. Assoc. 90 (1995) 773.
+EVIDENCE = 6.0
+FEW_LAWS = ("none", "linear", "quadratic", "linear+quadratic")  # those of the tier "fast"
+# Probability with which a record that follows one of the few laws still causes all to be tried.
+DOUBT = 0.01
+LOOSEST_POWER = 3.0  # maximum standard uncertainty of a free power that is stated: known powers lie between 0 and 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,16 +66,6 @@ class Damping:
         return bool(self.stated) and self.selected == self.stated
 
     @property
-    def ahead(self) -> bool:
-        """Whether the selected law is clearly ahead: every other admissible law needs more coefficients.
-
-        It is False if the selected law has no coefficients, or if the record rejects it.
-        """
-        count = len(self.best.law.parameters)
-        others = (len(self.fits[name].law.parameters) for name in self.admissible if name != self.selected)
-        return count > 1 and self.selected in self.admissible and all(more > count for more in others)
-
-    @property
     def best(self) -> LawFit:
         """The fit of the selected law."""
         return self.fits[self.selected]
@@ -139,7 +93,9 @@ class Damping:
         return mean_squared_rate(self.best, self.best.amplitude(t - self.t0))
 
 
-def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = None) -> Damping:
+def fit_damping(
+    demodulated: Demodulated, t0: float, laws: Sequence[str | Law] = tuple(LAWS), stated: str | Law | None = None
+) -> Damping:
     """Fit the damping laws to the windows' amplitudes.
 
     Parameters
@@ -147,7 +103,9 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     demodulated : Demodulated
     t0 : float
         Time at which the analysed part starts, s.
-    params : Params, optional
+    laws, stated
+        As in :class:`pipeline.options.Options`. A stated law is tried in addition to ``laws`` and selected however well
+        other laws fit; the record may still contradict it.
 
     Returns
     -------
@@ -161,52 +119,52 @@ def fit_damping(demodulated: Demodulated, t0: float, params: Params | None = Non
     Notes
     -----
     Real amplitudes scatter more than their noise, for example because of beats with a sideways mode or clusters of
-    false echoes. The excess scatter is measured about a smooth curve that is independent of all laws, so that a wrong
-    law cannot hide its misfit in it. If friction stops the motion, the decay has a corner that no smooth curve
-    follows. A law whose residuals are less than half as large then replaces the curve. Correlated points count as fewer
-    points: chi-square, BIC and degrees of freedom are divided by the correlation length, and the covariance is
-    multiplied by it. If chi-square rejects a law, its covariance comes from its own residuals: it is multiplied by the
-    reduced chi-square, and the correlation length is that of the residuals.
+    false echoes. The excess scatter is measured about a smooth curve that is independent of all laws, so that a
+    wrong law cannot hide its misfit in it. If few windows decay fast, or friction stops the motion, no smooth curve
+    follows the decay. A law whose residuals are less than half as large then replaces the curve. Correlated points
+    count as fewer points: chi-square, BIC and degrees of freedom are divided by the correlation length, and the
+    covariance is multiplied by it. If chi-square rejects a law, its covariance comes from its own residuals: it is
+    multiplied by the reduced chi-square, and the correlation length is that of the residuals.
 
     Drag coefficients are not negative, but their estimates may be by chance; only unbounded estimates are unbiased and
     have correct intervals. So the fits are unbounded. A law is rejected if a coefficient is negative by more than two
     standard uncertainties. The BIC is that of the law's best fit without negative coefficients, which is that of one
     of its special cases.
     """
-    params = params or Params()
     t, amplitude = demodulated.t - t0, demodulated.amplitude
     noise = np.sqrt(demodulated.covariance[:, 0, 0])
     if t.size < 3:
         # One or two points determine no law: the decrease of the amplitude since the start then counts as uncertainty.
         noise = np.hypot(noise, amplitude * demodulated.decay * t)
-    # Even computed data contain rounding errors: without a minimum noise, chi-square would divide by zero.
-    noise = np.maximum(noise, 1e-12 * float(np.max(amplitude)) + 1e-100)
+    # Even for computed data the windows are not exact.
+    noise = np.maximum(noise, ROUNDING * float(np.max(amplitude)) + 1e-100)
     points = _Points(t0, t, amplitude, noise, scatter(t, amplitude, noise))
-    found = _fit_laws(points, params.laws, params)
-    enough = not params.otherwise or (found.admissible and not _curved(found, params.doubt))
-    return found if enough else _fit_laws(points, params.otherwise, params)
+    known = None if stated is None else find_law(stated)
+    found = _fit_laws(points, laws, known)
+    # No wrong law is stated because only a few laws were tried to save time.
+    enough = tuple(laws) != FEW_LAWS or (found.admissible and not _curved(found))
+    return found if enough else _fit_laws(points, tuple(LAWS), known)
 
 
-def select_law(fits: Mapping[str, LawFit], params: Params, last_s: float) -> tuple[str, tuple[str, ...], str]:
-    """Return the selected law, the admissible laws and the stated law, for a record of ``last_s`` seconds.
+def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> tuple[str, tuple[str, ...]]:
+    """Return the selected law and the admissible laws, for a record of ``last_s`` seconds.
 
     A stated law is selected if it has a fit. It is then the only admissible law, or no law is if the record rejects it.
     """
-    stated = "" if params.stated is None else find_law(params.stated).name
-    if stated in fits:
-        return stated, () if fits[stated].rejected else (stated,), stated
+    if known in fits:
+        return known, () if fits[known].rejected else (known,)
     ends = np.array([0.0, last_s])
-    return *choose(fits, params.evidence, lambda name: fits[name].amplitude(ends)), stated
+    return choose(fits, EVIDENCE, lambda name: fits[name].amplitude(ends))
 
 
-def _curved(damping: Damping, doubt: float) -> bool:
+def _curved(damping: Damping) -> bool:
     """Return whether the decay has a curvature that neither linear nor quadratic drag explains alone."""
     mixed, best = damping.of_powers(1, 2), damping.best
-    if best is mixed or (best.dof > 0 and best.reduced_chi2 * best.dof > chi2_quantile(1.0 - doubt, best.dof)):
+    if best is mixed or (best.dof > 0 and best.reduced_chi2 * best.dof > chi2_quantile(1.0 - DOUBT, best.dof)):
         return True
     if mixed is None:
         return False
-    below = math.sqrt(chi2_quantile(1.0 - doubt, 1.0))
+    below = math.sqrt(chi2_quantile(1.0 - DOUBT, 1.0))
     return any(term.value < -below * term.u for term in list(mixed.joint.estimates().values())[1:])
 
 
@@ -229,20 +187,21 @@ class _Points:
         return self.minima[law.name]
 
 
-def _fit_laws(points: _Points, wanted: Sequence[str | Law], params: Params) -> Damping:
+def _fit_laws(points: _Points, wanted: Sequence[str | Law], known: Law | None) -> Damping:
     """Fit some laws and select among them."""
     unfitted: dict[str, str] = {}
     every = [find_law(law) for law in wanted]
-    if params.stated is not None and (known := find_law(params.stated)).name not in [law.name for law in every]:
+    if known is not None and known.name not in [law.name for law in every]:
         every.append(known)
     laws = _affordable(every, int(np.count_nonzero(points.spread.kept)), unfitted)
-    fits = _weigh_all(laws, points, params, unfitted)
+    fits = _weigh_all(laws, points, unfitted)
     if fits and (closer := _corner(fits, points)) is not None:
         points = replace(points, spread=closer, minima={})
-        fits = _weigh_all(laws, points, params, unfitted)
+        fits = _weigh_all(laws, points, unfitted)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
-    selected, admissible, stated = select_law(fits, params, float(points.t[-1]))
+    stated = "" if known is None else known.name
+    selected, admissible = select_law(fits, stated, float(points.t[-1]))
     return Damping(points.t0, fits, selected, admissible, points.spread, unfitted, stated)
 
 
@@ -257,13 +216,13 @@ def _affordable(wanted: Sequence[Law], points: int, unfitted: dict[str, str]) ->
     return laws
 
 
-def _weigh_all(laws: Sequence[Law], points: _Points, params: Params, unfitted: dict[str, str]) -> dict[str, LawFit]:
+def _weigh_all(laws: Sequence[Law], points: _Points, unfitted: dict[str, str]) -> dict[str, LawFit]:
     """Fit the laws and test each against the points; laws without a usable fit are added to ``unfitted``."""
     spread = points.spread
     t, y, u = points.t[spread.kept], points.amplitude[spread.kept], spread.u[spread.kept]
     sound = {}
     for law in laws:
-        if (why := _astray(law, points.minimum(law), t, y, params.loosest_power)) is None:
+        if (why := _astray(law, points.minimum(law), t, y)) is None:
             sound[law.name] = points.minimum(law)
             unfitted.pop(law.name, None)
         else:
@@ -272,7 +231,7 @@ def _weigh_all(laws: Sequence[Law], points: _Points, params: Params, unfitted: d
     least = least_chi2(sound, by_name)
     weighed = {}
     for name, fit in sound.items():
-        weighed[name] = weigh(by_name[name], fit, least[name], y.size, spread.correlation, params.rejection)
+        weighed[name] = weigh(by_name[name], fit, least[name], y.size, spread.correlation, REJECTION)
         if weighed[name].rejection == "misfit":
             weighed[name] = _widened(weighed[name], (y - weighed[name].amplitude(t)) / u, spread.correlation)
     return weighed
@@ -286,7 +245,7 @@ def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
     return replace(fit, joint=replace(fit.joint, covariance=widening * fit.joint.covariance), widening=widening)
 
 
-def _astray(law: Law, fit: Minimum, t: F8, y: F8, loosest_power: float) -> str | None:
+def _astray(law: Law, fit: Minimum, t: F8, y: F8) -> str | None:
     """Return why a fit is not usable; None if it is."""
     top = float(np.max(y))
     if not 1e-3 * top <= fit.theta[0] <= 1e3 * top or not math.isfinite(fit.chi2):
@@ -294,7 +253,7 @@ def _astray(law: Law, fit: Minimum, t: F8, y: F8, loosest_power: float) -> str |
     if not np.isfinite(fit.covariance).all():
         return "the windows do not determine its parameters"
     power = free_power(law)
-    if power is not None and np.diag(fit.covariance)[list(law.parameters).index(power)] > loosest_power**2:
+    if power is not None and np.diag(fit.covariance)[list(law.parameters).index(power)] > LOOSEST_POWER**2:
         return "the windows do not determine its power"
     if fit.theta.min() >= 0.0:
         return None

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import words_of
-from pipeline.damping.mixture import find_mixed
 from pipeline.damping.select import Damping
 from pipeline.findings.finding import Found
-from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import number
 
 # Difference of BIC that is "very strong" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773. If two laws
@@ -17,8 +15,8 @@ from pipeline.numerics.quantity import number
 VERY_STRONG = 10.0
 
 
-def damping_findings(damping: Damping, stated: Mapping[str, Estimate]) -> Iterator[Found]:
-    """Yield which laws fit, which do not, and which cannot be distinguished; ``stated`` are the final coefficients."""
+def damping_findings(damping: Damping) -> Iterator[Found]:
+    """Yield which laws fit, which do not, and which cannot be distinguished."""
     rejected = [name for name, fit in damping.fits.items() if fit.rejected]
     if damping.fits and len(rejected) == len(damping.fits):
         nearest = min(damping.fits.values(), key=lambda fit: fit.reduced_chi2) if damping.by_statement else damping.best
@@ -29,14 +27,6 @@ def damping_findings(damping: Damping, stated: Mapping[str, Estimate]) -> Iterat
         unfitted = len(damping.unfitted)
         numbers = {"rejected": len(rejected) + unfitted, "tried": len(damping.fits) + unfitted}
         yield Found("law_rejected", {**numbers, **_reasons(damping)})
-    if (mixed := find_mixed(damping)) is not None:
-        terms = mixed.fit.joint.names[1:]
-        # A coefficient has the same uncertainty here as in the results.
-        given = stated if set(stated) == set(terms) else mixed.fit.joint.estimates()
-        found = " and ".join(f"{name} = {given[name]}" for name in terms)
-        alone = ", ".join(f"{words_of(damping.fits[name].law)} {number(x)}" for name, x in mixed.against.items())
-        words: dict[str, float | str] = {"law": words_of(mixed.fit.law), "terms": found, "alone": alone}
-        yield Found("mixed_drag", words | {name: given[name].value for name in terms})
     if len(damping.admissible) > 1:
         laws = [damping.fits[name].law for name in damping.admissible]
         undamped = next((words_of(law) for law in laws if len(law.parameters) == 1), None)

@@ -57,27 +57,21 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Foun
         yield Found("missing_samples", lost, "warning")
     if phase.backbone is not None:
         start = phase.damping.best.joint["A0"].value
-        shift = phase.backbone.value * start**phase.exponent / omega
+        shift = phase.backbone.value * start**2 / omega
         # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
         if abs(shift) > (phase.damping.best.rate_at_start() / omega) ** 2:
-            numbers = {"relative_shift": shift, "amplitude_m": start, "exponent": phase.exponent}
+            numbers = {"relative_shift": shift, "amplitude_m": start}
             yield Found("amplitude_dependent_frequency", {**numbers, "higher" if shift > 0 else "lower": abs(shift)})
     # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
-    if rest.moves and rest.range_m > float(np.max(errors)):
+    if rest.drifts and rest.drift_m > float(np.max(errors)):
         yield _rest_drift(rest, phase.damping.best.damping_rate().u)
     yield from _modes(fitted, rest.mean.unit)
 
 
 def _rest_drift(rest: Rest, u_rate: float) -> Found:
-    numbers: dict[str, float] = {}
-    if rest.drifts:
-        numbers["drift_m"] = rest.drift_m
-    if rest.steps:
-        first = rest.steps[0]
-        numbers |= {"jump_m": first.height.value, "time_s": first.time.value}
-        numbers |= {"jumps": len(rest.steps)} if len(rest.steps) > 1 else {}
-    if rest.drifts and rest.mean.unit == "m" and rest.mean.value > 0.0:
+    numbers = {"drift_m": rest.drift_m}
+    if rest.mean.unit == "m" and rest.mean.value > 0.0:
         share, seconds = rest.drift_m / rest.mean.value, float(np.ptp(rest.t))
         if share >= u_rate * seconds:
             numbers |= {"scale_change": share, "damping_rate_error": share / seconds}
@@ -122,9 +116,7 @@ def smoothing_findings(found: Smoothing) -> Iterator[Found]:
         "correlation": found.correlation,
         "amplitude_loss": found.loss,
         "late_s": found.late_s,
-        "joined_samples": found.joined_samples or None,
-        "mean_samples": found.mean_samples or None,
-        "lag_s": found.lag_s or None,
+        "alike_samples": found.samples,
     }
     yield Found("smoothed_sensor", numbers)
 

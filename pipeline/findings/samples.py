@@ -32,7 +32,7 @@ def sample_findings(
     """
     track, quantum_m = conditioned.track, conditioned.quantum_m
     counts, n = count_quality(flags), len(track)
-    levels_m = [cut.from_m for cut in conditioned.cuts] or conditioned.plateaus_m
+    levels_m = [cut.from_m for cut in conditioned.cuts]
     move = _distance_to_move(levels_m, swing_m) if swing_m is not None and track.unit == "m" else {}
     for cut in conditioned.cuts:
         numbers = {
@@ -46,8 +46,7 @@ def sample_findings(
         }
         yield Found("clipped", {**numbers, **move})
     if counts["clipped"] and not conditioned.cuts:
-        levels = {f"level_{i}_m": level for i, level in enumerate(conditioned.plateaus_m, 1)}
-        yield Found("clipped", {"samples": counts["clipped"], "n": n, **levels, **move})
+        yield Found("clipped", {"samples": counts["clipped"], "n": n, **move})
     if (echoes := counts["false_echo"]) and not by_chance:
         numbers = {"samples": echoes, "n": n, "share": echoes / n}
         if clusters is not None and clusters.count:
@@ -75,10 +74,10 @@ def _distance_to_move(levels_m: Sequence[float], swing_m: tuple[float, float]) -
     return {way: math.ceil(100.0 * lack_m + 1.0)}
 
 
-def held_findings(count: int, interval_s: float) -> Iterator[Found]:
-    """Yield how often a sensor that is slower than its recording repeats each value."""
-    late_s = 0.5 * interval_s * (count - 1) / count
-    yield Found("held_samples", {"count": count, "interval_s": interval_s, "late_s": late_s})
+def held_findings(count: int, step_s: float) -> Iterator[Found]:
+    """Yield how often a sensor slower than its recording repeats each value; 1 means that they are joined by lines."""
+    numbers = {"count": count, "interval_s": count * step_s, "late_s": 0.5 * step_s * (count - 1)}
+    yield Found("held_samples", numbers if count > 1 else {})
 
 
 def clock_findings(track: Track, instrument: Instrument) -> Iterator[Found]:

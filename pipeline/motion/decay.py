@@ -15,8 +15,6 @@ from pipeline.numerics import least_squares
 from pipeline.numerics.regression import covariance_of, solve_weighted
 from pipeline.track import F8
 
-__all__ = ["DecayFit", "best_decay", "critical_decay", "lone_exponential"]
-
 FAR = 20.0  # maximum change of the logarithm of a rate in the fit of a single exponential
 DIFFERENCE = 1e-5  # relative change of a rate in the difference quotients for the covariance
 

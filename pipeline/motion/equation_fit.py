@@ -14,10 +14,9 @@ from functools import partial
 import numpy as np
 
 from pipeline.damping.law_fit import mean_squared_rate
-from pipeline.damping.laws.drag import DRAGS, Drag
+from pipeline.damping.laws.drag import COEFFICIENTS, DRAGS, Drag
 from pipeline.damping.select import Damping
-from pipeline.damping.select import Params as DampingParams
-from pipeline.motion.equation_model import COEFFICIENTS, STATE, envelope
+from pipeline.motion.equation_model import STATE, envelope
 from pipeline.motion.equation_search import (
     Cleaned,
     Samples,
@@ -37,34 +36,16 @@ from pipeline.samples.stopping import stop_row
 from pipeline.track import F8, U8, Quality
 from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["EquationFit", "EquationMisfit", "Params", "fit_equation"]
-
 STATE_UNITS = ("m", "m", "m/s", "rad/s")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`fit_equation`.
-
-    Parameters
-    ----------
-    least_damping : float
-        Damping ratio :math:`-\\dot A/A\\omega` at the first sample above which the equation of motion is fitted.
-    always : float
-        Damping ratio above which it is fitted even if the windows, which are then few, show linear drag or none.
-    misfit : float
-        Maximum root mean square of the residual of the law with most parameters, in units of the record's noise.
-    clip_sigmas : float
-        Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
-    most_periods : int
-        Maximum number of periods for the fit of a weakly damped motion that stops within the record.
-    """
-
-    most_periods: int = 250
-    least_damping: float = 0.01
-    always: float = 0.05
-    misfit: float = 1.25
-    clip_sigmas: float = 4.0
+MOST_PERIODS = 250  # maximum number of periods for the fit of a weakly damped motion that stops within the record
+# Damping ratio :math:`-\\dot A/A\\omega` at the first sample above which the equation of motion is fitted.
+LEAST_DAMPING = 0.01
+# Damping ratio above which it is fitted even if the windows, which are then few, show linear drag or none.
+ALWAYS = 0.05
+# Maximum root mean square of the residual of the law with most parameters, in units of the record's noise.
+MISFIT = 1.25
+# Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
+CLIP_SIGMAS = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,8 +141,6 @@ def fit_equation(
     conditioned: Conditioned,
     demodulated: Demodulated,
     damping: Damping,
-    params: Params | None = None,
-    laws: DampingParams | None = None,
     *,
     stopped: bool = False,
 ) -> EquationFit | EquationMisfit | None:
@@ -173,9 +152,6 @@ def fit_equation(
     demodulated : Demodulated
     damping : Damping
         The fits of the amplitude laws, from which the fits here start.
-    params : Params, optional
-    laws : pipeline.damping.select.Params, optional
-        Options for the choice among the laws.
     stopped : bool
         Whether the bob stops within the record, as found by :func:`pipeline.samples.stopping.moving_part`.
 
@@ -197,33 +173,32 @@ def fit_equation(
     The law with most parameters is fitted first: its residual shows the false echoes and the noise. The other laws are
     compared with this noise and selected by the same rules as the amplitude laws.
     """
-    params, laws = params or Params(), laws or DampingParams()
     ratio = damping.best.rate_at_start() / demodulated.angular_frequency
     drags, unit = _fittable(damping), conditioned.track.unit
-    if not drags or not _required(damping, demodulated, ratio, params, stopped=stopped):
+    if not drags or not _required(damping, demodulated, ratio, stopped=stopped):
         return None
     periods = demodulated.angular_frequency / (2.0 * math.pi) * float(np.ptp(demodulated.t))
-    if ratio <= params.least_damping and periods > params.most_periods:
+    if ratio <= LEAST_DAMPING and periods > MOST_PERIODS:
         return EquationMisfit(
             f"the bob stops within the record, and whether friction stopped it was not settled: over {periods:.0f} "
-            f"periods the equation of motion takes too long to solve (at most {params.most_periods}); the averaged "
+            f"periods the equation of motion takes too long to solve (at most {MOST_PERIODS}); the averaged "
             "law stands"
         )
     samples = samples_of(conditioned, demodulated, damping, stop_row(conditioned))
-    start, richest = first_solution(samples, demodulated, damping, drags, params.misfit), drags[-1]
-    cleaned = without_echoes(samples, richest, start, params.clip_sigmas)
+    start, richest = first_solution(samples, demodulated, damping, drags, MISFIT), drags[-1]
+    cleaned = without_echoes(samples, richest, start, CLIP_SIGMAS)
     if cleaned is None:
         return EquationMisfit(
             f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err, and no motion with "
             f"{richest.words} comes near the samples: the averaged law stands"
         )
-    if not cleaned.noise_m <= params.misfit * samples.expected_m:
+    if not cleaned.noise_m <= MISFIT * samples.expected_m:
         return EquationMisfit(
             f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err, and the equation of "
             f"motion with {richest.words} leaves {amount(cleaned.noise_m, unit)} where samples scatter by "
             f"{amount(samples.expected_m, unit)}: the averaged law stands"
         )
-    chosen = choose_law(samples, cleaned, damping, drags, laws)
+    chosen = choose_law(samples, cleaned, damping, drags)
     if chosen is None:
         return EquationMisfit(f"the damping ratio is {ratio:.2g} at the start, and no fit of the equation converged")
     law = next(drag for drag in drags if drag.name == chosen[0].selected)
@@ -244,14 +219,14 @@ def _fittable(damping: Damping) -> list[Drag]:
     return sorted(wanted, key=lambda law: len(law.powers))
 
 
-def _required(damping: Damping, demodulated: Demodulated, ratio: float, params: Params, *, stopped: bool) -> bool:
-    if stopped or ratio > params.always:
+def _required(damping: Damping, demodulated: Demodulated, ratio: float, *, stopped: bool) -> bool:
+    if stopped or ratio > ALWAYS:
         return True
     best = damping.best.law
     if isinstance(best, Drag) and set(best.powers) <= {1}:
         return False  # for these laws the amplitude law is exact
     last = damping.best.amplitude(np.array([float(np.max(demodulated.t)) - damping.t0]))
-    return ratio > params.least_damping or bool(last[0] <= 0.0)
+    return ratio > LEAST_DAMPING or bool(last[0] <= 0.0)
 
 
 def _described(samples: Samples, cleaned: Cleaned, law: Drag, damping: Damping, fit: least_squares.Fit) -> EquationFit:
@@ -261,10 +236,7 @@ def _described(samples: Samples, cleaned: Cleaned, law: Drag, damping: Damping, 
     residual = conditioned.track.y - position
     rms = math.sqrt(float(np.mean(residual[cleaned.used] ** 2)))
     flags = conditioned.flags.copy()
-    dropped = samples.within & ~cleaned.used
-    plateau = dropped & conditioned.near_plateau(position, cleaned.noise_m)
-    flags[plateau] |= np.uint8(Quality.CLIPPED)
-    flags[dropped & ~plateau] |= np.uint8(Quality.FALSE_ECHO)
+    flags[samples.within & ~cleaned.used] |= np.uint8(Quality.FALSE_ECHO)
     count = len(STATE)
     state = Joint(STATE, fit.values[:count], fit.covariance[:count, :count] * cleaned.correlation, STATE_UNITS)
     ratio = damping.best.rate_at_start() / state["angular_frequency"].value

@@ -6,13 +6,10 @@ import math
 
 import numpy as np
 
-from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.dynamics import Equation, Problem, Trajectory
 from pipeline.dynamics.equation import Real
 from pipeline.dynamics.strang import STRANG
 from pipeline.track import F8
-
-__all__ = ["COEFFICIENTS", "STATE", "FreeMotion", "envelope"]
 
 STATE = ("rest", "displacement", "velocity", "angular_frequency")
 STEP = 0.08  # time step in radians; splitting and interpolation then err by less than 1e-4 of the amplitude

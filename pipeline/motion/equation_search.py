@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.damping.evidence import NEGATIVE, least_chi2, weigh
-from pipeline.damping.law_fit import Minimum
-from pipeline.damping.laws import Drag
-from pipeline.damping.select import Damping, LawFit, select_law
-from pipeline.damping.select import Params as DampingParams
-from pipeline.motion.equation_model import COEFFICIENTS, STATE, FreeMotion, envelope
+from pipeline.damping.law_fit import LawFit, Minimum
+from pipeline.damping.laws.drag import COEFFICIENTS, Drag
+from pipeline.damping.select import REJECTION, Damping, select_law
+from pipeline.motion.equation_model import STATE, FreeMotion, envelope
 from pipeline.numerics import least_squares
 from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.regression import correlation_length
@@ -28,8 +27,6 @@ from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
-
-__all__ = ["Cleaned", "Samples", "choose_law", "first_solution", "full", "samples_of", "without_echoes"]
 
 COUNT = len(STATE) + len(COEFFICIENTS)
 
@@ -238,7 +235,7 @@ def without_echoes(samples: Samples, law: Drag, start: F8, clip_sigmas: float, r
         theta = full(law, samples.fit(law, theta, used, samples.expected_m).values)
         whole = samples.model().position(theta)
         residual = y - whole
-        candidates = samples.within & ~samples.conditioned.near_plateau(whole, samples.expected_m)
+        candidates = samples.within
         spread = max(mad_sigma(residual[candidates]), samples.expected_m)
         kept = candidates & (np.abs(residual) <= clip_sigmas * spread)
         if np.count_nonzero(kept) <= COUNT:
@@ -252,7 +249,7 @@ def without_echoes(samples: Samples, law: Drag, start: F8, clip_sigmas: float, r
 
 
 def choose_law(
-    samples: Samples, cleaned: Cleaned, damping: Damping, laws: Sequence[Drag], params: DampingParams
+    samples: Samples, cleaned: Cleaned, damping: Damping, laws: Sequence[Drag]
 ) -> tuple[Damping, Fit] | None:
     """Fit every law and select one; return None if no fit has a finite covariance.
 
@@ -264,7 +261,6 @@ def choose_law(
         The fits of the amplitude laws.
     laws : sequence of Drag
         The laws, the one with most parameters last.
-    params : pipeline.damping.select.Params
     """
     richest = laws[-1]
     unfitted = {n: "it has no equation of motion" for n in damping.fits if n not in [law.name for law in laws]}
@@ -278,23 +274,20 @@ def choose_law(
             unfitted[law.name] = f"its equation of motion was not solved for its coefficients: {fit.tried}"
     if not fits:
         return None
-    weighed = _weighed(cleaned, laws, fits, params)
-    selected, admissible, stated = select_law(weighed, params, float(np.max(samples.elapsed)))
+    weighed = _weighed(cleaned, laws, fits)
+    selected, admissible = select_law(weighed, damping.stated, float(np.max(samples.elapsed)))
     scatter = replace(damping.scatter, correlation=cleaned.correlation)
-    return Damping(damping.t0, weighed, selected, admissible, scatter, unfitted, stated), fits[selected]
+    return Damping(damping.t0, weighed, selected, admissible, scatter, unfitted, damping.stated), fits[selected]
 
 
-def _weighed(
-    cleaned: Cleaned, laws: Sequence[Drag], fits: Mapping[str, Fit], params: DampingParams
-) -> dict[str, LawFit]:
+def _weighed(cleaned: Cleaned, laws: Sequence[Drag], fits: Mapping[str, Fit]) -> dict[str, LawFit]:
     """Compare each law with the noise; the start amplitude replaces displacement and velocity as a parameter."""
     by_name = {law.name: law for law in laws if law.name in fits}
     minima = {name: _minimum(law, fits[name]) for name, law in by_name.items()}
     least = least_chi2(minima, by_name)
     points = int(np.count_nonzero(cleaned.used)) - len(STATE) + 1
     return {
-        name: weigh(by_name[name], minima[name], least[name], points, cleaned.correlation, params.rejection)
-        for name in fits
+        name: weigh(by_name[name], minima[name], least[name], points, cleaned.correlation, REJECTION) for name in fits
     }
 
 

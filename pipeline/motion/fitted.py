@@ -7,16 +7,12 @@ from dataclasses import dataclass, replace
 from pipeline.damping.laws import units_of
 from pipeline.damping.select import Damping
 from pipeline.motion.equation_fit import EquationFit
-from pipeline.motion.phase import Params as PhaseParams
-from pipeline.motion.phase import PhaseFit, backbone_unit, fit_phase
+from pipeline.motion.phase import BACKBONE, PhaseFit, fit_phase
 from pipeline.motion.waveform import Rest, Waveform, fit_rest, reconstruct
 from pipeline.motion.waveform_fit import FullFit, fit_record
-from pipeline.motion.waveform_fit import Params as WaveformParams
 from pipeline.samples.condition import Conditioned
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
-
-__all__ = ["Fitted", "fit_by_equation", "fit_by_windows", "fit_waveform"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +51,7 @@ class Fitted:
             for name, fit in self.damping.fits.items()
         }
         damping, backbone = replace(self.damping, fits=fits), self.phase.backbone
-        bent = None if backbone is None else replace(backbone, unit=backbone_unit(self.phase.exponent, unit))
+        bent = None if backbone is None else replace(backbone, unit=BACKBONE.of(unit))
         return replace(
             self,
             damping=damping,
@@ -64,23 +60,20 @@ class Fitted:
         )
 
 
-def fit_by_windows(
-    demodulated: Demodulated, disturbances: Disturbances, damping: Damping, params: PhaseParams | None = None
-) -> Fitted:
+def fit_by_windows(demodulated: Demodulated, disturbances: Disturbances, damping: Damping) -> Fitted:
     """Return a weakly damped oscillation from the amplitudes, phases and rest positions of its windows.
 
     Parameters
     ----------
     demodulated, disturbances, damping
         Outputs of the stages with these names.
-    params : pipeline.motion.phase.Params, optional
     """
-    phase, rest = fit_phase(demodulated, damping, params), fit_rest(demodulated)
+    phase, rest = fit_phase(demodulated, damping), fit_rest(demodulated)
     waveform = reconstruct(disturbances.conditioned.track, demodulated, phase, rest)
     return Fitted(demodulated, disturbances, damping, phase, rest, waveform, None)
 
 
-def fit_waveform(fitted: Fitted, conditioned: Conditioned, params: WaveformParams) -> Fitted:
+def fit_waveform(fitted: Fitted, conditioned: Conditioned) -> Fitted:
     """Return the oscillation from a fit of the whole waveform that starts from the windows' result.
 
     Parameters
@@ -89,7 +82,6 @@ def fit_waveform(fitted: Fitted, conditioned: Conditioned, params: WaveformParam
         The fit by windows.
     conditioned : Conditioned
         The samples including all disturbances.
-    params : pipeline.motion.waveform_fit.Params
     """
     disturbances = fitted.disturbances
     # With the disturbances' columns in the model, the samples without disturbances give the same fit as the original
@@ -102,7 +94,6 @@ def fit_waveform(fitted: Fitted, conditioned: Conditioned, params: WaveformParam
         fitted.rest,
         fitted.waveform,
         extra=disturbances.columns(conditioned.track.t),
-        params=params,
     )
     demodulated = replace(fitted.demodulated, flags=full.flags)
     return Fitted(demodulated, disturbances, full.damping, full.phase, full.rest, full.waveform, full)

@@ -19,34 +19,16 @@ from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 from pipeline.windows.cycles import NoOscillation
 
-__all__ = ["Kind", "Overdamped", "Params", "find_overdamped", "spring_constant"]
-
 Kind = Literal["overdamped", "critical", "strong"]
 
 FEWEST = 20  # minimum number of samples for a fit of five parameters
 POINTS = 300  # approximate number of block means to which a record is reduced before shapes are compared
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`find_overdamped`.
-
-    Parameters
-    ----------
-    evidence : float
-        Margin by which the BIC of a relaxation must be lower than that of any drift, step or ramp.
-    misfit : float
-        Maximum root mean square of the fit's residual, in units of the record's noise.
-    least_damping : float
-        Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
-    u_clock : float
-        Relative standard uncertainty of the clock; the tolerance of a crystal is assumed for every clock.
-    """
-
-    evidence: float = 10.0
-    misfit: float = 1.5
-    least_damping: float = 0.05
-    u_clock: float = 50e-6 / math.sqrt(3.0)
+EVIDENCE = 10.0  # margin by which the BIC of a relaxation must be lower than that of any drift, step or ramp
+MISFIT = 1.5  # maximum root mean square of the fit's residual, in units of the record's noise
+# Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
+LEAST_DAMPING = 0.05
+# Relative standard uncertainty of the clock; the tolerance of a crystal is assumed for every clock.
+U_CLOCK = 50e-6 / math.sqrt(3.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +59,12 @@ class Overdamped:
     start_s: float
 
 
-def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> Overdamped | NoOscillation | None:
+def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | None:
     """Fit the free motion of a linearly damped bob and classify its damping.
 
     Parameters
     ----------
     conditioned : Conditioned
-    params : Params, optional
 
     Returns
     -------
@@ -100,16 +81,15 @@ def find_overdamped(conditioned: Conditioned, params: Params | None = None) -> O
     BIC lower by six than a single exponential. If a record begins before the release, the fit begins where the
     displacement begins to fall.
     """
-    params = params or Params()
     used = conditioned.used
     t, y = conditioned.track.t[used], conditioned.track.y[used]
     if t.size < FEWEST:
         return None
     noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
-    if not (noise > 0.0 and _moves(y, noise, params.evidence)):
+    if not (noise > 0.0 and _moves(y, noise, EVIDENCE)):
         return None
     for first in _starts(y, noise):
-        found = _follow(t[first:], y[first:], noise, conditioned, params)
+        found = _follow(t[first:], y[first:], noise, conditioned)
         if found is not None:
             return found
     return None
@@ -133,12 +113,12 @@ def _starts(y: F8, noise: float) -> Iterator[int]:
         yield int(held[-1])
 
 
-def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params) -> Overdamped | NoOscillation | None:
+def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned) -> Overdamped | NoOscillation | None:
     tau = t - t[0]
     fit = best_decay(tau, y, noise, conditioned.track.rate_hz)
-    if fit is None or not fit.rate * tau[-1] > 2.0 or _misses(tau, y, fit, params.misfit):
+    if fit is None or not fit.rate * tau[-1] > 2.0 or _misses(tau, y, fit, MISFIT):
         return None
-    if not _beats_other_shapes(tau, y, fit, noise, params.evidence):
+    if not _beats_other_shapes(tau, y, fit, noise, EVIDENCE):
         return None
     choice = _kind(tau, y, fit, 0.5 * conditioned.track.rate_hz, conditioned.track.unit)
     if choice is None or isinstance(choice, NoOscillation):
@@ -146,8 +126,8 @@ def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned, params: Params
     kind, fit = choice
     # A residual larger than the noise increases the uncertainties.
     fit = replace(fit, covariance=fit.covariance * max(1.0, fit.chi2 / max(t.size - 5, 1)))
-    found = _described(fit, kind, float(t[0]), t.size, params.u_clock, conditioned.track.unit)
-    return None if kind == "strong" and found.damping_ratio.value < params.least_damping else found
+    found = _described(fit, kind, float(t[0]), t.size, U_CLOCK, conditioned.track.unit)
+    return None if kind == "strong" and found.damping_ratio.value < LEAST_DAMPING else found
 
 
 def _misses(tau: F8, y: F8, fit: DecayFit, misfit: float) -> bool:

@@ -7,47 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.damping.select import Damping, LawFit
+from pipeline.damping.law_fit import LawFit
+from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import Unit
 from pipeline.numerics.regression import Line, Scatter, chi2_quantile, correlation_length, scatter, solve_weighted
 from pipeline.track import F8
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import ROUNDING, Demodulated
 
+BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency depends on the squared amplitude
 TABLE = 2049  # number of points in the tables of the lag and of the integral of the amplitude
 MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
 NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
-EXPONENTS = (2.0, 1.0, 0.5)  # 2: a nonlinear spring; 1 and 0.5: carried air that grows with the stroke through vortices
-
-__all__ = [
-    "Params",
-    "PhaseFit",
-    "amplitude_integral",
-    "backbone_unit",
-    "fit_phase",
-    "lag_of",
-    "words_on_exponent",
-    "wrapped",
-]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`fit_phase`.
-
-    Parameters
-    ----------
-    evidence : float
-        Minimum decrease of the BIC for the frequency to count as amplitude-dependent; 10 is "very strong" evidence.
-    another_exponent : float
-        Minimum decrease of chi-square for a power of the amplitude other than the square to be used.
-    rejection : float
-        Probability that the chi-square test rejects residuals that are only noise.
-    """
-
-    evidence: float = 10.0
-    another_exponent: float = 10.0
-    rejection: float = 1e-3
+# Minimum decrease of the BIC for the frequency to count as amplitude-dependent; 10 is "very strong" evidence.
+EVIDENCE = 10.0
+REJECTION = 1e-3  # probability that the chi-square test rejects residuals that are only noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +37,7 @@ class PhaseFit:
     phase : Estimate
         Phase at ``t0``, wrapped into (-pi, pi], rad.
     backbone : Estimate or None
-        :math:`\\kappa` of :math:`\\omega(A) = \\omega_0 + \\kappa A^p`, rad/(s m^p); None if it is not significant.
+        :math:`\\kappa` of :math:`\\omega(A) = \\omega_0 + \\kappa A^2`, rad/(s m^2); None if it is not significant.
     reduced_chi2 : float
         Reduced chi-square of the selected model, from the noise of the windows' phases and their excess scatter.
     correlation : float
@@ -76,9 +50,6 @@ class PhaseFit:
         Weighted mean time of the record, s.
     damping : Damping
         Provides the amplitude that the backbone's column integrates.
-    exponent : float
-        The exponent p. It is 2, the first correction of any smooth spring, unless 1 or 0.5 describes the phase much
-        better.
     lag : tuple of (g,) float64, or None
         Times (in s) and the delays (in rad) of a period's fitted sinusoid at these times, see :func:`lag_of`; None if
         the delay is constant.
@@ -97,7 +68,6 @@ class PhaseFit:
     coefficients: F8
     middle: float
     damping: Damping
-    exponent: float = 2.0
     lag: tuple[F8, F8] | None = None
     squared_rate: float | None = None
 
@@ -106,25 +76,24 @@ class PhaseFit:
         level, slope, *bend = self.coefficients.tolist()
         total = level + slope * (t - self.middle)
         if bend:
-            total += bend[0] * _integral_at(t, self.middle, self.damping, self.exponent)
+            total += bend[0] * _integral_at(t, self.middle, self.damping)
         return np.asarray(total if self.lag is None else total - np.interp(t, *self.lag))
 
     def rate(self, amplitude: F8) -> F8:
         """Return the model's angular frequency in rad/s at amplitudes (n,) in m."""
         omega = np.full(amplitude.size, self.coefficients[1])
         if self.coefficients.size == 3:
-            omega += self.coefficients[2] * np.abs(amplitude) ** self.exponent
+            omega += self.coefficients[2] * amplitude**2
         return omega
 
 
-def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None = None) -> PhaseFit:
+def fit_phase(demodulated: Demodulated, damping: Damping) -> PhaseFit:
     """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
 
     Parameters
     ----------
     demodulated : Demodulated
     damping : Damping
-    params : Params, optional
 
     Returns
     -------
@@ -137,16 +106,13 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
     is too large, of the reduced chi-square. The interval then covers a curvature of the phase.
 
     The frequency of an ideal spring is constant. A nonlinear spring shifts it in proportion to the square of the
-    amplitude. The air that a disc carries along grows with the stroke, as its drag coefficient does; on real discs
-    it shifts the frequency about in proportion to the square root of the amplitude. If the square is significant, the
-    powers 1 and 0.5 are tried in its place; the number of parameters is equal, so that chi-square decides.
+    amplitude.
 
     The delay of a period's fitted sinusoid (:func:`lag_of`) follows from the damping law and is removed first.
     """
-    params = params or Params()
     t, lag = demodulated.t, lag_of(damping.best, damping.t0, demodulated)
     phase = demodulated.phase if lag is None else demodulated.phase + np.interp(t, *lag)
-    noise = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
+    noise = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), ROUNDING)
     if t.size < 2:
         return _single(demodulated, damping, float(noise[0]))
     turning = phase - demodulated.angular_frequency * (t - t[0])
@@ -156,22 +122,16 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
     middle = float(np.average(t[kept], weights=1.0 / u**2))
     # The last row of the design matrices is that of the start.
     points = np.append(t, damping.t0)
-    line = design = _design(points, middle, damping, None)
+    line = design = _design(points, middle, damping, bent=False)
     straight = solve_weighted(line[:-1][kept], phase[kept], u)
-    bent, exponent = None, EXPONENTS[0]
+    bent = None
     if u.size >= 8 and len(damping.best.law.parameters) > 1:
-        curve = _design(points, middle, damping, exponent)
+        curve = _design(points, middle, damping, bent=True)
         trial = solve_weighted(curve[:-1][kept], phase[kept], u)
         gain = (straight.chi2 - trial.chi2) / spread.correlation - math.log(u.size / spread.correlation)
-        if gain > params.evidence:
+        if gain > EVIDENCE:
             bent, design = trial, curve
-            for other in EXPONENTS[1:]:
-                curve = _design(points, middle, damping, other)
-                trial = solve_weighted(curve[:-1][kept], phase[kept], u)
-                least = params.another_exponent if exponent == EXPONENTS[0] else 0.0
-                if (bent.chi2 - trial.chi2) / spread.correlation > least:
-                    bent, design, exponent = trial, curve, other
-    widened, length = _widening(straight, u, spread, params)
+    widened, length = _widening(straight, u, spread)
     covariance = straight.covariance * widened
     model = bent or straight
     start = np.array([1.0, damping.t0 - middle])
@@ -182,14 +142,13 @@ def fit_phase(demodulated: Demodulated, damping: Damping, params: Params | None 
         damping.t0,
         Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
         Estimate(wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
-        None if bent is None else _backbone(bent, spread, free, exponent),
+        None if bent is None else _backbone(bent, spread, free),
         model.chi2 / free,
         length,
         residual,
         model.values,
         middle,
         damping,
-        exponent,
         lag,
     )
 
@@ -233,26 +192,24 @@ def lag_of(fit: LawFit, t0: float, demodulated: Demodulated) -> tuple[F8, F8] | 
     return (t, lag) if float(np.ptp(lag)) > 1e-12 else None
 
 
-def _design(t: F8, middle: float, damping: Damping, exponent: float | None) -> F8:
+def _design(t: F8, middle: float, damping: Damping, *, bent: bool) -> F8:
     columns = [np.ones(t.size), t - middle]
-    if exponent is not None:
-        columns.append(_integral_at(t, middle, damping, exponent))
+    if bent:
+        columns.append(_integral_at(t, middle, damping))
     return np.stack(columns, axis=1)
 
 
-def _integral_at(t: F8, middle: float, damping: Damping, exponent: float) -> F8:
+def _integral_at(t: F8, middle: float, damping: Damping) -> F8:
     end = max(2.0 * middle - damping.t0, float(np.max(t)), damping.t0 + 1e-9)
     first = min(damping.t0, float(np.min(t)))
-    grid, area = amplitude_integral(damping.best, damping.t0, middle, first, end, exponent)
+    grid, area = amplitude_integral(damping.best, damping.t0, middle, first, end)
     return np.asarray(np.interp(t - middle, grid, area))
 
 
-def amplitude_integral(
-    fit: LawFit, t0: float, middle: float, first: float, last: float, exponent: float
-) -> tuple[F8, F8]:
-    """Return times relative to ``middle`` (2049,) in s and the integral of A^p from ``middle`` in m^p s.
+def amplitude_integral(fit: LawFit, t0: float, middle: float, first: float, last: float) -> tuple[F8, F8]:
+    """Return times relative to ``middle`` (2049,) in s and the integral of A^2 from ``middle`` in m^2 s.
 
-    The trapezoidal rule and linear interpolation between its points have a relative error below 1e-5 if A^p decays
+    The trapezoidal rule and linear interpolation between its points have a relative error below 1e-5 if A^2 decays
     by a factor of e^10 within the table.
 
     Parameters
@@ -261,47 +218,29 @@ def amplitude_integral(
         Provides the amplitude as a function of the time since ``t0``.
     t0, middle, first, last : float, s
         The table extends from ``first`` to ``last``.
-    exponent : float
-        The exponent p.
     """
     from scipy.integrate import cumulative_trapezoid
 
     grid = np.linspace(first - middle, last - middle, TABLE)
-    power = np.abs(fit.amplitude(grid + (middle - t0))) ** exponent
+    power = fit.amplitude(grid + (middle - t0)) ** 2
     power[~np.isfinite(power)] = 0.0  # before the analysed part a law may have a pole
     integral = cumulative_trapezoid(power, grid, initial=0.0)
     return grid, np.asarray(integral - np.interp(0.0, grid, integral))
 
 
-def _widening(line: Line, u: F8, spread: Scatter, params: Params) -> tuple[float, float]:
+def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
     """Return the factor that widens the straight line's covariance, and the correlation length used for it."""
     free = line.residual.size - 2
     if free < 1:
         return 1.0, 1.0
     length = max(correlation_length(line.residual / u), spread.correlation)
-    too_large = line.chi2 > chi2_quantile(1.0 - params.rejection, free)
+    too_large = line.chi2 > chi2_quantile(1.0 - REJECTION, free)
     return length * (line.chi2 / free if too_large else 1.0), length
 
 
-def backbone_unit(exponent: float, unit: str = "m") -> str:
-    """Return the unit of the backbone's coefficient for a recording in a unit.
-
-    Examples
-    --------
-    >>> backbone_unit(2.0), backbone_unit(1.0), backbone_unit(2.0, "V")
-    ('rad/(m^2 s)', 'rad/(m s)', 'rad/(V^2 s)')
-    """
-    return Unit(-exponent, -1, radian=1).of(unit)
-
-
-def words_on_exponent(exponent: float) -> str:
-    """Return the words for the power of the amplitude in proportion to which the frequency shifts."""
-    return {2.0: "the square of the amplitude", 1.0: "the amplitude", 0.5: "the root of the amplitude"}[exponent]
-
-
-def _backbone(bent: Line, spread: Scatter, free: int, exponent: float) -> Estimate:
+def _backbone(bent: Line, spread: Scatter, free: int) -> Estimate:
     widened = spread.correlation * max(1.0, bent.chi2 / free)
-    return Estimate(float(bent.values[2]), math.sqrt(bent.covariance[2, 2] * widened), backbone_unit(exponent))
+    return Estimate(float(bent.values[2]), math.sqrt(bent.covariance[2, 2] * widened), BACKBONE.of("m"))
 
 
 def _single(demodulated: Demodulated, damping: Damping, noise: float) -> PhaseFit:

@@ -15,36 +15,18 @@ from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-__all__ = ["Params", "TwoModes", "find_two_modes"]
-
 ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by rounding
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`find_two_modes`.
-
-    Parameters
-    ----------
-    left : float
-        Maximum share of the variance that remains in the residual of two modes.
-    weaker : float
-        Minimum ratio of the weaker mode's amplitude to the stronger one's; below it only one oscillation counts.
-    beats, periods : float
-        Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
-        distinguished from one that changes.
-    most : int
-        Maximum number of samples; longer records are not fitted.
-    thin : float
-        Maximum mean spacing of the samples, in units of their median spacing.
-    """
-
-    left: float = 0.1
-    weaker: float = 1.0 / 3.0
-    beats: float = 0.8
-    periods: float = 3.0
-    most: int = 100_000
-    thin: float = 50.0
+LEFT = 0.1  # maximum share of the variance that remains in the residual of two modes
+# Minimum ratio of the weaker mode's amplitude to the stronger one's; below it only one oscillation counts.
+WEAKER = 1.0 / 3.0
+# Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
+# distinguished from one that changes.
+BEATS = 0.8
+# Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
+# distinguished from one that changes.
+PERIODS = 3.0
+MOST = 100_000  # maximum number of samples; longer records are not fitted
+THIN = 50.0  # maximum mean spacing of the samples, in units of their median spacing
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,30 +46,28 @@ class TwoModes:
     estimates: dict[str, Estimate]
 
 
-def find_two_modes(conditioned: Conditioned, params: Params | None = None) -> TwoModes | None:
+def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     """Return the two modes that a record consists of; None if two modes do not describe it.
 
     Parameters
     ----------
     conditioned : Conditioned
-    params : Params, optional
 
     Notes
     -----
     :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted by least squares to all samples
     used. It starts from the strongest line of the spectrum and from the strongest line of the residual of the first.
     Covariances are scaled by the residuals, including their correlation. Records above the limits of
-    :class:`Params` in length or mean spacing are not searched.
+    the limits in length or mean spacing are not searched.
     """
-    params = params or Params()
     used = conditioned.used & np.isfinite(conditioned.track.t)
     t, y, unit = conditioned.track.t[used], conditioned.track.y[used], conditioned.track.unit
     tau, span = t - t[0], float(t[-1] - t[0])
     scale = float(np.std(y))
     if (
-        not 32 <= y.size <= params.most
+        not 32 <= y.size <= MOST
         or scale <= ROUNDING * float(np.max(np.abs(y)))
-        or not 0.0 < span < params.thin * y.size * float(np.median(np.diff(t)))
+        or not 0.0 < span < THIN * y.size * float(np.median(np.diff(t)))
     ):
         return None
     values = (y - y.mean()) / scale
@@ -95,17 +75,13 @@ def find_two_modes(conditioned: Conditioned, params: Params | None = None) -> Tw
     second = _strongest(tau, values - _model(_linear(tau, values, (first,)), tau)[0])
     start = _linear(tau, values, (first, second))
     fit = minimise(lambda x: _model(x, tau)[0] - values, start, lambda x: _model(x, tau)[1])
-    if not np.all(np.isfinite(fit.covariance)) or not float(fit.residual @ fit.residual) < params.left * y.size:
+    if not np.all(np.isfinite(fit.covariance)) or not float(fit.residual @ fit.residual) < LEFT * y.size:
         return None
     places = sorted((1, 5), key=lambda i: -float(np.hypot(*fit.values[i : i + 2])))
     omegas = [abs(float(fit.values[i + 2])) for i in places]
     sizes = [float(np.hypot(*fit.values[i : i + 2])) for i in places]
     beats = abs(omegas[0] - omegas[1]) * span / (2.0 * math.pi)
-    if (
-        min(omegas) * span < 2.0 * math.pi * params.periods
-        or beats < params.beats
-        or sizes[1] < params.weaker * sizes[0]
-    ):
+    if min(omegas) * span < 2.0 * math.pi * PERIODS or beats < BEATS or sizes[1] < WEAKER * sizes[0]:
         return None
     slow, fast = sorted(omegas)
     # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.

@@ -11,13 +11,10 @@ import numpy as np
 
 from pipeline.motion.phase import PhaseFit
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.regression import beating_length, correlation_length, scatter, smooth_curve
+from pipeline.numerics.regression import correlation_length, scatter, smooth_curve
 from pipeline.track import F8, UNUSABLE, Track
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
-from pipeline.windows.steps import Step, staircase
-
-__all__ = ["Rest", "Waveform", "fit_rest", "reconstruct"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,9 +30,7 @@ class Rest:
     drifts : bool
         Whether the curve fits much better than a constant.
     t, curve : (w,) float64, s, m
-        Times of the windows' centres, and the curve at these times without the steps.
-    steps : tuple of Step
-        Steps of the rest position in order of time.
+        Times of the windows' centres, and the curve at these times.
     """
 
     mean: Estimate
@@ -43,46 +38,10 @@ class Rest:
     drifts: bool
     t: F8
     curve: F8
-    steps: tuple[Step, ...] = ()
-
-    @property
-    def moves(self) -> bool:
-        """Whether the rest position drifts or has steps."""
-        return self.drifts or bool(self.steps)
-
-    @property
-    def range_m(self) -> float:
-        """Peak-to-peak range of drift and steps together, m."""
-        curve = self.curve if self.drifts else np.zeros(self.t.size)
-        return float(np.ptp(curve + staircase(self.steps, self.t)))
 
     def at(self, t: F8) -> F8:
         """Return the rest position in m at times t (n,) in s."""
-        if not self.moves:
-            return np.full(t.size, self.mean.value)
-        level = np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self._before())
-        return np.asarray(level + staircase(self.steps, t))
-
-    def stepping(self, steps: tuple[Step, ...]) -> Rest:
-        """Return the rest position including steps that had been subtracted from the record before the fit.
-
-        The mean becomes that of the whole record. The uncertainty of each step's height contributes to its uncertainty
-        in proportion to the product of the shares of the record before and after the step.
-        """
-        if not steps:
-            return self
-        after = np.array([float(np.mean(self.t >= step.time.value)) for step in steps])
-        heights = np.array([(step.height.value, step.height.u) for step in steps])
-        mean = Estimate(
-            self.mean.value + float(after @ heights[:, 0]),
-            math.hypot(self.mean.u, *(after * (1.0 - after) * heights[:, 1])),
-            self.mean.unit,
-        )
-        return replace(self, mean=mean, steps=steps)
-
-    def _before(self) -> float:
-        """Return the rest position before the first step."""
-        return self.mean.value - float(np.mean(staircase(self.steps, self.t)))
+        return np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self.mean.value)
 
 
 def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.0) -> Rest:
@@ -103,9 +62,7 @@ def fit_rest(demodulated: Demodulated, *, degree: int = 6, evidence: float = 10.
     weight = 1.0 / spread.u[spread.kept]
     mean = float(np.average(offset[spread.kept], weights=weight**2))
     left = (offset[spread.kept] - mean) * weight
-    if (length := beating_length(left)) is None:
-        length = max(spread.correlation, correlation_length(left))
-    widened = length * max(1.0, float(left @ left) / max(left.size - 1, 1))
+    widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), "m")
     curve = np.asarray(polynomial(t), np.float64)
     return Rest(estimate, float(np.ptp(curve)), gain > evidence, t, curve)

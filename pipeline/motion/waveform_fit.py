@@ -11,50 +11,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.damping.evidence import BARE_MENTION
-from pipeline.damping.law_fit import joint_of
+from pipeline.damping.law_fit import LawFit, joint_of
 from pipeline.damping.laws import LAWS, Law, free_power
 from pipeline.damping.laws import in_units as in_length_units
-from pipeline.damping.select import Damping, LawFit
-from pipeline.motion.phase import PhaseFit, amplitude_integral, backbone_unit, wrapped
+from pipeline.damping.select import Damping
+from pipeline.motion.phase import PhaseFit, amplitude_integral, wrapped
 from pipeline.motion.waveform import Rest, Waveform
 from pipeline.motion.waveform_model import Chooser, Record, Rows, State, WaveformModel
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.regression import beating_length, correlation_length, solve_weighted
+from pipeline.numerics.regression import correlation_length, solve_weighted
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["FullFit", "Params", "fit_record"]
-
 FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`fit_record`.
-
-    Parameters
-    ----------
-    clip_sigmas : float
-        Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
-    rounds : int
-        Maximum number of rounds of clipping and refitting.
-    steady : float
-        Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas
-        and with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
-    steps : int
-        Maximum number of evaluations of the model in one fit.
-    besides : tuple of str
-        Laws that are fitted in addition to the selected and the admissible ones, even if the windows contradict them.
-        The default is the single exponential, the usual reference for comparisons.
-    """
-
-    clip_sigmas: float = 4.0
-    rounds: int = 5
-    steady: float = 1e-4
-    steps: int = 25
-    besides: tuple[str, ...] = ("linear",)
+# Samples whose residuals exceed this many standard deviations are false echoes and are excluded from the fit.
+CLIP_SIGMAS = 4.0
+ROUNDS = 5  # maximum number of rounds of clipping and refitting
+# Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
+# with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
+STEADY = 1e-4
+STEPS = 25  # maximum number of evaluations of the model in one fit
+# Laws that are fitted in addition to the selected and the admissible ones, even if the windows contradict them. The
+# default is the single exponential, the usual reference for comparisons.
+BESIDES = ("linear",)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +117,6 @@ def fit_record(
     waveform: Waveform,
     *,
     extra: F8 | None = None,
-    params: Params | None = None,
 ) -> FullFit:
     """Fit rest position, damping law and phase to all samples together.
 
@@ -147,7 +127,6 @@ def fit_record(
         Outputs of the stages with these names: the start values, and the results if the fit fails.
     extra : (n, k) float64, optional
         Columns that enter linearly in addition to the rest position: cosine and sine of a sideways mode, and steps.
-    params : Params, optional
 
     Returns
     -------
@@ -155,45 +134,42 @@ def fit_record(
 
     Notes
     -----
-    The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^p\\bigr)`, where
+    The model is :math:`y = L c + A(t; \\theta) \\cos\\bigl(\\varphi + \\omega\\tau + \\kappa \\int A^2\\bigr)`, where
     :math:`\\tau` is the time from the middle of the record; there frequency and phase are uncorrelated. A drifting
     rest position and further columns enter linearly and are projected out
     (:class:`pipeline.motion.waveform_model.WaveformModel`). A constant rest position is a parameter like the others.
 
     Samples whose residuals exceed four standard deviations, as estimated from the median absolute deviation, are
     excluded. The fit is repeated until the set of samples no longer changes
-    (:class:`pipeline.motion.waveform_model.Chooser`). Near a clipped plateau samples are excluded by the model's value
-    and not by their own noise, to avoid bias. The margin is 3.5 standard deviations from the level above which samples
-    count as clipped.
+    (:class:`pipeline.motion.waveform_model.Chooser`).
 
     If residuals are not white the covariance is that of the score summed over whole periods, including correlation
     between neighbouring periods, if it exceeds the white covariance significantly.
     """
-    params = params or Params()
     record = Record.of(conditioned, demodulated, phase, rest, extra)
-    chooser = Chooser(conditioned, demodulated, record, params.clip_sigmas)
+    chooser = Chooser(conditioned, demodulated, record, CLIP_SIGMAS)
     area_of = functools.partial(_area, record, damping.best, phase)
     if demodulated.t.size < FEW_WINDOWS and not damping.by_statement:
         phase = replace(phase, lag=None)  # only no damping and linear drag are tried, whose lag is constant
-        damping, start = _select_short(record, chooser.by_windows, demodulated, damping, phase, params)
+        damping, start = _select_short(record, chooser.by_windows, demodulated, damping, phase)
     else:
         theta = damping.best.joint.values
         area = area_of(theta) if phase.coefficients.size == 3 else None
-        start = _state(record, damping.best.law, theta, phase.coefficients, area, phase.exponent)
+        start = _state(record, damping.best.law, theta, phase.coefficients, area)
         if phase.lag is not None:
             start = replace(start, lag=(phase.lag[0] - phase.middle, phase.lag[1]))
-    solved = _settled(record, chooser, start, area_of, params)
+    solved = _settled(record, chooser, start, area_of)
     if isinstance(solved, str):
         noise_m = demodulated.noise_m
         return FullFit(False, solved, damping, phase, rest, waveform, demodulated.flags, noise_m, {})
     covariance, factors = _covariance(solved, demodulated)
     fits = dict(damping.fits)
-    for name in {damping.selected, *damping.admissible, *params.besides} & fits.keys():
+    for name in {damping.selected, *damping.admissible, *BESIDES} & fits.keys():
         if name == damping.selected:
             fits[name] = _with_joint(fits[name], solved, covariance)
             continue
         start = solved.state.with_law(fits[name].law, fits[name].joint.values)
-        own = _solve(record, start, solved.rows, params)
+        own = _solve(record, start, solved.rows)
         if own.fit.converged:
             fits[name] = _with_joint(fits[name], own, _covariance(own, demodulated)[0])
     damping = replace(damping, fits=fits)
@@ -204,37 +180,34 @@ def fit_record(
         _refined_phase(phase, damping, demodulated, solved.state, covariance),
         _refined_rest(solved, rest, phase.middle, covariance),
         _refined_waveform(solved, conditioned.track),
-        _flags(conditioned, chooser, solved),
+        _flags(conditioned, solved),
         solved.noise_m,
         dict(zip(solved.state.names, factors.tolist(), strict=True)),
     )
 
 
-def _state(
-    record: Record, law: Law, theta: F8, turning: F8, area: tuple[F8, F8] | None = None, exponent: float = 2.0
-) -> State:
+def _state(record: Record, law: Law, theta: F8, turning: F8, area: tuple[F8, F8] | None = None) -> State:
     constant = record.order == 0
-    return State(law, np.concatenate([theta, turning, [0.0] * constant]), constant, area, exponent)
+    return State(law, np.concatenate([theta, turning, [0.0] * constant]), constant, area)
 
 
 def _area(record: Record, fit: LawFit, phase: PhaseFit, theta: F8) -> tuple[F8, F8]:
     """Return the backbone's column for the parameters ``theta`` of the law."""
     last = phase.t0 + float(record.elapsed.max())
     fit = replace(fit, joint=replace(fit.joint, values=theta))
-    return amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last, phase.exponent)
+    return amplitude_integral(fit, phase.t0, phase.middle, phase.t0, last)
 
 
-def _solve(record: Record, state: State, rows: Rows, params: Params) -> _Solved:
+def _solve(record: Record, state: State, rows: Rows) -> _Solved:
     model = WaveformModel(record, state, rows)
-    options = least_squares.Params(steps=params.steps)
     if free_power(state.law) is None:
-        fit = least_squares.minimise(model.residuals, state.values, model.jacobian, options)
+        fit = least_squares.minimise(model.residuals, state.values, model.jacobian, steps=STEPS)
     else:
-        fit = _solve_by_amplitude(model, state, options)
+        fit = _solve_by_amplitude(model, state)
     return _Solved(record, replace(state, values=fit.values), model, rows, fit)
 
 
-def _solve_by_amplitude(model: WaveformModel, state: State, options: least_squares.Params) -> least_squares.Fit:
+def _solve_by_amplitude(model: WaveformModel, state: State) -> least_squares.Fit:
     """Fit with lengths in units of the first amplitude; in metres a free power and its factor are nearly degenerate."""
     own, count = state.law, state.theta.size
     length = abs(float(state.theta[0])) or 1.0
@@ -252,35 +225,33 @@ def _solve_by_amplitude(model: WaveformModel, state: State, options: least_squar
         lambda at: model.residuals(in_metres(at)),
         in_units(state.values, length),
         lambda at: model.jacobian(in_metres(at)) @ turn(at),
-        options,
+        steps=STEPS,
     )
     covariance = turn(fit.values) @ fit.covariance @ turn(fit.values).T
     return replace(fit, values=in_metres(fit.values), covariance=covariance)
 
 
-def _settled(
-    record: Record, chooser: Chooser, state: State, area_of: Callable[[F8], tuple[F8, F8]], params: Params
-) -> _Solved | str:
+def _settled(record: Record, chooser: Chooser, state: State, area_of: Callable[[F8], tuple[F8, F8]]) -> _Solved | str:
     """Fit repeatedly until the samples that lie on the model no longer change; return a text if that fails."""
     rows, state = chooser.settled(state, chooser.by_windows)
-    for _ in range(params.rounds):
+    for _ in range(ROUNDS):
         if np.count_nonzero(rows) < 2 * (state.values.size + record.basis.shape[1]):
             return f"only {np.count_nonzero(rows)} samples lie on the model"
         if state.area is not None:
             # The backbone's column so far belongs to the previous amplitudes.
             state = replace(state, area=area_of(state.theta))
-        solved = _solve(record, state, rows, params)
+        solved = _solve(record, state, rows)
         if not solved.fit.converged:
             return solved.fit.tried
         chosen = chooser.near(record.y - solved.position, rows)
-        if np.count_nonzero(chosen != rows) <= params.steady * rows.size:
+        if np.count_nonzero(chosen != rows) <= STEADY * rows.size:
             break
         rows, state = chooser.settled(solved.state, chosen)
     return solved
 
 
 def _select_short(
-    record: Record, rows: Rows, demodulated: Demodulated, damping: Damping, phase: PhaseFit, params: Params
+    record: Record, rows: Rows, demodulated: Demodulated, damping: Damping, phase: PhaseFit
 ) -> tuple[Damping, State]:
     """Select no damping or linear drag for a record of few periods: fit both to the waveform and compare by BIC."""
     fits: dict[str, LawFit] = {}
@@ -291,7 +262,7 @@ def _select_short(
     starts = {"none": np.array([amplitude]), "linear": np.array([amplitude * math.exp(rate * elapsed), rate])}
     for name, theta in starts.items():
         law = LAWS[name]
-        solved = _solve(record, _state(record, law, theta, phase.coefficients[:2]), rows, params)
+        solved = _solve(record, _state(record, law, theta, phase.coefficients[:2]), rows)
         if not solved.fit.converged:
             continue
         states[name] = solved.state
@@ -324,10 +295,7 @@ def _covariance(solved: _Solved, demodulated: Demodulated) -> tuple[F8, F8]:
             ratio = float(squares.sum())
             independent = ratio**2 / max(float(squares @ squares), 1e-300)
             significant = ratio > 1.0 + 3.3 * math.sqrt(2.0 / max(independent, 1.0))
-            # The last parameter is the constant rest position, in which a beat causes oscillating deviations.
-            beats = beating_length(pull) if solved.state.constant and k == u.size - 1 else None
-            length = correlation_length(pull) if beats is None else beats
-            factors[k] = math.sqrt((ratio if significant else 1.0) * length)
+            factors[k] = math.sqrt((ratio if significant else 1.0) * correlation_length(pull))
     return inverse * solved.noise_m**2 * np.outer(factors, factors), factors
 
 
@@ -337,13 +305,11 @@ def _with_joint(fit: LawFit, solved: _Solved, covariance: F8) -> LawFit:
     return replace(fit, joint=joint, converged=True)
 
 
-def _flags(conditioned: Conditioned, chooser: Chooser, solved: _Solved) -> NDArray[np.uint8]:
-    """Return the flags, with the samples excluded from the fit flagged as clipped or false echoes."""
+def _flags(conditioned: Conditioned, solved: _Solved) -> NDArray[np.uint8]:
+    """Return the flags, with the samples excluded from the fit flagged as false echoes."""
     flags = conditioned.flags.copy()
     out = ((flags & UNUSABLE) == 0) & ~solved.rows
-    crest = out & chooser.on_plateau(solved.position)
-    flags[crest] |= np.uint8(Quality.CLIPPED)
-    flags[out & ~crest] |= np.uint8(Quality.FALSE_ECHO)
+    flags[out] |= np.uint8(Quality.FALSE_ECHO)
     return flags
 
 
@@ -359,7 +325,7 @@ def _refined_phase(
     backbone = None
     if state.area is not None:
         gradient[2] = float(np.interp(before, *state.area)[0])
-        backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), backbone_unit(phase.exponent))
+        backbone = Estimate(float(state.turning[2]), math.sqrt(covariance[2, 2]), "rad/(s m^2)")
         tau = demodulated.t - phase.middle
         u = np.maximum(np.sqrt(demodulated.covariance[:, 1, 1]), 1e-12)
         line = solve_weighted(np.stack([np.ones(tau.size), tau], axis=1), state.steady_angle(tau), u)
@@ -395,5 +361,5 @@ def _refined_waveform(solved: _Solved, track: Track) -> Waveform:
 def _velocity(state: State, amplitude: F8, tau: F8) -> F8:
     angle, rate = state.angle(tau), state.turning[1]
     if state.area is not None:
-        rate = rate + state.turning[2] * np.abs(amplitude) ** state.exponent
+        rate = rate + state.turning[2] * amplitude**2
     return np.asarray(state.law.rate(amplitude, state.theta) * np.cos(angle) - amplitude * rate * np.sin(angle))

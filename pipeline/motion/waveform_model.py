@@ -16,8 +16,6 @@ from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated, model_error
 
-__all__ = ["Chooser", "Record", "Rows", "State", "WaveformModel"]
-
 Rows = NDArray[np.bool_]
 
 DEPENDENT = 1e-13  # eigenvalue, relative to the largest, below which columns count as linearly dependent
@@ -114,14 +112,12 @@ class State:
     law : Law
     values : (q,) float64
         The law's parameters, the phase in the middle (rad) and the angular frequency (rad/s). With ``area`` the
-        backbone (rad/(s m^p)) of :math:`\\omega(A) = \\omega_0 + \\kappa A^p` follows. If the rest position is
+        backbone (rad/(s m^2)) of :math:`\\omega(A) = \\omega_0 + \\kappa A^2` follows. If the rest position is
         constant, it comes last, minus the record's level (m).
     constant : bool
         Whether the rest position is constant.
     area : tuple of (g,) float64, or None
-        Times from the middle (s) and the integral of A^p (m^p s); only with a backbone.
-    exponent : float
-        The exponent p.
+        Times from the middle (s) and the integral of A^2 (m^2 s); only with a backbone.
     lag : tuple of (g,) float64, or None
         Times from the middle (s) and the delays of a period's fitted sinusoid at these times (rad). They are fixed at
         those of the windows' law, because their change with the parameters is of second order.
@@ -131,7 +127,6 @@ class State:
     values: F8
     constant: bool
     area: tuple[F8, F8] | None = None
-    exponent: float = 2.0
     lag: tuple[F8, F8] | None = None
 
     @property
@@ -309,12 +304,8 @@ class Chooser:
     def near(self, left: F8, rows: Rows) -> Rows:
         """Return the samples within the noise of a model with residuals ``left`` (n,) in m."""
         spread = mad_sigma(left[self._candidates])
-        near = self._candidates & ~self.on_plateau(self._record.y - left)
+        near = self._candidates
         if spread > 1.5 * self._noise_m:
             # The residuals contain more than noise, so that samples excluded so far remain excluded.
             return np.asarray(near & rows)
         return np.asarray(near & (np.abs(left) <= self._clip_sigmas * max(spread, self._least_m)))
-
-    def on_plateau(self, position: F8) -> Rows:
-        """Return where a model (n,), in m minus the record's level, is too close to a clipping level."""
-        return self._conditioned.near_plateau(position + self._record.level, self._noise_m)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from pipeline.track import F8
-
-__all__ = ["Estimate", "Joint", "UpperLimit", "format_limit", "format_value", "in_brackets"]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -75,7 +72,7 @@ class Estimate:
         return format_value(self.value, self.u, self.unit)
 
     def __repr__(self) -> str:
-        return in_brackets(str(self))
+        return in_brackets(self.value, self.u, self.unit)
 
     def __format__(self, spec: str) -> str:
         return format(self.ufloat, spec) if spec else str(self)
@@ -222,46 +219,27 @@ class Joint:
 def format_value(value: float, u: float, unit: str = "") -> str:
     """Write u to two significant digits and the value to the same decimal place.
 
-    Examples
-    --------
-    >>> format_value(0.752857, 0.001429, "s")
-    '0.7529 +- 0.0014 s'
-    >>> format_value(13.98, 0.0, "N/m")
-    '13.98 N/m'
-    >>> format_value(1.5e-7, 2.0e-9, "m")
-    '(1.500 +- 0.020)e-07 m'
-    >>> format_value(-0.02, 1.6, "m")
-    '0.0 +- 1.6 m'
+    >>> format_value(0.752857, 0.001429, "s"), format_value(13.98, 0.0, "N/m"), format_value(1.5e-7, 2.0e-9, "m")
+    ('0.7529 +- 0.0014 s', '13.98 N/m', '(1.500 +- 0.020)e-07 m')
     """
-    tail = f" {unit}" if unit not in ("", "1") else ""
-    if not math.isfinite(value) or not math.isfinite(u):
-        return f"{value:g} +- {u:g}{tail}"
-    if u <= 0:
-        return f"{value:.6g}{tail}"
-    # The exponent of u after rounding to two digits: 0.0999 becomes 0.10.
-    exponent = int(f"{u:.1e}".split("e")[1])
-    scale = max(abs(value), u)
-    if not 1e-4 <= scale < 1e6:
-        power = math.floor(math.log10(scale))
-        digits = max(0, power - exponent + 1)
-        return f"({value / 10.0**power:z.{digits}f} +- {u / 10.0**power:.{digits}f})e{power:+03d}{tail}"
-    digits = max(0, 1 - exponent)
-    if exponent > 1:
-        step = 10.0 ** (exponent - 1)
-        return f"{round(value / step) * step:z.0f} +- {round(u / step) * step:.0f}{tail}"
-    return f"{value:z.{digits}f} +- {u:.{digits}f}{tail}"
+    return _written(value, u, ".2u", unit)
 
 
-def in_brackets(text: str) -> str:
-    """Write the uncertainty of :func:`format_value` in brackets, in units of the value's last digit.
+def in_brackets(value: float, u: float, unit: str = "") -> str:
+    """Write the uncertainty in brackets, in units of the value's last digit.
 
-    Examples
-    --------
-    >>> in_brackets("0.7529 +- 0.0014 s"), in_brackets("12.3 +- 1.4"), in_brackets("(1.500 +- 0.020)e-07 m")
+    >>> in_brackets(0.752857, 0.001429, "s"), in_brackets(12.3, 1.4), in_brackets(1.5e-7, 2.0e-9, "m")
     ('0.7529(14) s', '12.3(1.4)', '1.500(20)e-07 m')
     """
-    found = re.fullmatch(r"\(?(-?[\d.]+) \+- ([\d.]+)\)?(.*)", text)
-    if found is None:
-        return text
-    value, u, tail = found.groups()
-    return f"{value}({u.lstrip('0.') if u.startswith('0.') else u}){tail}"
+    return _written(value, u, ".2uS", unit)
+
+
+def _written(value: float, u: float, form: str, unit: str) -> str:
+    tail = f" {unit}" if unit not in ("", "1") else ""
+    if math.isfinite(value) and u <= 0.0:
+        return f"{value:.6g}{tail}"
+    if not (abs(value) < 1e250 and 1e-250 < u < 1e250):
+        return f"{value:g} +- {u:g}{tail}"
+    from uncertainties import ufloat
+
+    return f"{ufloat(value, u):{form}}{tail}".replace("+/-", " +- ")

@@ -20,8 +20,6 @@ from numpy.typing import ArrayLike
 from pipeline.numerics.regression import decompose
 from pipeline.track import F8
 
-__all__ = ["Fit", "Params", "central_differences", "evaluated_once", "minimise"]
-
 T = TypeVar("T")
 
 EPS = float(np.finfo(np.float64).eps)
@@ -34,22 +32,8 @@ OUT_OF_STEPS = 5  # MINPACK's return code for it
 STALLED = 1e-3  # remaining distance allowed where the search finds no further step, in standard uncertainties
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`minimise`.
-
-    Parameters
-    ----------
-    precision : float
-        Stop when the remaining step is this fraction of the parameters' standard uncertainties, as estimated from the
-        residuals. The default adds 0.005 % to a standard uncertainty; 1e-8 is for reference values.
-    steps : int
-        Maximum number of trial steps; each takes one evaluation of the residuals. Of the fits that converged on
-        96 recordings, half took 4 steps and all but two took at most 40.
-    """
-
-    precision: float = 0.01
-    steps: int = 60
+PRECISION = 0.01  # remaining step over the standard uncertainties, which then grow by 0.005 %; see :func:`minimise`
+STEPS = 60  # maximum number of trial steps: of the fits that converged on 96 recordings, all but two took at most 40
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +81,9 @@ def minimise(
     residuals: Callable[[F8], F8],
     start: ArrayLike,
     jacobian: Callable[[F8], F8] | None = None,
-    params: Params | None = None,
+    *,
+    precision: float = PRECISION,
+    steps: int = STEPS,
 ) -> Fit:
     """Find the parameters that minimise the sum of squared residuals.
 
@@ -110,7 +96,11 @@ def minimise(
     jacobian : callable, optional
         Maps (p,) to (n, p): derivatives of the residuals. The default is central differences, which are accurate to
         about ten digits.
-    params : Params, optional
+    precision : float
+        Stop when the remaining step is this fraction of the parameters' standard uncertainties, as estimated from the
+        residuals; 1e-8 is for reference values.
+    steps : int
+        Maximum number of trial steps; each takes one evaluation of the residuals.
 
     Returns
     -------
@@ -141,7 +131,6 @@ def minimise(
     >>> fit.converged, fit.values.round(9)
     (True, array([3. , 0.7]))
     """
-    params = params or Params()
     theta = np.array(start, np.float64, ndmin=1)
     with np.errstate(all="ignore"):
         residual = np.asarray(residuals(theta), np.float64)
@@ -150,11 +139,11 @@ def minimise(
         if not np.all(np.isfinite(residual)):
             return _failed(theta, residual, f"no finite value at {_shown(theta)}", 1)
         slopes = jacobian or (lambda at: central_differences(residuals, at))
-        return _searched(residuals, slopes, theta, residual, params)
+        return _searched(residuals, slopes, theta, residual, precision, steps)
 
 
 def _searched(
-    residuals: Callable[[F8], F8], jacobian: Callable[[F8], F8], theta: F8, residual: F8, params: Params
+    residuals: Callable[[F8], F8], jacobian: Callable[[F8], F8], theta: F8, residual: F8, precision: float, steps: int
 ) -> Fit:
     """Search downhill from a start with known residuals, and judge the end point."""
     from scipy.optimize import leastsq
@@ -173,15 +162,15 @@ def _searched(
         np.maximum(largest, _lengths(slope), out=largest)
         return slope
 
-    share = params.precision**2 * theta.size / max(residual.size - theta.size, 1)
-    ends = {"ftol": max(share, LEAST_GAIN), "xtol": LEAST_STEP, "gtol": LEAST_GAIN, "maxfev": params.steps}
+    share = precision**2 * theta.size / max(residual.size - theta.size, 1)
+    ends = {"ftol": max(share, LEAST_GAIN), "xtol": LEAST_STEP, "gtol": LEAST_GAIN, "maxfev": steps}
     try:
         x, _, report, _, code = leastsq(values, theta, Dfun=slopes, full_output=True, **ends)
         slope = slopes(x)
     except _NoDerivativeError as error:
         return _failed(error.theta, np.asarray(residuals(error.theta), np.float64), str(error), 1)
     # Where the search finds no further step, its end may be less precise than where it runs out of steps.
-    precision = params.precision if code == OUT_OF_STEPS else max(params.precision, STALLED)
+    precision = precision if code == OUT_OF_STEPS else max(precision, STALLED)
     return _judged(x, report["fvec"], slope, largest, report["nfev"], precision)
 
 

@@ -13,22 +13,6 @@ from numpy.typing import NDArray
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.track import F8
 
-__all__ = [
-    "Line",
-    "Scatter",
-    "beating_length",
-    "beyond",
-    "chi2_quantile",
-    "correlation_length",
-    "covariance_of",
-    "decompose",
-    "scatter",
-    "smooth_columns",
-    "smooth_curve",
-    "solve_weighted",
-]
-
-OPPOSITE, SLOWEST = 0.5, 4  # correlation required at half and whole periods; fewest points of a quarter record
 LAGS = 16  # lags computed together; most residuals are uncorrelated beyond these
 
 
@@ -261,29 +245,6 @@ def correlation_length(residual: F8) -> float:
                 return total
             total += 2.0 * product / power
     return total
-
-
-def beating_length(residual: F8) -> float | None:
-    """Return how many points count as one if the residuals oscillate at some period, and None otherwise.
-
-    A beating mode makes the windows' rest positions oscillate. Their autocorrelation is about -r after half a period
-    and r after one period, where r is the wave's share of their power. Autocorrelated noise shows neither. The mean of
-    a wave over c periods, in n points, is off by at most :math:`\\sin(\\pi c)/(\\pi c)` of its amplitude. So the share
-    r counts :math:`n/(\\pi c)^2` times, and the white remainder once.
-    """
-    n = residual.size
-    centred = residual - residual.mean()
-    power = float(centred @ centred)
-    if n < 4 * SLOWEST or not power > 0.0:
-        return None
-    spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
-    rho = np.fft.irfft(spectrum, 2 * n)[:n] / power / (1.0 - np.arange(n) / n)
-    half = int(np.argmin(rho[: n // 4 + 1]))
-    # A minimum at either end of the range is no turning point.
-    if not 2 < half < n // 4 or rho[half] > -OPPOSITE:
-        return None
-    share = min(float(np.max(rho[2 * half - 1 : 2 * half + 2])), 1.0)
-    return 1.0 - share * (1.0 - (2 * half / math.pi) ** 2 / n) if share > OPPOSITE else None
 
 
 def chi2_quantile(probability: float, dof: float) -> float:

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from pipeline.track import F8
 
-__all__ = ["MAD_TO_SIGMA", "mad_sigma", "median"]
-
 MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4)
 
 

@@ -18,18 +18,6 @@ from pipeline.numerics.regression import beyond
 from pipeline.numerics.robust import median
 from pipeline.track import F8
 
-__all__ = [
-    "Band",
-    "Blocks",
-    "Peak",
-    "evidence_for",
-    "false_alarm",
-    "smooth_density",
-    "spectral_density",
-    "strongest",
-    "worth_a_look",
-]
-
 AR_ORDER = 4  # highest order of the autoregression that describes the residual's correlation
 OVERSAMPLING = 4  # of the spectrum; between two of its points a line loses at most 5 % of its power
 CONTINUUM = 2.5  # independent trials per natural bin, because frequencies between bins are searched too

@@ -11,8 +11,6 @@ import threading
 from contextlib import ContextDecorator
 from typing import Any
 
-__all__ = ["one_thread"]
-
 
 class _OneThread(ContextDecorator):
     """Restrict numpy's and scipy's linear algebra to one thread, in a ``with`` block or as a decorator.

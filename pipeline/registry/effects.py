@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-__all__ = ["EFFECTS", "check_effect"]
-
 EFFECTS: Mapping[str, str] = {
     "spring_mass": "mass of the spring",
     "added_mass": "air that the disc carries along",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["LAW_NAMES"]
-
 LAW_NAMES = (
     "none",
     "linear",

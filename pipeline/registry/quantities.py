@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from pipeline.numerics.quantity import Unit
 
-__all__ = ["INPUTS", "QUANTITIES", "Input", "Quantity", "check_input", "check_quantity"]
-
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
@@ -128,12 +126,9 @@ INPUTS: Mapping[str, Input] = {
     "calibrated_scale": Input("calibration of the scale"),
     "sensor_zero": Input("calibration of the zero", "z", Unit(1)),
     "sensor_mean_samples": Input("running mean of the sensor"),
-    "sensor_median_samples": Input("running median of the sensor"),
-    "sensor_median_cut": Input("crests cut by a running median"),
     "sensor_lag": Input("lag of the sensor", "tau", "s"),
     # Contradictions between the recording and its model.
     "model_misfit": Input("what differs from a sinusoid in every period"),
-    "choice_of_fit": Input("difference between the fits of windows and of the whole waveform"),
     "held_samples": Input("distances held by the sensor"),
     "sensor_smoothing": Input("smoothing by the sensor"),
     "implausible_motion": Input("motion that no bob on a spring makes"),

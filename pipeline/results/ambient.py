@@ -13,8 +13,6 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.budget import Inputs, estimate_of, function_of
 
-__all__ = ["Ambient"]
-
 
 class Ambient:
     """Density, viscosity and distance scale, calculated from the same temperature, pressure and humidity.

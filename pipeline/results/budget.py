@@ -17,8 +17,6 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.registry.quantities import check_input
 
-__all__ = ["COVERAGE", "Budget", "Contribution", "Inputs", "Kind", "estimate_of", "function_of", "joint_of"]
-
 Kind = Literal["A", "B"]
 
 COVERAGE = 0.9545

@@ -14,12 +14,9 @@ import numpy as np
 
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
-from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import minimise
 from pipeline.track import F8, UNUSABLE, Track
-
-__all__ = ["Classic", "classic", "sliding_amplitude"]
 
 STATED_ERROR_M = 0.00239  # error of one distance in the report, from the error column of the file
 READING_S = 0.01  # error of a time read from the graph in the report, one sample
@@ -196,7 +193,7 @@ def _exponential(t: F8, amplitude: F8) -> tuple[float, float]:
     def jacobian(theta: F8) -> F8:
         return np.asarray(-start * t * np.exp(-theta[0] * t))[:, None]
 
-    fit = minimise(residuals, [0.0], jacobian, least_squares.Params(precision=1e-9))
+    fit = minimise(residuals, [0.0], jacobian, precision=1e-9)
     if not fit.converged:
         return float(fit.values[0]), math.inf
     return float(fit.values[0]), math.sqrt(fit.cost / max(t.size - 1, 1) * float(fit.covariance[0, 0]))

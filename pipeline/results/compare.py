@@ -18,13 +18,11 @@ from pipeline.numerics.threads import one_thread
 from pipeline.results.derive import Derived
 from pipeline.track import F8
 
-__all__ = ["Comparison", "SpringRun", "compare_springs"]
-
 NEARER = 0.01  # maximum tension with two runs exchanged, over that without: chance does not reduce it so much
 SOLVED = 0.5  # maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it
 LARGEST_SPRING = 0.6  # maximum mass of a spring, over the lightest bob: a heavier spring is noticed and weighed
 GAUSS_NEWTON_STEPS = 30
-SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those farthest from the majority
+SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those farthest from the mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +167,7 @@ def compare_springs(
     masses outweigh it. The mass then takes one degree of freedom, so two runs determine it but do not test it. Spring
     constants do not depend on the scale of the distances.
 
-    If the runs disagree, the eight runs farthest from a robust line are exchanged pair by pair. A pair is reported if
+    If the runs disagree, the eight runs farthest from the mean are exchanged pair by pair. A pair is reported if
     its exchange makes all runs agree, or reduces their tension to a hundredth, because exchanged records need not agree
     to the last digit.
 
@@ -194,16 +192,13 @@ def compare_springs(
     best = fit
     if not fit.agree:
         nearest = NEARER * fit.tension
-        for i, j in itertools.combinations(_suspects(runs, masses, spring_mass_kg, mass_correlation), 2):
+        farthest = sorted(np.argsort(-np.abs(fit.pulls), kind="stable")[:SUSPECTS].tolist())
+        for i, j in itertools.combinations(farthest, 2):
             trial = masses.copy()
             trial[i], trial[j] = trial[j], trial[i]
             other = _fit(runs, trial, spring_mass_kg, mass_correlation, probability)
             if other.tension <= max(nearest, 1.0) and (not exchanged or other.tension < best.tension):
                 best, exchanged = other, (runs[i].name, runs[j].name)
-    reweighed = None
-    if not fit.agree and spring_mass_kg is not None:
-        free = _fit(runs, masses, None, mass_correlation, probability)
-        reweighed = free if free.agree and free.solved else None
     return Comparison(
         tuple(run.name for run in runs),
         fit.constant,
@@ -218,7 +213,7 @@ def compare_springs(
         fit.deviation,
         exchanged,
         best.chi2 if exchanged else None,
-        _message(runs, fit, spring_mass_kg, exchanged, best, reweighed),
+        _message(runs, fit, exchanged, best),
     )
 
 
@@ -356,34 +351,6 @@ def _known_spring(masses: Sequence[Estimate], stated: Estimate | None) -> Estima
     return stated or unstated_spring_kg(Scene(bob_mass_kg=Estimate(lightest, 0.0, "kg")))
 
 
-def _suspects(
-    runs: Sequence[SpringRun], masses: Sequence[Estimate], stated: Estimate | None, mass_correlation: float
-) -> list[int]:
-    """Return the indices of the runs farthest from a robust line, in ascending order.
-
-    The soft-L1 loss of the line limits the influence of a few outliers. The line is linear in the constant and in the
-    deviation of the spring's mass from its value before the comparison.
-    """
-    from scipy.optimize import least_squares
-
-    if len(runs) <= SUSPECTS:
-        return list(range(len(runs)))
-    spring = _known_spring(masses, stated)
-    loads = np.array([mass.value for mass in masses])
-    squared = np.array([run.angular_frequency.value**2 for run in runs])
-    k = squared * _oscillating(spring.value, loads)
-    _, own = _covariance(runs, masses, k, mass_correlation)
-    # d k_i / d s = omega_i^2 / 3 for a light spring; the unit of s is the uncertainty of the spring's mass.
-    slope = squared * spring.u / 3.0
-
-    def pulls(x: F8) -> F8:
-        return np.asarray((k + slope * x[1] - x[0]) / own)
-
-    start = np.array([float(np.median(k)), 0.0])
-    line = least_squares(pulls, start, x_scale="jac" if spring.u > 0 else np.array([start[0], 1.0]), loss="soft_l1").x
-    return sorted(np.argsort(-np.abs(pulls(line)), kind="stable")[:SUSPECTS].tolist())
-
-
 def _oscillating(spring_kg: float, loads: F8) -> F8:
     return np.array([oscillating_mass_kg(spring_kg, float(load)) for load in loads])
 
@@ -404,44 +371,21 @@ def _covariance(
     return np.diag(own**2) + common, own
 
 
-def _message(
-    runs: Sequence[SpringRun],
-    fit: _Fit,
-    stated: Estimate | None,
-    exchanged: tuple[str, ...],
-    best: _Fit,
-    reweighed: _Fit | None,
-) -> str:
+def _message(runs: Sequence[SpringRun], fit: _Fit, exchanged: tuple[str, ...], best: _Fit) -> str:
     together = ", ".join(run.name for run in runs)
     difference = f"{fit.deviation:.1f} standard uncertainties"
-    if fit.agree and fit.solved:
-        text = f"One spring if it weighs {_grams(fit.spring)}: {together} agree on k = {fit.constant} then. "
-        if fit.dof:
-            return f"{text}The runs solve for its mass, which the scene does not state (chi-square {fit.chi2:.2g})."
-        return (
-            f"{text}Two runs solve for its mass, which the scene does not state, and do not test it: weigh the spring, "
-            "or add a run with a third mass."
-        )
-    if fit.agree:
+    if not fit.agree:
+        text = f"Not one spring as recorded: {together} differ by {difference}."
+    elif fit.dof:
         text = f"One spring: {together} agree on k = {fit.constant} (largest difference {difference})."
-        if stated is None:
-            text += " The scene does not weigh it and the bobs are too alike to tell: the uncertainty holds its mass."
-        return text
-    text = f"Not one spring as recorded: {together} differ by {difference}."
-    if reweighed is not None:
-        text = (
-            f"They agree if the spring weighs {_grams(reweighed.spring)}, where the scene states {_grams(stated)}: "
-            f"weigh it again. {text}"
-        )
-    elif stated is None:
-        text += " No mass that springs have brings them together."
+    else:
+        text = f"Two runs determine k = {fit.constant} and the spring's mass without a test: add a third bob."
+    if fit.agree and fit.solved:
+        grams = Estimate(1e3 * fit.spring.value, 1e3 * fit.spring.u, "g")
+        text += f" The spring then weighs {grams}, which the scene does not state."
     if exchanged:
         text += (
             f" With the masses (or the periods) of {exchanged[0]} and {exchanged[1]} exchanged they "
             f"{'agree' if best.agree else 'come together'}: check which record belongs to which bob."
         )
     return text
-
-
-def _grams(mass: Estimate | None) -> str:
-    return "nothing" if mass is None else str(Estimate(1e3 * mass.value, 1e3 * mass.u, "g"))

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.damping.average import Weighted
-from pipeline.damping.select import Damping, LawFit
+from pipeline.damping.law_fit import LawFit
+from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.regression import solve_weighted
 from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
-
-__all__ = ["Curve", "drag_curve", "energy_curve"]
 
 POINTS = 200  # number of points of a drawn curve
 GROUPS = 12  # maximum number of groups of windows whose local slopes are drawn with the curve

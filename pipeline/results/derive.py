@@ -5,8 +5,8 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.checks.misfit import Misfit
-from pipeline.damping.average import Weighted, average_over_laws, scaled, spread_counts
+from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Law, free_power
 from pipeline.damping.select import Damping
@@ -33,24 +33,10 @@ from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["Derived", "Params", "derive", "limited"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`derive`.
-
-    Parameters
-    ----------
-    u_clock_nominal : float
-        Relative standard uncertainty of a clock from the specification of its crystal: 50 ppm is the half-width of a
-        rectangular distribution. It does not decrease by averaging.
-    u_air_temperature_k : float
-        Standard uncertainty of an air temperature stated without one, K.
-    """
-
-    u_clock_nominal: float = U_CRYSTAL
-    u_air_temperature_k: float = 0.5
+# Relative standard uncertainty of a clock from the specification of its crystal: 50 ppm is the half-width of a
+# rectangular distribution. It does not decrease by averaging.
+U_CLOCK_NOMINAL = U_CRYSTAL
+U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +61,6 @@ class Derived:
     law : str
         Name of the law by which the results are stated; empty if they are an average over laws. They count as an
         average also if the record selects one drag and the results use both, of which it is a special case.
-    alone : callable or None
-        Function that returns the results by the law that is clearly ahead
-        (:attr:`pipeline.damping.select.Damping.ahead`). None if no law is ahead, or if ``law`` is not empty.
     """
 
     estimates: Mapping[str, Estimate]
@@ -86,7 +69,6 @@ class Derived:
     laws: tuple[Weighted, ...]
     parts: Mapping[str, tuple[Any, str]]
     law: str
-    alone: Callable[[], Derived] | None = None
 
     @cached_property
     def of_law(self) -> frozenset[str]:
@@ -97,18 +79,6 @@ class Derived:
             if any(c.name in ("damping_law", "choice_of_law") for c in self.budgets[name].contributions)
         )
 
-    @cached_property
-    def leading(self) -> Derived | None:
-        """The results if the law that is clearly ahead is true; None if no law is ahead, or if the results use it."""
-        return None if self.alone is None else self.alone()
-
-    def coefficients_of(self, law: str) -> Mapping[str, Estimate]:
-        """Return the coefficients of a law as the results state them; empty if they state none of this law."""
-        for stated in (self, self.leading):
-            if stated is not None and stated.laws[0].fit.name == law:
-                return stated.coefficients
-        return {}
-
     def parameters_of(self, fit: LawFit) -> dict[str, Estimate]:
         """Return the parameters of a law by name, in true seconds and metres, with all known contributions.
 
@@ -117,10 +87,9 @@ class Derived:
         """
         from uncertainties import correlated_values
 
-        coefficients = self.coefficients_of(fit.name)
-        for stated in (self, self.leading):
-            if stated is not None and stated.law == fit.name:
-                return {"A0": stated.estimates["amplitude"], **coefficients}
+        coefficients = self.coefficients if self.laws[0].fit.name == fit.name else {}
+        if self.law == fit.name:
+            return {"A0": self.estimates["amplitude"], **coefficients}
         joint = scaled(fit).joint
         variables = list(correlated_values(joint.values.tolist(), joint.covariance))
         found = {
@@ -222,7 +191,6 @@ def derive(
     effects: tuple[Effect, ...],
     *,
     instrument: Instrument,
-    params: Params | None = None,
     misfits: tuple[Misfit, ...] = (),
     smoothing: SensorFilter | None = None,
 ) -> Derived:
@@ -238,7 +206,6 @@ def derive(
         The effects table, which says which masses are included.
     instrument : Instrument
         Clock and scale of the sensor.
-    params : Params, optional
     misfits : tuple of Misfit
         Contradictions between the record and its model; they are inputs of kind B with the mean zero.
     smoothing : SensorFilter, optional
@@ -274,8 +241,7 @@ def derive(
 
     Results that depend on the damping law are averages over laws
     (:func:`pipeline.damping.average.average_over_laws`): :math:`x = \\sum_i w_i x_i` and
-    :math:`u^2 = \\sum_i w_i (u_i^2 + c (x_i - x)^2)`, where the factor c weights the spread between laws
-    (:func:`pipeline.damping.average.spread_counts`).
+    :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
 
     References
     ----------
@@ -285,9 +251,8 @@ def derive(
     inputs = Inputs()
     laws = _Laws(damping, inputs, demodulated)
     unit = rest.mean.unit
-    params = params or Params()
     terms, coefficients = _terms(
-        demodulated, damping, phase, rest, scene, effects, instrument, params, misfits, smoothing, laws, inputs
+        demodulated, damping, phase, rest, scene, effects, instrument, misfits, smoothing, laws, inputs
     )
     found: dict[str, tuple[Any, str]] = {}
     parts: dict[str, tuple[Any, str]] = {}
@@ -299,21 +264,6 @@ def derive(
     parts |= {name: (terms[name], "") for name in ("rates", "lengths")}
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
     law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == damping.selected else ""
-    alone = None
-    if damping.ahead and not law:
-        alone = partial(
-            derive,
-            demodulated,
-            replace(damping, stated=damping.selected),
-            phase,
-            rest,
-            scene,
-            effects,
-            instrument=instrument,
-            params=params,
-            misfits=misfits,
-            smoothing=smoothing,
-        )
     return Derived(
         estimates={name: budgets[name].estimate for name in found},
         coefficients={name: limited(laws.stated.law, name, budgets[name].estimate) for name in coefficients},
@@ -321,7 +271,6 @@ def derive(
         laws=laws.weighted,
         parts=parts,
         law=law,
-        alone=alone,
     )
 
 
@@ -426,14 +375,13 @@ def _terms(
     scene: Scene,
     effects: tuple[Effect, ...],
     instrument: Instrument,
-    params: Params,
     misfits: tuple[Misfit, ...],
     smoothing: SensorFilter | None,
     laws: _Laws,
     inputs: Inputs,
 ) -> tuple[dict[str, Any], dict[str, tuple[Any, str]]]:
     """Return the terms of the formulas by name, as far as record and scene give them, and the coefficients."""
-    ambient = Ambient(scene, inputs, u_temperature_k=params.u_air_temperature_k)
+    ambient = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
     amiss = _Amiss(misfits, inputs)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
     unit = rest.mean.unit
@@ -536,13 +484,11 @@ class _Filtered:
         self.delay: Any = 0.0
         if smoothing is None:
             return
-        names = ("sensor_mean_samples", "sensor_median_samples", "sensor_lag")
         sizes = [
             inputs.add(name, size, "B") if size.u > 0.0 else size.value
-            for name, size in zip(names, smoothing.sizes, strict=True)
+            for name, size in (("sensor_mean_samples", smoothing.mean_samples), ("sensor_lag", smoothing.lag_s))
         ]
-        cut = inputs.add("sensor_median_cut", Estimate(0.0, smoothing.u_cut(float(omega.nominal_value)), ""), "B")
-        self.gain = function_of(smoothing.gain, omega, *sizes) + cut
+        self.gain = function_of(smoothing.gain, omega, *sizes)
         self.delay = function_of(smoothing.delay, omega, *sizes)
 
 
@@ -571,8 +517,7 @@ class _Laws:
         if weights.size > 1:
             factors = [by_parameters @ _root(one.fit.joint.covariance) for one, _, by_parameters in found]
             apart = each - self.values
-            counts = spread_counts(weights, apart[:, 1], np.array([factor[1] @ factor[1] for factor in factors]))
-            covariance = counts * (weights[:, None] * apart).T @ apart
+            covariance = (weights[:, None] * apart).T @ apart
             for factor, one, weight in zip(factors, self.weighted, weights, strict=True):
                 if one.fit is not self.stated:
                     covariance += weight * factor @ factor.T

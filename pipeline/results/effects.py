@@ -23,7 +23,7 @@ from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
-from pipeline.motion.phase import PhaseFit, words_on_exponent
+from pipeline.motion.phase import PhaseFit
 from pipeline.motion.waveform import Rest
 from pipeline.numerics.quantity import Unit, amount
 from pipeline.registry.effects import check_effect
@@ -195,24 +195,21 @@ def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
     if phase.backbone is None:
         return Effect(name, None, None, "1", False, "a constant frequency describes the phase: an ideal spring's")
     start = damping.best.joint["A0"].value
-    shift = phase.backbone.value * start**phase.exponent / phase.angular_frequency.value
+    shift = phase.backbone.value * start**2 / phase.angular_frequency.value
     why = (
         f"the phase bends: the frequency shifts by {shift:.2g} of itself from rest to the first amplitude, "
-        f"with {words_on_exponent(phase.exponent)}, far beyond its uncertainty"
+        "with the square of the amplitude, far beyond its uncertainty"
     )
     return Effect(name, None, shift, "1", True, why)
 
 
 def _rest_drift(rest: Rest, noise_m: float) -> Effect:
     unit = rest.mean.unit
-    if not rest.moves:
+    if not rest.drifts:
         why = f"a constant rest position describes the record (noise of one sample {amount(noise_m, unit)})"
         return Effect("rest_drift", None, rest.drift_m, unit, False, why)
-    parts = ["it is followed by a smooth curve"] if rest.drifts else []
-    if rest.steps:
-        parts.append(f"its steps, {len(rest.steps)} in number, are taken out")
-    why = f"the rest position moves more than its scatter allows; {' and '.join(parts)}"
-    return Effect("rest_drift", None, rest.range_m, unit, True, why)
+    why = "the rest position moves more than its scatter allows; it is followed by a smooth curve"
+    return Effect("rest_drift", None, rest.drift_m, unit, True, why)
 
 
 def _modes(disturbances: Disturbances | None, unit: str) -> Iterator[Effect]:

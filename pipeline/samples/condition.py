@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -13,34 +12,16 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
-__all__ = ["Conditioned", "Cut", "Params", "coarsest_step", "condition", "fourth_difference_noise"]
-
 # Variance of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
 QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
 TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
-CREST_SIGMAS = 3.5
 BLOCK = 256  # samples over which a local curvature is estimated
 LARGEST = 1e100  # magnitude of a measured value; anything beyond is a missing sample
 ROUNDING = 1e-9  # fraction of the largest value; smaller differences are rounding errors of one value
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`condition`.
-
-    Parameters
-    ----------
-    spike_sigmas : float
-        Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in
-        standard deviations of the noise.
-    plateau_contrast : float
-        Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an
-        unclipped crest the ratio is 1 / (sqrt 2 - 1) = 2.4.
-    """
-
-    spike_sigmas: float = 8.0
-    plateau_contrast: float = 5.0
+# Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in standard
+# deviations of the noise.
+SPIKE_SIGMAS = 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,22 +61,16 @@ class Conditioned:
         The track's own flags and those found here.
     noise_m : float
         Standard deviation of the white noise from fourth differences, m; independent of any model of the motion.
-    plateaus_m : tuple of float
-        Distances at which the record is clipped, m.
     quantum_m : float or None
         Resolution of the distances: the track's, or a coarser one that the distances themselves show.
-    clipped_from_m : tuple of float
-        For each plateau, the distance beyond which samples were flagged, m.
     cuts : tuple of Cut
-        Cuts found by the sinusoid, which replace the plateaus; see :mod:`pipeline.windows.clipping`.
+        Cuts found by the sinusoid; see :mod:`pipeline.windows.clipping`.
     """
 
     track: Track
     flags: U8
     noise_m: float
-    plateaus_m: tuple[float, ...]
     quantum_m: float | None
-    clipped_from_m: tuple[float, ...] = ()
     cuts: tuple[Cut, ...] = ()
 
     @property
@@ -108,31 +83,13 @@ class Conditioned:
         """Return the record with values (n,) subtracted from its distances; flags and times are kept."""
         return replace(self, track=replace(self.track, y=self.track.y - taken_m))
 
-    def near_plateau(self, model_m: F8, noise_m: float) -> NDArray[np.bool_]:
-        """Return where a model is so close to a plateau that noise decides whether a sample is clipped.
 
-        The model selects the samples to leave out there, not their own noise, so the remaining samples are not biased.
-
-        Parameters
-        ----------
-        model_m : (...) float64, m
-        noise_m : float
-        """
-        near = np.zeros(model_m.shape, np.bool_)
-        middle = float(np.median(model_m)) if self.clipped_from_m else 0.0
-        for bottom in self.clipped_from_m:
-            sign = 1.0 if bottom > middle else -1.0
-            near |= sign * model_m > sign * bottom - CREST_SIGMAS * noise_m
-        return near
-
-
-def condition(track: Track, params: Params | None = None) -> Conditioned:
-    """Flag missing samples, duplicate and backward times, isolated false echoes and clipped plateaus.
+def condition(track: Track) -> Conditioned:
+    """Flag missing samples, duplicate and backward times, and isolated false echoes.
 
     Parameters
     ----------
     track : Track
-    params : Params, optional
 
     Returns
     -------
@@ -159,7 +116,6 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
     >>> int(found.flags[500]), int(np.count_nonzero(found.flags))
     (2, 1)
     """
-    params = params or Params()
     flags = track.flags.copy()
     measured = np.abs(track.y) < LARGEST  # and not NaN
     flags[~measured] |= np.uint8(Quality.MISSING)
@@ -176,26 +132,13 @@ def condition(track: Track, params: Params | None = None) -> Conditioned:
         )
     y, rows = track.y[clean], np.flatnonzero(clean)
     half_step = 0.5 * (track.quantum_m or 0.0)
-    spikes = _spikes(y, half_step, params.spike_sigmas)
+    spikes = _spikes(y, half_step, SPIKE_SIGMAS)
     flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
     y_kept, rows = y[~spikes], rows[~spikes]
     noise_m = fourth_difference_noise(y_kept)
-    plateaus: list[float] = []
-    bottoms: list[float] = []
     ordered = np.sort(y_kept)
-    found = [
-        (sign, *_plateau(sign * y_kept, increasing, max(noise_m, half_step), params.plateau_contrast))
-        for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1]))
-    ]
-    # A record that lies mostly on plateaus is a step or a bob at rest, not a clipped motion.
-    if sum(members.size for _, _, _, members in found) <= 0.6 * y_kept.size:
-        for sign, level, bottom, members in found:
-            if members.size:
-                plateaus.append(sign * level)
-                bottoms.append(sign * bottom)
-                flags[rows[members]] |= np.uint8(Quality.CLIPPED)
     quantum_m = coarsest_step(ordered, track.quantum_m)
-    return Conditioned(track, flags, noise_m, tuple(plateaus), quantum_m, tuple(bottoms))
+    return Conditioned(track, flags, noise_m, quantum_m)
 
 
 def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
@@ -213,6 +156,10 @@ def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
     if not 0 < np.count_nonzero(apart) <= 0.5 * ordered.size:
         return stated_m
     least = float(steps[apart].min())
+    # Values in steps are whole steps apart; those of a computed motion that repeats itself are not.
+    near = steps[apart & (steps < 50.0 * least)] / least
+    if np.mean(np.abs(near - np.rint(near)) > 0.1) > 0.1:
+        return stated_m
     return least if stated_m is None or least > 1.5 * stated_m else stated_m
 
 
@@ -343,64 +290,3 @@ def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
     high = np.minimum(np.maximum(a, b), np.maximum(c, d))
     return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
-
-
-def _visits(y: F8, band: NDArray[np.bool_], low: float) -> int:
-    """Count how often the motion enters the band from below ``low``; a bob that settles there enters once."""
-    state = np.where(band, 1, np.where(y < low, -1, 0))
-    known = state[state != 0]
-    return int(np.count_nonzero((known[1:] > 0) & (known[:-1] < 0))) + int(known[0] > 0)
-
-
-def _plateau(y: F8, ordered: F8, noise_m: float, contrast: float) -> tuple[float, float, NDArray[np.int64]]:
-    """Find a clipped plateau at the upper end of ``y``; ``ordered`` contains its values in increasing order.
-
-    A clipped record has many samples in a band a few sigma wide, with almost none above it and few beneath. For an
-    unclipped crest, the number of samples grows as the square root of the depth below the crest.
-    """
-    none = np.empty(0, np.int64)
-    low, high = ordered[0], ordered[-1]
-    if (level := _saturated(y, ordered, contrast)) is not None:
-        return level, level, np.flatnonzero(y >= level)
-    width = 6.0 * noise_m
-    if high - low < 6.0 * width or width == 0.0:
-        return 0.0, 0.0, none
-    first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
-    upper = ordered[first:]
-    few = math.ceil(max(0.02 * y.size, 8))
-    # Bands that begin at these indices contain enough samples.
-    starts = np.flatnonzero(upper[few - 1 :] <= upper[: max(upper.size - few + 1, 0)] + width)
-    if not starts.size:
-        return 0.0, 0.0, none
-    counts = np.searchsorted(upper, upper[starts] + width, side="right") - starts
-    fullest = int(np.argmax(counts))
-    start, inside = int(starts[fullest]), int(counts[fullest])
-    bottom = upper[start]
-    above = upper.size - start - inside
-    beneath = first + start - int(np.searchsorted(ordered, bottom - width))
-    if above > 0.1 * inside or inside < contrast * (beneath + 1):
-        return 0.0, 0.0, none
-    band = (y >= bottom) & (y <= bottom + width)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], band.astype(np.int8), [0]])))
-    starts, stops = edges[::2], edges[1::2]
-    if np.median(stops - starts) < 3 or _visits(y, band, bottom - 3.0 * width) < 2:
-        return 0.0, 0.0, none
-    # Samples in heavy tails of the noise lie above the band but still belong to the plateau.
-    members = np.flatnonzero(y >= bottom)
-    return float(np.median(y[band])), float(bottom), members
-
-
-def _saturated(y: F8, ordered: F8, contrast: float) -> float | None:
-    """Return the value at which a sensor clips its noisy signal at the top, or None where it does not."""
-    few = max(int(0.02 * y.size), 8)
-    level = float(ordered[-max(few // 2, 1)])
-    first, last = np.searchsorted(ordered, level), np.searchsorted(ordered, level, side="right")
-    inside = int(last - first)
-    if inside < few or ordered.size - last > 0.1 * inside or first == 0:
-        return None
-    next_lower = ordered[first - 1]
-    beneath = int(first - np.searchsorted(ordered, next_lower))
-    margin = 0.05 * (level - float(ordered[0]))
-    if inside < contrast * (beneath + 1) or _visits(y, y >= level, level - margin) < 2:
-        return None
-    return level

@@ -10,8 +10,6 @@ from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-__all__ = ["moving_part", "stop_row"]
-
 BLOCK = 25  # samples over which a bob is judged to be moving or at rest
 
 

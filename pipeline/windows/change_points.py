@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
@@ -10,42 +9,19 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 
-__all__ = ["Change", "Params", "find_changes", "lone_points"]
-
 I8 = NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`find_changes`.
-
-    Parameters
-    ----------
-    false_alarm : float
-        Probability that a jump is found anywhere in a smooth series: Bonferroni's bound over all points tested.
-    lengths : tuple of int
-        Numbers of points in an interval, in ascending order. Lengths that double lose less than a tenth of the power
-        between two lengths [1]_. Fewer than 8 points leave no degrees of freedom. Over more than 32 periods, drag and
-        drift are no longer cubic.
-    undisturbed : float
-        Minimum share of the intervals without a jump; the scatter of these intervals is taken as typical.
-    apart : int
-        Minimum number of points between an interval's end and a jump within it, so that two bad windows do not count
-        as a jump. It is a quarter of the interval if that is less. At the ends of the series one point is enough.
-
-    References
-    ----------
-    .. [1] S. Kovacs, P. Buehlmann, H. Li, A. Munk, "Seeded binary segmentation", Biometrika 110 (2023) 249,
-       doi:10.1093/biomet/asac052.
-    """
-
-    false_alarm: float = 1e-3
-    lengths: tuple[int, ...] = (10, 18, 32)
-    undisturbed: float = 1 / 3
-    apart: int = 5
+# Probability that a jump is found anywhere in a smooth series: Bonferroni's bound over all points tested.
+FALSE_ALARM = 1e-3
+# Numbers of points in an interval, in ascending order. Lengths that double lose less than a tenth of the power
+# between two lengths [1]_. Fewer than 8 points leave no degrees of freedom. Over more than 32 periods, drag and drift
+# are no longer cubic.
+LENGTHS = (10, 18, 32)
+UNDISTURBED = 1 / 3  # minimum share of the intervals without a jump; the scatter of these intervals is taken as typical
+# Minimum number of points between an interval's end and a jump within it, so that two bad windows do not count as a
+# jump. It is a quarter of the interval if that is less. At the ends of the series one point is enough.
+APART = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +40,7 @@ class Change:
     false_alarm: float
 
 
-def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Change, ...]:
+def find_changes(t: F8, y: F8, u: F8) -> tuple[Change, ...]:
     """Find where a series of several components jumps, in order of time.
 
     Parameters
@@ -73,7 +49,6 @@ def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Cha
         Times in ascending order.
     y, u : (m, n) float64
         Components and their standard uncertainties, independent of each other.
-    params : Params, optional
 
     Returns
     -------
@@ -111,17 +86,16 @@ def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Cha
     >>> change.index
     25
     """
-    params = params or Params()
-    scatter = _scatter(t, y, u, params)
-    trials = sum(length * _starts(t.size, length).size for length in params.lengths if length <= t.size)
+    scatter = _scatter(t, y, u)
+    trials = sum(length * _starts(t.size, length).size for length in LENGTHS if length <= t.size)
     found: dict[int, float] = {}
     parts = [(0, t.size)]
     while parts:
         first, stop = parts.pop()
-        for length in params.lengths:
+        for length in LENGTHS:
             if length > stop - first:
                 break
-            change = _strongest(t[first:stop], y[:, first:stop], scatter[length][:, first:stop], length, params, trials)
+            change = _strongest(t[first:stop], y[:, first:stop], scatter[length][:, first:stop], length, trials)
             if change is not None:
                 index = first + change.index
                 found[index] = change.false_alarm
@@ -134,39 +108,12 @@ def find_changes(t: F8, y: F8, u: F8, params: Params | None = None) -> tuple[Cha
     return tuple(Change(index, found[index]) for index in sorted(found))
 
 
-def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
-    """Return (n,) bool: True for single outliers, caused by clusters of echoes or by a jump within a window.
-
-    Parameters
-    ----------
-    y, u : (m, n) float64
-        Components and their standard uncertainties.
-    false_alarm : float
-        Maximum probability that noise makes any point an outlier.
-
-    Notes
-    -----
-    Such a point lies far from interpolations between its neighbours and from extrapolations of the two points before or
-    after it. The first and last two points are never outliers. The maximum of n normal deviations in two components
-    exceeds :math:`\\sqrt{2 \\ln(n/\\alpha)}` with probability :math:`\\alpha`. A mean of two neighbours adds half the
-    variance.
-    """
-    if y.shape[1] < 5:
-        return np.zeros(y.shape[1], np.bool_)
-    before2, before, here, after, after2 = (y[:, k : y.shape[1] - 4 + k] for k in range(5))
-    expected = (0.5 * (before + after), 0.5 * (before2 + after2), 2.0 * before - before2, 2.0 * after - after2)
-    off = np.min([np.abs(here - each) for each in expected], axis=0)
-    usual = np.maximum(math.sqrt(1.5) * u[:, 2:-2], [[mad_sigma(each)] for each in off])
-    far = math.sqrt(2.0 * math.log(y.shape[1] / false_alarm))
-    return np.concatenate([[False, False], np.any(off > far * usual, axis=0), [False, False]])
-
-
 def _starts(size: int, length: int) -> I8:
     """Return the first points of the intervals of a length: a quarter of it apart, and one at the end."""
     return np.unique(np.append(np.arange(0, size - length + 1, length // 4), size - length))
 
 
-def _strongest(t: F8, y: F8, u: F8, length: int, params: Params, trials: int) -> Change | None:
+def _strongest(t: F8, y: F8, u: F8, length: int, trials: int) -> Change | None:
     """Return the strongest jump within the intervals of one length, or None if none is significant."""
     starts = _starts(t.size, length)
     rows = starts[:, None] + np.arange(length)
@@ -181,14 +128,14 @@ def _strongest(t: F8, y: F8, u: F8, length: int, params: Params, trials: int) ->
         left = left - np.sum(column * left, axis=2, keepdims=True) * column
     gain = _gains(weight, basis, left)
     after = np.maximum(np.sum(left**2, axis=(0, 2))[:, None] - gain, 0.0)
-    statistic = np.where(_allowed(starts, length, t.size, params.apart), gain / m, 0.0) / np.maximum(1.0, after / dof)
+    statistic = np.where(_allowed(starts, length, t.size, APART), gain / m, 0.0) / np.maximum(1.0, after / dof)
     place = np.argmax(statistic, axis=1)
     highest = np.max(statistic, axis=1)
     best: tuple[float, Change] | None = None
     # No quantile of F is below that of chi-square; few records without a jump need scipy's exact quantile.
-    if m * float(highest.max()) < NormalDist().inv_cdf(0.5 * params.false_alarm / trials) ** 2:
+    if m * float(highest.max()) < NormalDist().inv_cdf(0.5 * FALSE_ALARM / trials) ** 2:
         return None
-    for i in np.flatnonzero(highest > _threshold(m, dof, params.false_alarm / trials)).tolist():
+    for i in np.flatnonzero(highest > _threshold(m, dof, FALSE_ALARM / trials)).tolist():
         k = int(place[i])
         design = np.stack([*(x[i] ** power for power in range(degree + 1)), np.arange(length) >= k], axis=1)
         reach = _correlation(
@@ -196,12 +143,12 @@ def _strongest(t: F8, y: F8, u: F8, length: int, params: Params, trials: int) ->
         )
         corrected = float(highest[i]) / reach
         chance = trials * _chance(corrected, m, dof / reach)
-        if chance < params.false_alarm and (best is None or corrected > best[0]):
+        if chance < FALSE_ALARM and (best is None or corrected > best[0]):
             best = corrected, Change(int(starts[i]) + k, chance)
     return None if best is None else best[1]
 
 
-def _scatter(t: F8, y: F8, u: F8, params: Params) -> dict[int, F8]:
+def _scatter(t: F8, y: F8, u: F8) -> dict[int, F8]:
     """Return, by interval length, (m, n): u plus the typical misfit of a polynomial, added in quadrature.
 
     A series that fluctuates throughout, for example with a second mode, has no jump, although its fluctuations have a
@@ -210,7 +157,7 @@ def _scatter(t: F8, y: F8, u: F8, params: Params) -> dict[int, F8]:
     """
     excess = np.zeros((len(y), 1))
     found = {}
-    for length in params.lengths:
+    for length in LENGTHS:
         if t.size >= 2.5 * length:
             rows = _starts(t.size, length)[:, None] + np.arange(length)
             x = t[rows] - t[rows].mean(axis=1, keepdims=True)
@@ -220,7 +167,7 @@ def _scatter(t: F8, y: F8, u: F8, params: Params) -> dict[int, F8]:
             left = y[:, rows] - np.einsum("ijk,mik->mij", fitted, y[:, rows])
             noise = np.sum(u[:, rows] ** 2 * (1.0 - np.diagonal(fitted, axis1=1, axis2=2)), axis=2)
             beyond = (np.sum(left**2, axis=2) - noise) / free
-            excess = np.sqrt(np.maximum(np.quantile(beyond, params.undisturbed, axis=1), 0.0))[:, None]
+            excess = np.sqrt(np.maximum(np.quantile(beyond, UNDISTURBED, axis=1), 0.0))[:, None]
         found[length] = np.hypot(u, excess)
     return found
 

@@ -1,7 +1,6 @@
 """Clipping: crests cut off by a fixed object or a lost target, found by comparison with the middle of the swing.
 
-A level plateau shows in the distances alone (:mod:`pipeline.samples.condition`). A plateau that changes from crest to
-crest, lies at both ends or ends after the first cycles does not; it shows in comparison with the middle of the swing.
+The plateau may change from crest to crest, lie at both ends, or end after the first cycles.
 """
 
 from __future__ import annotations
@@ -17,10 +16,8 @@ from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Conditioned, Cut
 from pipeline.track import F8, Quality
 from pipeline.windows.cycles import Cycles
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import ROUNDING, Demodulated
 from pipeline.windows.sinusoids import Windows, refit, solve
-
-__all__ = ["Params", "find_cuts"]
 
 LEVELS = 40  # number of heights tried for the level, from the middle of the swing to its top
 LEAST_SAMPLES = 3  # samples of a crest needed for a median
@@ -29,32 +26,14 @@ SHARE_BEYOND = 0.05  # share of a plateau's samples below the level beyond which
 SETTLING, ROUNDS = 8, 11  # fits until the cut crests no longer affect the middle of the swing; fits in all
 
 Bools = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`find_cuts`.
-
-    Parameters
-    ----------
-    false_alarm : float
-        Probability that the crests of an uncut motion in white noise appear to be cut at either end.
-    each : float
-        Shortfall that each of three quarters of the crests must have, in standard uncertainties. One in twenty uncut
-        crests has it. Clusters of echoes occur at some crests only.
-    least_crests : int
-        Minimum number of crests; echoes may strike fewer in succession.
-    middle : float
-        Fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted.
-    crest : float
-        Fraction of the amplitude beyond which the crest lies: within 30 degrees of the turning point.
-    """
-
-    false_alarm: float = 1e-3
-    each: float = 1.645
-    least_crests: int = 3
-    middle: float = 0.5
-    crest: float = math.cos(math.pi / 6.0)
+FALSE_ALARM = 1e-3  # probability that the crests of an uncut motion in white noise appear to be cut at either end
+# Shortfall that each of three quarters of the crests must have, in standard uncertainties. One in twenty uncut crests
+# has it. Clusters of echoes occur at some crests only.
+EACH = 1.645
+LEAST_CRESTS = 3  # minimum number of crests; echoes may strike fewer in succession
+MIDDLE = 0.5  # fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted
+# Fraction of the amplitude beyond which the crest lies: within 30 degrees of the turning point.
+CREST = math.cos(math.pi / 6.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,16 +65,13 @@ class _End:
     windows: int
 
 
-def find_cuts(
-    conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated, params: Params | None = None
-) -> Conditioned | None:
-    """Return the record with every cut crest flagged, or None if no cuts show beyond those flagged already.
+def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated) -> Conditioned | None:
+    """Return the record with every cut crest flagged, or None if no cuts show.
 
     Parameters
     ----------
     conditioned, cycles, demodulated
         Outputs of the stages with these names.
-    params : Params, optional
 
     Notes
     -----
@@ -110,27 +86,26 @@ def find_cuts(
     nineteen in twenty samples on the plateau exceed, with one more sample on either side. The model selects them, not
     their own values, so this causes no bias.
     """
-    params = params or Params()
-    least_m = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
+    # A record whose crests are flat may show no noise at all.
+    rounding_m = ROUNDING * float(np.max(np.abs(demodulated.amplitude)))
+    least_m = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), rounding_m)
     unexplained = _of_windows(Windows.cut(conditioned, cycles.bounds), demodulated)
-    if not any(_cut_windows(unexplained, sign, least_m, params) for sign in (1.0, -1.0)):
+    if not any(_cut_windows(unexplained, sign, least_m) for sign in (1.0, -1.0)):
         return None
     flags = conditioned.flags.copy()
-    seen = slice(int(cycles.bounds[0]), int(cycles.bounds[-1]))
-    flags[seen] = flags[seen] & ~np.uint8(Quality.CLIPPED) | conditioned.track.flags[seen]
     windows = Windows.cut(replace(conditioned, flags=flags), cycles.bounds)
     least = max(least_m, windows.tiny)
     whole = _of_windows(windows, demodulated)
     decay = np.interp(windows.centre, demodulated.t, demodulated.decay)
     basis = windows.basis(np.full(decay.size, demodulated.angular_frequency), decay)
-    inside = np.abs(whole.height(1.0)) < params.middle
+    inside = np.abs(whole.height(1.0)) < MIDDLE
     ends: list[_End] = []
     for step in range(ROUNDS):
         fit, sigma = _fitted(windows, basis, inside, least)
-        inside = np.abs(fit.height(1.0)) < params.middle
+        inside = np.abs(fit.height(1.0)) < MIDDLE
         if step < SETTLING:
             continue
-        ends = [end for sign in (1.0, -1.0) if (end := _end(fit, sign, sigma, params)) is not None]
+        ends = [end for sign in (1.0, -1.0) if (end := _end(fit, sign, sigma)) is not None]
         if not ends:
             return None
         inside = ~_beyond(fit, ends)
@@ -139,9 +114,7 @@ def find_cuts(
         beyond = _beyond(fit, [end]) & fit.judged
         cuts.append(_described(end, fit, windows, conditioned, beyond))
         flags[windows.rows[beyond]] |= np.uint8(Quality.CLIPPED)
-    return replace(
-        conditioned, flags=flags, plateaus_m=tuple(cut.level_m for cut in cuts), clipped_from_m=(), cuts=tuple(cuts)
-    )
+    return replace(conditioned, flags=flags, cuts=tuple(cuts))
 
 
 def _of_windows(windows: Windows, demodulated: Demodulated) -> _Fit:
@@ -158,7 +131,8 @@ def _fitted(windows: Windows, basis: F8, inside: Bools, least: float) -> tuple[_
     """Fit every window's sinusoid to selected samples without false echoes; return it and the noise, m."""
     usable = windows.usable > 0
     solution = solve(basis, (inside & usable).astype(np.float64))
-    sigma = max(least, mad_sigma(solution.residual[inside & usable & solution.good[:, None]]))
+    middle = solution.residual[inside & usable & solution.good[:, None]]
+    sigma = max(least, mad_sigma(middle)) if middle.size else least
     refit(basis, solution, (inside & usable & (np.abs(solution.residual) < FAR_OFF * sigma)).astype(np.float64))
     rest, a, b = solution.coefficients.T
     part = basis[:, :3]
@@ -168,35 +142,32 @@ def _fitted(windows: Windows, basis: F8, inside: Bools, least: float) -> tuple[_
     return _Fit(rest, size, windows.y - solution.residual, solution.residual, u, judged), sigma
 
 
-def _cut_windows(fit: _Fit, sign: float, sigma: float, params: Params) -> int:
+def _cut_windows(fit: _Fit, sign: float, sigma: float) -> int:
     """Return the number of first windows whose crests are cut; 0 if noise can explain the shortfall."""
-    crest = fit.judged & (fit.height(sign) > params.crest)
+    crest = fit.judged & (fit.height(sign) > CREST)
     count = crest.sum(axis=1)
     rows = np.flatnonzero(count >= LEAST_SAMPLES)
-    if rows.size < params.least_crests:
+    if rows.size < LEAST_CRESTS:
         return 0
     short = _median_of_rows(-sign * fit.residual[rows], crest[rows])
     u_model = np.max(np.where(crest[rows], fit.u[rows], 0.0), axis=1)
     z = short / (sigma * np.sqrt(0.5 * math.pi / count[rows] + u_model**2))
     score = np.cumsum(z) / np.sqrt(np.arange(1, z.size + 1))
-    score[: params.least_crests - 1] = -math.inf
+    score[: LEAST_CRESTS - 1] = -math.inf
     n = int(np.argmax(score))
-    if (
-        score[n] <= -NormalDist().inv_cdf(0.5 * params.false_alarm / z.size)
-        or np.quantile(z[: n + 1], 0.25) < params.each
-    ):
+    if score[n] <= -NormalDist().inv_cdf(0.5 * FALSE_ALARM / z.size) or np.quantile(z[: n + 1], 0.25) < EACH:
         return 0
     return int(rows[n]) + 1
 
 
-def _end(fit: _Fit, sign: float, sigma: float, params: Params) -> _End | None:
+def _end(fit: _Fit, sign: float, sigma: float) -> _End | None:
     """Return the level and the windows of a cut at one end, or None if the motion is not cut there."""
-    n = _cut_windows(fit, sign, sigma, params)
-    outer = fit.judged[:n] & (fit.height(sign)[:n] > params.middle)
+    n = _cut_windows(fit, sign, sigma)
+    outer = fit.judged[:n] & (fit.height(sign)[:n] > MIDDLE)
     if np.count_nonzero(outer) < LEAST_SAMPLES:
         return None
     height, short = (sign * fit.model[:n])[outer], (-sign * fit.residual[:n])[outer]
-    middle = float(np.median(sign * fit.rest[:n] + params.middle * fit.amplitude[:n]))
+    middle = float(np.median(sign * fit.rest[:n] + MIDDLE * fit.amplitude[:n]))
     levels = np.linspace(middle, float(height.max()), LEVELS, endpoint=False)
     left = np.sum(np.abs(short - np.maximum(height - levels[:, None], 0.0)), axis=1)
     best = int(np.argmin(left))

@@ -19,30 +19,12 @@ LONG = 0.05  # fraction of the record without a usable sample that counts as a h
 MOSTLY_HOLES = 0.2  # fraction of holes in the record beyond which straight lines across them would pass for a motion
 SHORTFALL = 0.05  # tolerance of the minimum of one and a half periods, periods
 
-__all__ = ["Cycles", "NoOscillation", "Params", "find_cycles"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`find_cycles`.
-
-    Parameters
-    ----------
-    samples_per_window : int
-        Minimum number of samples in a window; windows span as many whole periods as this needs.
-    u_phase : float
-        Maximum standard uncertainty of a window's phase due to noise, rad. Windows span as many whole periods as this
-        needs, so that phases can be unwrapped at any signal-to-noise ratio.
-    most_windows : int
-        Maximum number of windows; longer records have longer windows, not more of them.
-    false_alarm : float
-        Probability that pure white noise is taken for an oscillation.
-    """
-
-    samples_per_window: int = 12
-    u_phase: float = 0.2
-    most_windows: int = 20_000
-    false_alarm: float = 1e-6
+SAMPLES_PER_WINDOW = 12  # minimum number of samples in a window; windows span as many whole periods as this needs
+# Maximum standard uncertainty of a window's phase due to noise, rad. Windows span as many whole periods as this
+# needs, so that phases can be unwrapped at any signal-to-noise ratio.
+U_PHASE = 0.2
+MOST_WINDOWS = 20_000  # maximum number of windows; longer records have longer windows, not more of them
+FALSE_ALARM = 1e-6  # probability that pure white noise is taken for an oscillation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,13 +65,12 @@ class NoOscillation:
     code: str = "no_oscillation"
 
 
-def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycles | NoOscillation:
+def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
     """Find the oscillation's frequency and cut the record into windows of one period or, with noise, several.
 
     Parameters
     ----------
     conditioned : Conditioned
-    params : Params, optional
 
     Returns
     -------
@@ -113,7 +94,6 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     .. [1] M. Gasior, J. L. Gonzalez, "Improving FFT frequency measurement resolution by parabolic and Gaussian
        spectrum interpolation", AIP Conf. Proc. 732 (2004) 276, doi:10.1063/1.1831158.
     """
-    params = params or Params()
     track, used = conditioned.track, conditioned.used
     t, y = track.t[used], track.y[used]
     low, high = float(y.min()), float(y.max())
@@ -123,7 +103,7 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
         return NoOscillation(
             f"the {noun(track.unit)} stays within {amount(spread, track.unit, '.3g')}: nothing moves in the beam"
         )
-    line = _spectral_line(t, y, track.t, track.rate_hz, params.false_alarm)
+    line = _spectral_line(t, y, track.t, track.rate_hz, FALSE_ALARM)
     if isinstance(line, NoOscillation):
         return line
     frequency_hz, amplitude_m = line
@@ -133,10 +113,8 @@ def find_cycles(conditioned: Conditioned, params: Params | None = None) -> Cycle
     count = duration_s * frequency_hz
     if count < 1.5 - SHORTFALL:
         return NoOscillation(f"the recording spans only {count:.2g} periods, and at least 1.5 are needed")
-    needed = max(
-        params.samples_per_window, 2.0 * (conditioned.noise_m / (params.u_phase * max(amplitude_m, 1e-300))) ** 2
-    )
-    periods = max(1, math.ceil(needed * frequency_hz / track.rate_hz), math.ceil(count / params.most_windows))
+    needed = max(SAMPLES_PER_WINDOW, 2.0 * (conditioned.noise_m / (U_PHASE * max(amplitude_m, 1e-300))) ** 2)
+    periods = max(1, math.ceil(needed * frequency_hz / track.rate_hz), math.ceil(count / MOST_WINDOWS))
     periods = min(periods, max(1, int(count)))
     return Cycles(frequency_hz, count, _bounds(track.t, used, frequency_hz, track.rate_hz, periods), periods)
 

@@ -9,44 +9,25 @@ fit and the tuning of its basis. This module contains the passes: let clusters g
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
-from pipeline.numerics.regression import scatter, smooth_curve
 from pipeline.numerics.robust import MAD_TO_SIGMA, mad_sigma, median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, U8, Quality
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.sinusoids import Solution, Tuning, Windows, quantile, refit, retune, solve, unwrap
 
-__all__ = ["Demodulated", "Params", "demodulate", "model_error", "polar"]
-
 WEAK = 7.0  # amplitude in standard uncertainties below which its phase is uncertain by more than 0.14 rad
-DISTURBING, DRIFTING = 0.1, 0.5  # a drift's bias over the amplitudes' uncertainty; its size over the motion's
-FEWEST_STEADIED = 8  # windows needed to correct a drift
-VERY_STRONG = 10.0  # difference of BIC: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773
+ROUNDING = 2e-6  # relative error of a window's sinusoid after two passes, for computed records without noise
 FINEST = 1e-4  # scatter relative to the amplitude; only computed records have less
 HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, with quantiles of |x| for normal x
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`demodulate`.
-
-    Parameters
-    ----------
-    clip_sigmas : float
-        Residuals beyond this many standard deviations are false echoes and are excluded from the fit.
-    rounds : int
-        Number of reweighted fits of windows with false echoes, before the final fits.
-    """
-
-    clip_sigmas: float = 4.0
-    rounds: int = 3
+CLIP_SIGMAS = 4.0  # residuals beyond this many standard deviations are false echoes and are excluded from the fit
+ROUNDS = 3  # number of reweighted fits of windows with false echoes, before the final fits
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +56,7 @@ class Demodulated:
     residual : (n,) float64, m
         Every sample less its window's fit; NaN for samples outside all windows or not measured.
     flags : (n,) uint8
-        Flags from the conditioning, with the false echoes and clipped crests found here.
+        Flags from the conditioning, with the false echoes found here.
     lost : int
         Number of windows with too few usable samples, which give no point.
     """
@@ -100,14 +81,13 @@ class Demodulated:
         return math.sqrt(float((dof * self.noise**2).sum()) / float(dof.sum()))
 
 
-def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None = None) -> Demodulated:
+def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
     """Fit rest position, amplitude and phase robustly in every window.
 
     Parameters
     ----------
     conditioned : Conditioned
     cycles : Cycles
-    params : Params, optional
 
     Returns
     -------
@@ -128,32 +108,25 @@ def demodulate(conditioned: Conditioned, cycles: Cycles, params: Params | None =
     are excluded permanently. A second pass uses the decay :math:`g` of each window. Without it, the conjugate line
     would bias the amplitude by the fraction :math:`g/2\\omega`.
     """
-    params = params or Params()
     windows = Windows.cut(conditioned, cycles.bounds)
     tuning = Tuning.constant(2.0 * math.pi * cycles.frequency_hz, len(windows.y))
     basis = windows.basis(tuning.turning, tuning.decay)
     rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
     basis = windows.decaying(basis, rough.decay)
-    solution, spread = _let_go(windows, basis, conditioned.noise_m, params)
-    _rescue(windows, basis, solution, spread, tuning, params)
-    _clip(windows, basis, solution, spread, rough, params)
+    solution, spread = _let_go(windows, basis, conditioned.noise_m)
+    _rescue(windows, basis, solution, spread, tuning)
+    _clip(windows, basis, solution, spread, rough)
     weights = solution.weights
-    if conditioned.clipped_from_m:
-        level = _typical(_spread(windows.usable, solution.residual), windows, solution)
-        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
-        windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
-        weights = np.where(crest, 0.0, weights)
-    # Fit again with each window's own frequency and decay, after correcting the drift of the rest position.
-    windows = _steadied(windows, solution, spread, tuning.angular_frequency)
+    # Fit again with each window's own frequency and decay.
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
     solution = solve(basis, weights)
     spread = _spread(windows.usable, solution.residual)
-    _clip(windows, basis, solution, spread, tuning, params)
+    _clip(windows, basis, solution, spread, tuning)
     return _finish(conditioned, windows, solution, tuning)
 
 
-def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tuple[Solution, F8]:
+def _let_go(windows: Windows, basis: F8, noise_m: float) -> tuple[Solution, F8]:
     """Fit every window; where the scatter exceeds the noise, use weights that ignore clusters of echoes.
 
     Returns the fits and the spreads (w,) of the samples about them.
@@ -163,12 +136,12 @@ def _let_go(windows: Windows, basis: F8, noise_m: float, params: Params) -> tupl
     odd = np.flatnonzero(spread > 1.3 * noise_m)
     if odd.size:
         size, least = np.abs(solution.residual[odd]), noise_m + windows.tiny
-        solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, HALF, least, params.rounds))
+        solution.put(odd, _reweighted(basis[odd], windows.usable[odd], size, HALF, least, ROUNDS))
         spread[odd] = _spread(windows.usable[odd], solution.residual[odd])
     return solution, spread
 
 
-def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
+def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning) -> None:
     """Fit windows that disagree with their neighbours again, starting from the neighbours' prediction.
 
     The solution and its spreads are updated in place.
@@ -190,7 +163,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
     expected = np.stack([rest, smooth.real, smooth.imag], axis=1)
     away = np.abs(solution.coefficients - expected).max(axis=1)
     level = _typical(spread, windows, solution)
-    bound = params.clip_sigmas * level
+    bound = CLIP_SIGMAS * level
     before = np.sum((np.abs(solution.residual) <= bound) * windows.usable, axis=1)
     few = before < 0.7 * windows.usable.sum(axis=1)
     odd = np.flatnonzero((away > 5.0 * mad_sigma(away)) | few | ~solution.good)
@@ -199,7 +172,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
     part, usable = basis[odd], windows.usable[odd]
     size = np.abs(part[:, 3] - (expected[odd, None, :] @ part[:, :3])[:, 0])
     # Only the best third of the samples sets the scale, so that echoes may make up more than half of a window.
-    trial = _reweighted(part, usable, size, THIRD, level, params.rounds)
+    trial = _reweighted(part, usable, size, THIRD, level, ROUNDS)
     after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])
     solution.put(odd[better], trial.part(better))
@@ -233,44 +206,18 @@ def _spread(usable: F8, residual: F8) -> F8:
     return quantile(np.abs(residual), usable, HALF[0]) / HALF[1]
 
 
-def _steadied(windows: Windows, solution: Solution, spread: F8, omega: float) -> Windows:
-    """Subtract the drift of the rest position within each window, where it would bias the amplitudes.
-
-    A window fits a constant rest position. If this moves by R over a record of length T, all amplitudes are biased by
-    up to :math:`2R/\\omega T`, equally where windows begin at equal phases. Let a straight line through the N rest
-    positions, of standard deviation :math:`\\sigma`, lower chi-square by X. The bias is then
-    :math:`\\sqrt{24 X}/\\omega T` times the uncertainty of the mean amplitude, :math:`\\sqrt{2/N}\\sigma`.
-    """
-    good = solution.good
-    if np.count_nonzero(good) < FEWEST_STEADIED:
-        return windows
-    t, rest = windows.centre[good], solution.coefficients[good, 0]
-    u = _typical(spread, windows, solution) / np.sqrt(solution.normal[good, 0, 0])
-    deviation = (rest - rest.mean()) / u
-    if 24.0 * (float(deviation @ deviation) - t.size) < (DISTURBING * omega * (t[-1] - t[0])) ** 2:
-        return windows
-    curve, gain = smooth_curve(t, rest, scatter(t, rest, u))
-    if not gain > VERY_STRONG:
-        return windows
-    moved = curve(windows.centre[:, None] + windows.tau) - curve(windows.centre)[:, None]
-    size = np.hypot(solution.coefficients[good, 1], solution.coefficients[good, 2])
-    if np.any(np.abs(moved[good]).max(axis=1) > DRIFTING * np.hypot(size, spread[good])):
-        return windows  # moved by a hand or another motion, not a drift of the rest position
-    return replace(windows, y=np.where(windows.placed, windows.y - moved, 0.0))
-
-
 def _typical(spread: F8, windows: Windows, solution: Solution) -> float:
     """Return the median spread of the record's good windows."""
     return max(median(spread[solution.good]) if solution.good.any() else 0.0, windows.tiny)
 
 
-def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning, params: Params) -> None:
+def _clip(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning: Tuning) -> None:
     """Exclude samples with residuals beyond the clipping bound and fit again."""
     level = _typical(spread, windows, solution)
     # One window's spread is uncertain, and a cluster of echoes widens it, so it is kept near the record's.
     size = np.hypot(solution.coefficients[:, 1], solution.coefficients[:, 2])
     least = model_error(size, tuning.decay, tuning.angular_frequency)
-    bound = params.clip_sigmas * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
+    bound = CLIP_SIGMAS * np.maximum(np.clip(spread, 0.75 * level, 2.0 * level), least)
     refit(basis, solution, np.where(np.abs(solution.residual) <= bound[:, None], windows.usable, 0.0))
 
 
@@ -305,10 +252,6 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     inside = windows.placed & good[:, None]
     echoes = inside & (windows.usable > 0) & (weights == 0)
     flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
-    crests = inside & (windows.usable == 0)
-    if crests.any():
-        crests &= flags[windows.rows] == 0
-        flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
     residual = np.full(len(conditioned.track), np.nan)
     residual[windows.rows[inside]] = solution.residual[inside]
     return Demodulated(

@@ -1,46 +1,21 @@
-"""Disturbances: modes and steps beside the main oscillation, found and subtracted where they would do harm."""
+"""Disturbances: modes beside the main oscillation, found and subtracted where they would do harm."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
-from pipeline.windows import sideways as swings
-from pipeline.windows import steps as jumps
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import Demodulated, demodulate
-from pipeline.windows.demodulate import Params as Demodulation
 from pipeline.windows.modes import Sideways
 from pipeline.windows.sideways import find_sideways
-from pipeline.windows.steps import Step, find_steps, staircase, weighed
-
-__all__ = ["Disturbances", "Params", "separate"]
 
 SHARE = 0.1  # maximum bias of an effect that is not modelled, relative to the uncertainty
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`separate`.
-
-    Parameters
-    ----------
-    sideways : pipeline.windows.sideways.Params
-    steps : pipeline.windows.steps.Params
-    modes : bool
-        Whether to search for modes at all.
-    rounds : int
-        Maximum number of searches for modes. Each but the first uses the windows fitted without the modes found.
-    """
-
-    sideways: swings.Params = field(default_factory=swings.Params)
-    steps: jumps.Params = field(default_factory=jumps.Params)
-    modes: bool = True
-    rounds: int = 2
+ROUNDS = 2  # maximum number of searches for modes. Each but the first uses the windows fitted without the modes found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +32,6 @@ class Disturbances:
         Whether ``sideways`` was subtracted, since it would bias the amplitude by over a tenth of its uncertainty.
     leak_m : float
         Bias of the amplitude that ``sideways`` would cause, m.
-    steps : tuple of Step
-        Steps of the rest position; they are always subtracted.
     position : (n,) float64, m
         Sum of the subtracted effects at the record's times.
     """
@@ -67,41 +40,36 @@ class Disturbances:
     sideways: Sideways
     modelled: bool
     leak_m: float
-    steps: tuple[Step, ...]
     position: F8
 
     @classmethod
     def nothing(cls, conditioned: Conditioned) -> Disturbances:
         """Return disturbances of which none was found, or none was searched for."""
-        return cls(conditioned, Sideways((), None), False, 0.0, (), np.zeros(len(conditioned.track)))
+        return cls(conditioned, Sideways((), None), False, 0.0, np.zeros(len(conditioned.track)))
 
     def __bool__(self) -> bool:
-        return self.modelled or bool(self.steps)
+        return self.modelled
 
     def columns(self, t: F8) -> F8:
         """Return (n, k): the subtracted effects at t (n,), as columns of a linear fit."""
-        parts = [np.empty((t.size, 0))]
-        if self.modelled:
-            parts.append(self.sideways.columns(t))
-        parts.extend((t >= step.time.value).astype(np.float64)[:, None] for step in self.steps)
-        return np.concatenate(parts, axis=1)
+        return self.sideways.columns(t) if self.modelled else np.empty((t.size, 0))
 
 
 def separate(
     conditioned: Conditioned,
     cycles: Cycles,
     demodulated: Demodulated,
-    params: Params | None = None,
-    demodulation: Demodulation | None = None,
+    *,
+    modes: bool = True,
 ) -> tuple[Demodulated, Disturbances]:
-    """Search for modes and steps, and demodulate again without them.
+    """Search for modes, and demodulate again without them.
 
     Parameters
     ----------
     conditioned, cycles, demodulated
         Outputs of the stages with these names.
-    params : Params, optional
-    demodulation : pipeline.windows.demodulate.Params, optional
+    modes : bool
+        Whether to search for modes at all.
 
     Returns
     -------
@@ -116,25 +84,19 @@ def separate(
     amplitude's standard uncertainty for every mode, the modes are reported but not subtracted. If they are subtracted,
     the windows' variances are increased, because the modes are estimated from the same samples.
     """
-    params = params or Params()
-    sideways = find_sideways(conditioned, demodulated, params.sideways) if params.modes else Sideways((), None)
+    sideways = find_sideways(conditioned, demodulated) if modes else Sideways((), None)
     leak_m = _leak(sideways)
     modelled = bool(sideways) and leak_m > SHARE * _u_amplitude(demodulated)
     t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
-    for again in range(params.rounds if modelled else 0):
+    for again in range(ROUNDS if modelled else 0):
         if again:
             # Windows fitted without the modes separate false echoes from the main oscillation better.
-            sideways = find_sideways(conditioned, demodulated, params.sideways) or sideways
+            sideways = find_sideways(conditioned, demodulated) or sideways
         taken = sideways.position(t)
-        demodulated = demodulate(conditioned.less(taken), cycles, demodulation)
+        demodulated = demodulate(conditioned.less(taken), cycles)
     if modelled:
         demodulated = replace(demodulated, covariance=demodulated.covariance * _price(sideways))
-    steps = find_steps(conditioned.less(taken), demodulated, params.steps)
-    if steps:
-        demodulated = demodulate(conditioned.less(taken + staircase(steps, t)), cycles, demodulation)
-        steps, demodulated = weighed(steps, demodulated)
-        taken = taken + staircase(steps, t)
-    return demodulated, Disturbances(conditioned.less(taken), sideways, modelled, leak_m, steps, taken)
+    return demodulated, Disturbances(conditioned.less(taken), sideways, modelled, leak_m, taken)
 
 
 def _u_amplitude(demodulated: Demodulated) -> float:

@@ -16,8 +16,6 @@ from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
 
-__all__ = ["C16", "Carrier", "Mode", "Sideways", "rotating"]
-
 C16 = NDArray[np.complex128]
 
 

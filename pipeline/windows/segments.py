@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -17,53 +17,30 @@ from numpy.typing import NDArray
 
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
+from pipeline.samples.stopping import moving_part
 from pipeline.track import F8, Quality, Track
-from pipeline.windows import change_points
-from pipeline.windows.change_points import find_changes, lone_points
-from pipeline.windows.cycles import Cycles
+from pipeline.windows.change_points import FALSE_ALARM, find_changes
 from pipeline.windows.demodulate import FINEST, Demodulated
 
-__all__ = ["Break", "BreakKind", "Params", "Segments", "Span", "SpanKind", "find_free_part"]
-
 MOST_DECAY = 300.0  # largest exponent of a decay, against overflow
-BRIDGED = 3  # samples that noise may move off a plateau on which a hand holds the bob
 # Jump of the amplitude, over that of the phase, up to which the phase jumps alone. For one touch in sixteen, at any
 # moment, the ratio is smaller.
 ALONE = 0.1
+LEAST_AFTER = 64  # samples needed after a trigger to leave out the part before it
+HANGING = 0.25  # fraction of the range after the trigger within which a bob hangs still before it
+STILL = 0.02  # amplitude over that of the motion after the release, below which a bob hangs still
 NEAR = 5  # number of windows beside a break or still windows from which the motion is extrapolated
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`find_free_part`.
-
-    Parameters
-    ----------
-    changes : pipeline.windows.change_points.Params
-        Options of the search for jumps; the false-alarm probability applies to still windows too.
-    least_windows : int
-        Minimum number of windows in a part that is analysed; a damped oscillation has four parameters.
-    share : float
-        Minimum amplitude of a part relative to the largest one. A smaller motion is a remnant after handling and is
-        not analysed.
-    rest_share : float
-        Minimum share of a record after the motion is lost in the noise for this rest to be left out. A shorter rest
-        does not impair a fit.
-    most_fall : float
-        Maximum decrease of the logarithm of the amplitude per window, after the maximum, for which jumps are searched.
-        The sinusoid of a window has a single decay rate. At a stronger decay its error, the square of the decrease
-        (0.4 %), exceeds the noise and is largest at the start of the motion.
-    held_periods : float
-        Minimum time on a plateau, in periods, that shows a hand holding the bob. A crest that is cut off above the
-        rest position lasts half a period at most.
-    """
-
-    changes: change_points.Params = field(default_factory=change_points.Params)
-    least_windows: int = 5
-    share: float = 0.2
-    rest_share: float = 0.3
-    most_fall: float = 0.06
-    held_periods: float = 0.75
+LEAST_WINDOWS = 5  # minimum number of windows in a part that is analysed; a damped oscillation has four parameters
+# Minimum amplitude of a part relative to the largest one. A smaller motion is a remnant after handling and is not
+# analysed.
+SHARE = 0.2
+# Minimum share of a record after the motion is lost in the noise for this rest to be left out. A shorter rest does
+# not impair a fit.
+REST_SHARE = 0.3
+# Maximum decrease of the logarithm of the amplitude per window, after the maximum, for which jumps are searched. The
+# sinusoid of a window has a single decay rate. At a stronger decay its error, the square of the decrease (0.4 %),
+# exceeds the noise and is largest at the start of the motion.
+MOST_FALL = 0.06
 
 
 class SpanKind(StrEnum):
@@ -153,17 +130,42 @@ class Segments:
         return Segments(first_s, last_s, tuple(spans), tuple(breaks))
 
 
-def find_free_part(
-    conditioned: Conditioned, cycles: Cycles, windows: Demodulated, params: Params | None = None
-) -> Segments | None:
+def before_trigger(conditioned: Conditioned) -> Segments | None:
+    """Return the part after the trigger, if the bob hung still before it; None otherwise."""
+    t, y, moment_s = conditioned.track.t, conditioned.track.y, conditioned.track.trigger_s
+    if moment_s is None:
+        return None
+    before, after = conditioned.used & (t < moment_s), conditioned.used & (t >= moment_s)
+    if not before.any() or np.count_nonzero(after) < LEAST_AFTER:
+        return None
+    # A bob that is already swinging triggers immediately, so there is no still part to leave out.
+    ranges = [float(np.ptp(np.quantile(y[rows], (0.05, 0.95)))) for rows in (before, after)]
+    if ranges[0] > HANGING * ranges[1]:
+        return None
+    return Segments(moment_s, math.inf, (Span(SpanKind.WAITING, float(t[before][0]), moment_s),))
+
+
+def long_after_stop(conditioned: Conditioned, share: float) -> Segments | None:
+    """Return the part to keep of a recording whose bob stops before a share of its samples; None otherwise.
+
+    Hours of rest would decide a fit to all samples.
+    """
+    moving = moving_part(conditioned, share)
+    if moving is None:
+        return None
+    t = conditioned.track.t[conditioned.used]
+    # An equal time at rest is kept, because it shows the rest position and the noise.
+    last_s = float(t[0] + 2.0 * (moving.track.t[-1] - t[0]))
+    return Segments(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, float(t[-1])),))
+
+
+def find_free_part(conditioned: Conditioned, windows: Demodulated) -> Segments | None:
     """Return the longest part with one free oscillation; None if this is the whole record.
 
     Parameters
     ----------
     conditioned : Conditioned
-    cycles : Cycles
     windows : Demodulated
-    params : Params, optional
 
     Notes
     -----
@@ -174,19 +176,15 @@ def find_free_part(
     frequency are removed first, so that a cubic can follow the remainder. The moment of a touch within its window is
     unknown, so a window on either side of a jump is left out.
     """
-    params = params or Params()
-    held = _held(conditioned, cycles, params.held_periods)
-    if held is not None:
-        return held
-    if windows.t.size < 2 * params.least_windows:
+    if windows.t.size < 2 * LEAST_WINDOWS:
         return None
-    series = _Series.of(windows, params.changes.false_alarm)
+    series = _Series.of(windows, FALSE_ALARM)
     moving = series.moving()
-    if moving < (1.0 - params.rest_share) * series.t.size:
+    if moving < (1.0 - REST_SHARE) * series.t.size:
         return _faded(series, moving)
-    if series.fall > params.most_fall:
-        return None
-    return _chosen(series, series.parts(params.changes), conditioned, params)
+    if series.fall > MOST_FALL:
+        return _released(series)
+    return _chosen(series, series.parts(), conditioned)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -254,16 +252,16 @@ class _Series:
         pairs = np.flatnonzero(out[1:] & out[:-1])
         return int(pairs[-1]) + 2 if pairs.size else 0
 
-    def parts(self, params: change_points.Params) -> list[_Part]:
+    def parts(self) -> list[_Part]:
         """Split the record into runs of still windows and the parts between jumps."""
         weak = self.weak
         edges = np.flatnonzero(np.diff(np.concatenate([[False], weak, [False]])))
         parts, begin = [], 0
         for first, stop in edges.reshape(-1, 2).tolist():
             if self.stands_still(first, stop, weak):
-                parts += [*self.between_jumps(begin, first, params), _Part(first, stop, True)]
+                parts += [*self.between_jumps(begin, first), _Part(first, stop, True)]
                 begin = stop
-        return [*parts, *self.between_jumps(begin, self.t.size, params)]
+        return [*parts, *self.between_jumps(begin, self.t.size)]
 
     def stands_still(self, first: int, stop: int, weak: NDArray[np.bool_]) -> bool:
         """Return whether moving windows beside weak ones extrapolate to over twice the limit of noise there."""
@@ -279,18 +277,16 @@ class _Series:
         slope = np.median(np.diff(self.values[:, rows]) / np.diff(t), axis=1)
         return np.asarray(np.median(self.values[:, rows] - slope[:, None] * t, axis=1))
 
-    def between_jumps(self, first: int, stop: int, params: change_points.Params) -> list[_Part]:
+    def between_jumps(self, first: int, stop: int) -> list[_Part]:
         """Split windows first to stop - 1 at their jumps."""
         if stop - first < NEAR:
             return [_Part(first, stop, False)] if stop > first else []
-        values, u = self.values[:, first:stop], self.u[:, first:stop]
-        rows = np.flatnonzero(~lone_points(values, u, params.false_alarm))
-        changes = find_changes(self.t[first + rows], values[:, rows], u[:, rows], params)
-        edges = [first, *(first + int(rows[change.index]) for change in changes), stop]
+        changes = find_changes(self.t[first:stop], self.values[:, first:stop], self.u[:, first:stop])
+        edges = [first, *(first + change.index for change in changes), stop]
         return [_Part(a, b, False) for a, b in itertools.pairwise(edges)]
 
 
-def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned, params: Params) -> Segments | None:
+def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned) -> Segments | None:
     """Return the longest of the parts that oscillate freely, with the spans and breaks beside it."""
     if len(parts) == 1:
         return None
@@ -300,10 +296,10 @@ def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned, param
     # In a long decay the amplitude is small for most of the time, so its beginning counts too.
     size = np.array([_size(series.size[part.first : part.stop]) for part in parts])
     length = np.array([stop - first for first, stop in limits])
-    free = ~np.array([part.still for part in parts]) & (length >= params.least_windows)
+    free = ~np.array([part.still for part in parts]) & (length >= LEAST_WINDOWS)
     if not free.any():
         return None
-    free &= size > params.share * size[free].max()
+    free &= size > SHARE * size[free].max()
     chosen = int(np.argmax(np.where(free, length, 0)))
     t = conditioned.track.t[conditioned.used]
     begin_s, end_s, half = float(t[0]), float(t[-1]), 0.5 * series.spacing
@@ -352,6 +348,19 @@ def _break(series: _Series, stop: int, start: int) -> Break:
     return Break(kind, 0.5 * (first_s + last_s), 0.25 * (last_s - first_s), math.expm1(ratio), angle)
 
 
+def _released(series: _Series) -> Segments | None:
+    """Return the record from the release on, before which the amplitude was far smaller; a free one only falls."""
+    most = int(np.argmax(series.size))
+    small = np.flatnonzero(series.size[:most] < SHARE * series.size[most])
+    if not small.size or series.t.size - most < LEAST_WINDOWS:
+        return None
+    # The next window may contain the release.
+    first = int(small[-1]) + 2
+    begin_s, first_s = float(series.t[0]) - 0.5 * series.spacing, float(series.t[first]) - 0.5 * series.spacing
+    kind = SpanKind.AT_REST if np.max(series.size[small]) < STILL * series.size[most] else SpanKind.HANDLED
+    return Segments(first_s, math.inf, (Span(kind, begin_s, first_s),))
+
+
 def _faded(series: _Series, moving: int) -> Segments | None:
     """Return the record up to where its motion is lost in the noise permanently."""
     if moving < 2:
@@ -359,22 +368,3 @@ def _faded(series: _Series, moving: int) -> Segments | None:
     last_s = float(series.t[moving - 1]) + series.spacing
     end_s = float(series.t[-1]) + 0.5 * series.spacing
     return Segments(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, end_s),))
-
-
-def _held(conditioned: Conditioned, cycles: Cycles, periods: float) -> Segments | None:
-    """Return the longer side of a plateau on which a hand holds the bob; None without such a plateau."""
-    rows = np.flatnonzero(conditioned.flags & np.uint8(Quality.CLIPPED))
-    if not rows.size:
-        return None
-    t, used = conditioned.track.t, np.flatnonzero(conditioned.used)
-    # Noise may move a few samples off a plateau.
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1])
-    ends = np.concatenate([starts[1:], [rows.size]]) - 1
-    longest = int(np.argmax(t[rows[ends]] - t[rows[starts]]))
-    first, last = int(rows[starts[longest]]), int(rows[ends[longest]])
-    if not t[last] - t[first] > periods / cycles.frequency_hz:
-        return None
-    begin, end = float(min(t[first], t[used[0]])), float(max(t[last], t[used[-1]]))
-    if t[first] - begin > end - t[last]:
-        return Segments(-math.inf, float(t[first - 1]), (Span(SpanKind.HANDLED, float(t[first]), end),))
-    return Segments(float(t[last + 1]), math.inf, (Span(SpanKind.HANDLED, begin, float(t[last])),))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,40 +27,19 @@ from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.modes import C16, Carrier, Mode, Sideways
 
-__all__ = ["Params", "find_sideways"]
-
 # Multiples of the phases of (sideways mode, main oscillation) at which a slanted beam shows products of both.
 PRODUCTS = ((2, 0), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2), (3, 0))
 HARMONICS = ((0, 2), (0, 3))
 NO_MODE = Estimate(0.0, 0.0, "Hz")
+FALSE_ALARM = 0.01  # probability that a mode or a harmonic is found in a record without any; each has half of it
+MOST = 4  # maximum number of modes, not counting harmonics and products
+ENVELOPE = 4  # maximum degree of the polynomial for a mode's amplitude and phase
+LEAST_WINDOWS = 6  # minimum number of windows; fewer cannot separate a mode from the main oscillation
+# Maximum length of a record, periods; for longer ones the model of the blocks would outgrow the memory.
+MOST_PERIODS = 4096
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Params:
-    """Options of :func:`find_sideways`.
-
-    Parameters
-    ----------
-    false_alarm : float
-        Probability that a mode or a harmonic is found in a record without any; each has half of it.
-    most : int
-        Maximum number of modes, not counting harmonics and products.
-    envelope : int
-        Maximum degree of the polynomial for a mode's amplitude and phase.
-    least_windows : int
-        Minimum number of windows; fewer cannot separate a mode from the main oscillation.
-    most_periods : int
-        Maximum length of a record, periods; for longer ones the model of the blocks would outgrow the memory.
-    """
-
-    false_alarm: float = 0.01
-    most: int = 4
-    envelope: int = 4
-    least_windows: int = 6
-    most_periods: int = 4096
-
-
-def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Params | None = None) -> Sideways:
+def find_sideways(conditioned: Conditioned, demodulated: Demodulated) -> Sideways:
     """Search for lines beside the main oscillation.
 
     Parameters
@@ -68,7 +47,6 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
     conditioned : Conditioned
     demodulated : Demodulated
         Its windows give the main oscillation, independent of any damping law; its flags select the samples.
-    params : Params, optional
 
     Returns
     -------
@@ -81,13 +59,12 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
     A mode within a few reciprocals of the record's length of the main frequency is not searched for. It beats too
     slowly to be distinguished from a change of the amplitude.
     """
-    params = params or Params()
     used = (demodulated.flags & UNUSABLE) == 0
     t = conditioned.track.t[used]
-    if demodulated.t.size < params.least_windows:
+    if demodulated.t.size < LEAST_WINDOWS:
         return Sideways((), None)
     turn = 2.0 * math.pi / demodulated.angular_frequency
-    if float(t[-1] - t[0]) > params.most_periods * turn:
+    if float(t[-1] - t[0]) > MOST_PERIODS * turn:
         return Sideways((), None)
     carrier = Carrier.through(demodulated, float(t[0]), float(t[-1]))
     residual = conditioned.track.y[used] - carrier.position(t)
@@ -98,9 +75,9 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated, params: Pa
     blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, conditioned.track.rate_hz)
     band = _band(carrier, blocks)
     multiples = tuple(turns[1] * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
-    if not worth_a_look(blocks, band, multiples, 0.5 * params.false_alarm):
+    if not worth_a_look(blocks, band, multiples, 0.5 * FALSE_ALARM):
         return Sideways((), carrier)
-    return _Search(carrier, blocks, band, params).run()
+    return _Search(carrier, blocks, band).run()
 
 
 def _band(carrier: Carrier, blocks: Blocks) -> Band:
@@ -112,8 +89,8 @@ def _band(carrier: Carrier, blocks: Blocks) -> Band:
 class _Search:
     """The model of the blocks, which grows mode by mode."""
 
-    def __init__(self, carrier: Carrier, blocks: Blocks, band: Band, params: Params) -> None:
-        self.carrier, self.blocks, self.band, self.params = carrier, blocks, band, params
+    def __init__(self, carrier: Carrier, blocks: Blocks, band: Band) -> None:
+        self.carrier, self.blocks, self.band = carrier, blocks, band
         self.t = blocks.t + blocks.origin
         self.main = carrier.wave(self.t)
         self.first: C16 | None = None
@@ -132,9 +109,9 @@ class _Search:
         width = 2.0 / self.blocks.seconds
         self.hole(*((b * self.main_hz, width) for _, b in HARMONICS))
         first: Mode | None = None
-        for _ in range(self.params.most):
+        for _ in range(MOST):
             peak = strongest(self.blocks, self.left, self.basis, self.band)
-            if peak is None or peak.false_alarm > 0.5 * self.params.false_alarm:
+            if peak is None or peak.false_alarm > 0.5 * FALSE_ALARM:
                 break
             mode, columns = self.free(peak)
             if not self.band.inside(np.array([mode.frequency.value]))[0]:
@@ -199,7 +176,7 @@ class _Search:
         if not trials:
             return
         taken, fallen = np.empty((self.t.size, 0)), 0.0
-        least = evidence_for(0.5 * self.params.false_alarm, len(orders))
+        least = evidence_for(0.5 * FALSE_ALARM, len(orders))
         for trial in trials:
             both = np.concatenate([taken, self.columns_of(trial)], axis=1)
             values, cofactors, fitted = self.fit(both)
@@ -261,7 +238,7 @@ class _Search:
                 break
         # A varying mode has a wider spectrum, which must not overlap the variations of the main oscillation.
         room = int(2.0 * (abs(f - self.main_hz) * self.blocks.seconds - 1.0) - self.carrier.degree)
-        degrees = np.arange(min(self.params.envelope, max(room, 0)) + 1)
+        degrees = np.arange(min(ENVELOPE, max(room, 0)) + 1)
         trial = replace(
             self.blank((1, 0), Estimate(f, u_rate / (2.0 * math.pi), "Hz")),
             decay=Estimate(rate if abs(rate) > 3.0 * u_rate else 0.0, u_rate, "1/s"),

@@ -12,8 +12,6 @@ from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-__all__ = ["Solution", "Tuning", "Windows", "quantile", "refit", "retune", "solve", "unwrap"]
-
 # Minimum determinant of the normal matrix per sample. It is 1/4 for a full period and less where samples cover only a
 # part of a period, so that rest position and amplitude cannot be distinguished.
 LEAST_DETERMINANT = 0.003

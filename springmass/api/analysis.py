@@ -34,9 +34,8 @@ class Analysis(Found):
     -----
     ``a["period"]`` is an :class:`~pipeline.numerics.estimate.Estimate`. Valid names are those of
     ``docs/reference/estimates.md``, their symbols (``a["k"]``, ``a["T"]``) and the coefficients of the selected law
-    (``a["gamma"]``). ``LAW.PARAMETER`` is a parameter of any law (``a["quadratic.beta"]``). ``LAW.NAME`` is any
-    estimate under the law that is clearly ahead (``a["linear.damping_rate"]``). Estimates of one analysis are
-    correlated, and arithmetic takes this into account. Estimates of two analyses are treated as independent;
+    (``a["gamma"]``). ``LAW.PARAMETER`` is a parameter of any law (``a["quadratic.beta"]``). Estimates of one analysis
+    are correlated, and arithmetic takes this into account. Estimates of two analyses are treated as independent;
     :func:`springmass.compare` accounts for what two runs share.
 
     Examples
@@ -69,8 +68,6 @@ class Analysis(Found):
         if isinstance(self.motion, Oscillation) and law in self.motion.damping.fits:
             derived = self.motion.derived
             parameters = derived.parameters_of(self.motion.damping.fits[law])
-            if derived.leading is not None and derived.leading.law == law:
-                parameters = {**derived.leading.estimates, **parameters}
             if parameter in parameters:
                 return parameters[parameter]
         raise _NoEstimate(

@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquisition.errors import NeedsAnswer
-from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis as Found
-from pipeline.analyse import Params
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError, TrackError
-from pipeline.motion.waveform_fit import Params as WaveformParams
+from pipeline.options import Options, options_for
 from pipeline.track import F8, Track
 from springmass.api.analysis import Analysis
 from springmass.api.frames import comparison_frame
@@ -41,12 +39,11 @@ __all__ = ["Comparison", "analyse", "compare", "load"]
 def analyse(
     source: Any,
     scene: Scene | str | os.PathLike[str] | Mapping[str, Any] | None = None,
-    params: Params | None = None,
+    options: Options | None = None,
     *,
     accuracy: str | None = None,
     law: str | Law | None = None,
     laws: Sequence[str | Law | EllipsisType] | None = None,
-    options: Mapping[str, Mapping[str, Any]] | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
     **completions: Any,
@@ -63,10 +60,10 @@ def analyse(
     scene : Scene, path or mapping, optional
         Known values of the bench. Default for ``NAME.h5``: the ``[scene]`` of ``NAME.about.toml`` beside it, else the
         scene inside the run file, else nothing.
-    params : pipeline.analyse.Params, optional
-        Options of every stage, instead of the options of a tier.
+    options : springmass.Options, optional
+        Options of the analysis, instead of those of a tier.
     accuracy : {"fast", "standard", "best"}, optional
-        Tier; default: "standard". It cannot be combined with ``params``.
+        Tier; default: "standard". It cannot be combined with ``options``.
     law : str or Law, optional
         The damping law, if it is known: a name of :data:`springmass.LAWS` or a law of :func:`springmass.make_law`. The
         results are based on it alone, and findings report whether the run contradicts it. "any" lets the run choose,
@@ -74,9 +71,6 @@ def analyse(
     laws : sequence of str or Law, optional
         The damping laws to try: names of :data:`springmass.LAWS`, laws of :func:`springmass.make_law`, and ``...`` for
         all built-in laws.
-    options : mapping, optional
-        Individual options of stages, under the names of :class:`springmass.Params`:
-        ``{"damping": {"evidence": 10.0}}``.
     from_s, to_s : float, optional
         Limits of the time range to use, s; default: the whole run.
     **completions
@@ -107,11 +101,11 @@ def analyse(
     >>> analyse((t, y), laws=["none", "linear"])["period"]
     0.757010(22) s
     """
-    if params is not None and accuracy is not None:
-        raise AnalysisError("params are the options of an accuracy in full: give one of the two")
-    chosen = with_options(params or params_for(accuracy or "standard"), options or {})
+    if options is not None and accuracy is not None:
+        raise AnalysisError("options replace those of an accuracy: give one of the two")
+    chosen = options or options_for(accuracy or "standard")
     if laws is not None:
-        chosen = replace(chosen, damping=replace(chosen.damping, laws=_laws(laws), otherwise=()))
+        chosen = replace(chosen, laws=_laws(laws))
     if law is not None:
         chosen = with_law(chosen, law if law == ANY_LAW else find_law(law))
     if isinstance(source, Run):
@@ -123,7 +117,7 @@ def analyse(
     elif isinstance(source, Loaded):
         source = replace(source, track=cut(source.track, from_s, to_s, where=source.path))
     if isinstance(source, Loaded):
-        found, name = analyse_loaded(source, _scene(scene), params=chosen).analysis, source.path.name
+        found, name = analyse_loaded(source, _scene(scene), options=chosen).analysis, source.path.name
     else:
         track = cut(track_of(source), from_s, to_s, where="the record")
         found, name = analyse_track(track, _scene(scene) or Scene(), chosen), ""
@@ -231,34 +225,6 @@ def compare(
     demand_one_spring([(name, run.scene) for name, run in runs.items()])
     found = compare_analysed([Analysed(name, run, {}) for name, run in runs.items()], mass_correlation=mass_correlation)
     return Comparison(found.comparison, found.joint, found.findings, runs)
-
-
-def with_options(params: Params, options: Mapping[str, Mapping[str, Any]]) -> Params:
-    """Return the options with individual ones changed.
-
-    Parameters
-    ----------
-    params : Params
-    options : mapping
-        The changed options, by stage and then by name.
-
-    Raises
-    ------
-    AnalysisError
-        If a stage or an option is unknown.
-    """
-    for stage, changed in options.items():
-        stages = [each.name for each in fields(Params)]
-        if stage not in stages:
-            raise AnalysisError(f"options are of the stages {', '.join(stages)}; got {stage!r}")
-        now: Any = getattr(params, stage)
-        now = WaveformParams() if now is None else now
-        known = [each.name for each in fields(now)]
-        if unknown := [name for name in changed if name not in known]:
-            raise AnalysisError(f"{stage} has the options {', '.join(known)}; got {unknown[0]!r}")
-        with_them: Any = {stage: replace(now, **changed)}
-        params = replace(params, **with_them)
-    return params
 
 
 def track_of(source: Any) -> Track:

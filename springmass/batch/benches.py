@@ -96,25 +96,15 @@ _NAMES = {"spring_constant": "spring_constant", "drag": "drag_coefficient"}
 def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
     k, omega, mass = (_number(row, name) for name in ("spring_constant", "natural_angular_frequency", "own_mass_kg"))
     own = math.hypot(2.0 * _number(row, "natural_angular_frequency_u") / omega, _number(row, "own_mass_kg_u") / mass)
-    length = row["unit"] == "m"
     points = np.array(json.loads(row["drag_points"] or "[]"))
     middle = points[len(points) // 2] if len(points) else None
-    diameter = _number(row, "disc_diameter_m")
     return CourseRun(
         name=row["run"] if alone else f"{row[COURSE]}: {row['run']}",
         spring=_label(row, "spring", "spring_mass_kg"),
         disc=_label(row, "disc", "disc_diameter_m"),
         bench=str(row[bench] or ""),
         spring_constant=Estimate(k, k * own, "N/m") if math.isfinite(k * own) else None,
-        bob_mass_kg=_number(row, "bob_mass_kg"),
-        natural_angular_frequency=omega,
-        amplitude_m=_number(row, "amplitude") if length else math.nan,
-        offset_m=_number(row, "offset") if length else math.nan,
-        noise_m=_number(row, "noise") if length else math.nan,
-        diameter_m=diameter,
         drag=None if middle is None else Estimate(float(middle[2]), float(middle[3])),
-        keulegan_carpenter=math.nan if middle is None else float(middle[1]),
-        clipped="clipped" in json.loads(row["findings"] or "[]"),
     )
 
 
@@ -154,5 +144,5 @@ def compared_text(comparison: CourseComparison) -> str:
     lines += ["", f"damping laws selected: {laws}"] if laws else []
     differing = comparison.suspects
     lines += ["", f"runs that differ from their course: {len(differing)}"] if differing else []
-    lines += [f"  {suspect.name}: {suspect.cause}: {suspect.message}" for suspect in differing]
+    lines += [f"  {suspect.name}: {suspect.message}" for suspect in differing]
     return "\n".join(lines)

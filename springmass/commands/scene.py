@@ -33,7 +33,6 @@ temperature_c = { value = 20.0, u = 1.0 }   # sets the speed of sound: the scale
 [sensor]
 position = "below"                          # or "above" the bob
 # mean_samples = 8                          # it gives the mean of its last 8 distances
-# median_samples = 5                        # it gives their median
 # lag_s = { value = 0.05, u = 0.005 }       # or follows with a first-order lag
 
 # For springmass simulate and record --simulate:

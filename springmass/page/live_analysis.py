@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from acquisition.errors import AcquisitionError
 from acquisition.recordings.recording import Trap
-from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
+from pipeline.options import options_for
 from pipeline.track import F8, Track
 from springmass.errors import ProgramError
 from springmass.page.stopping import ALPHA, more_seconds, widening
@@ -82,8 +82,8 @@ def motion_of(
     accuracy : {"fast", "standard", "best"}
         Tier of the analysis; the message names it.
     """
-    params = with_law(params_for(accuracy), law)
-    return _message(lambda: analyse_track(track, scene, params, traps), track, accuracy, wanted_u_s)
+    options = with_law(options_for(accuracy), law)
+    return _message(lambda: analyse_track(track, scene, options, traps), track, accuracy, wanted_u_s)
 
 
 def _message(analyse: Callable[[], Analysis], track: Track, accuracy: str, wanted_u_s: float | None) -> dict[str, Any]:

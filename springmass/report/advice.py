@@ -12,7 +12,7 @@ from springmass.report.words import typeset
 
 __all__ = ["LAW_CODES", "STANDING", "Harm", "Notice", "by_harm", "harm_of", "lab_report_line", "notices_of"]
 
-LAW_CODES = frozenset({"law_rejected", "laws_not_separable", "mixed_drag", "no_law_fits"})
+LAW_CODES = frozenset({"law_rejected", "laws_not_separable", "no_law_fits"})
 """Codes of findings that the sentence on damping and the table of laws already state."""
 STANDING = ("nominal_clock", "stated_error_is_not_noise", "jittered_time", "offset_unknown", "velocity_missing")
 """Notes that apply to every file of a format; they would hide what is special about this recording."""

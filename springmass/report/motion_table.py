@@ -6,8 +6,8 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
-from pipeline.motion.smoother import Smoothed
 from pipeline.numerics.quantity import Unit, noun
+from pipeline.results.kinematics import Smoothed
 from pipeline.track import UNUSABLE
 
 __all__ = ["COLUMNS", "columns_of", "motion_csv", "row_step", "smoothed_or_why"]

@@ -16,7 +16,6 @@ from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
 from pipeline.registry.quantities import QUANTITIES
-from pipeline.results.derive import Derived
 
 __all__ = [
     "TableKey",
@@ -58,7 +57,7 @@ class TableKey(NamedTuple):
     law: str | None = None
     certain: bool = False
     row: str = ""
-    """The law whose values have a separate row: for coefficients, and for the law that is clearly ahead."""
+    """The law whose values have a separate row, for coefficients."""
 
     @property
     def words(self) -> str:
@@ -77,8 +76,7 @@ class TableRow:
     Parameters
     ----------
     name : str
-        Name as in ``Analysis.estimates``, or name of a coefficient; ``LAW.NAME`` in an additional line with the value
-        under the law that is clearly ahead.
+        Name as in ``Analysis.estimates``, or name of a coefficient.
     quantity : str
         The quantity in words, with the law if the value depends on it.
     symbol, page_symbol, tex_symbol : str
@@ -120,22 +118,13 @@ def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     if not isinstance(motion, Oscillation):
         return {TableKey(name): analysis.estimates[name] for name in _IN_TABLE if name in analysis.estimates}
     derived = motion.derived
-    found = _stated(derived, certain=bool(derived.law))
-    if derived.leading is None:
-        return found
-    leading = _stated(derived.leading, certain=False, row=derived.leading.law)
-    # A coefficient of the same law has the same value in every row.
-    return found | {key: x for key, x in leading.items() if key.law is not None and key not in found}
-
-
-def _stated(derived: Derived, *, certain: bool, row: str = "") -> dict[TableKey, Estimate]:
-    law = derived.laws[0].fit.law
+    law, certain = derived.laws[0].fit.law, bool(derived.law)
     # A coefficient of a user-defined law is not one of these quantities, even if it has the same name.
     coefficients = derived.coefficients if law.name in LAWS else {}
     found = {}
     for name in _IN_TABLE:
         if name in derived.estimates:
-            key = TableKey(name, derived.law, certain, row) if QUANTITIES[name].by_law else TableKey(name)
+            key = TableKey(name, derived.law, certain) if QUANTITIES[name].by_law else TableKey(name)
             found[key] = derived.estimates[name]
         elif name in coefficients:
             found[TableKey(name, law.name, certain, law.name)] = coefficients[name]

@@ -188,7 +188,7 @@ def damping_sentence(analysis: Analysis, *, coefficients: bool = False) -> str:
     if damping.by_statement:
         text += ", as you stated"
     if coefficients:
-        stated = derived.coefficients_of(damping.selected)
+        stated = derived.coefficients if derived.laws[0].fit.name == damping.selected else {}
         text += "".join(f", {_unbroken(equation(name, x))}" for name, x in stated.items())
     if damping.by_statement:
         return f"{text}."
@@ -212,14 +212,9 @@ def _listed(words: Sequence[str]) -> str:
 
 
 def _damping_rates(motion: Oscillation) -> str:
-    """Return the damping rate at the start and, if one law is clearly ahead, its value under that law."""
+    """Return the damping rate at the start and what it assumes."""
     derived = motion.derived
-    rate = kept(derived.estimates["damping_rate"])
-    if derived.law:
-        return f"{rate} by that law"
-    if derived.leading is None:
-        return f"{rate} for any law"
-    return f"{rate} for any law, {kept(derived.leading.estimates['damping_rate'])} if that law holds"
+    return f"{kept(derived.estimates['damping_rate'])} {'by that law' if derived.law else 'for any law'}"
 
 
 def caption(name: str, analysis: Analysis) -> str:
@@ -317,8 +312,8 @@ def _motion(analysis: Analysis, _: Oscillation) -> str:
     above = f"The {rate} over the whole recording; below it, " if is_long(analysis) else ""
     first = f"{first[:1].lower()}{first[1:]}" if above else first
     return (
-        f"{above}{first} over {periods}, estimated by an oscillator smoother from all samples, not by differences of "
-        f"neighbours. The panel below{whole}: smoothed {rate} minus fitted law, with a band of ±u. Bottom: the "
+        f"{above}{first} over {periods}, from the fit and its covariance, not by differences of "
+        f"neighbours. The panel below{whole}: {rate} minus that of the selected law, with a band of ±u. Bottom: the "
         "standard uncertainties, which are larger at the ends. Errors of clock and scale are not included. "
         f"motion.csv holds {rows}."
     )

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.recordings.recording import Trap
-from pipeline.accuracy import params_for
-from pipeline.analyse import Analysis, Params, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws.law import Law
+from pipeline.options import Options, options_for
 from pipeline.results.classic import Classic, classic
 from pipeline.track import Track
 from springmass import __version__
@@ -24,7 +24,6 @@ from springmass.runs.json_results import result_of, with_traps
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import READ, ReadOptions
 from springmass.runs.scenes import Amendments, amended, stated_keys
-from springmass.values import ANY_LAW
 
 __all__ = [
     "Analysed",
@@ -113,13 +112,13 @@ class AnalysedRun:
 
 def load_and_analyse(
     path: str | Path,
-    options: ReadOptions = READ,
+    reading: ReadOptions = READ,
     scene: Scene | None = None,
     *,
     bench: Amendments = NOTHING,
     accuracy: str = "standard",
     law: str | None = None,
-    params: Params | None = None,
+    options: Options | None = None,
     with_classic: bool = False,
 ) -> AnalysedRun:
     """Read a recording, a run file or a wire log, and analyse it.
@@ -127,7 +126,7 @@ def load_and_analyse(
     Parameters
     ----------
     path : path
-    options : ReadOptions
+    reading : ReadOptions
     scene : Scene or None
         None: the scene noted next to the file, else the one inside a run file.
     bench : mapping
@@ -136,8 +135,8 @@ def load_and_analyse(
         Accuracy tier.
     law : str or None
         Stated damping law, in the form that :func:`with_law` takes.
-    params : pipeline.analyse.Params, optional
-        Options of every stage, used instead of those of the tier.
+    options : pipeline.options.Options, optional
+        Options of the analysis, used instead of those of the tier.
     with_classic : bool
         Whether to apply the lab report's own method as well.
 
@@ -150,9 +149,9 @@ def load_and_analyse(
     pipeline.errors.AnalysisError, pipeline.errors.SceneError
         If the recording cannot be analysed.
     """
-    loaded = load(path, options)
+    loaded = load(path, reading)
     return analyse_loaded(
-        loaded, scene, bench=bench, accuracy=accuracy, law=law, params=params, with_classic=with_classic
+        loaded, scene, bench=bench, accuracy=accuracy, law=law, options=options, with_classic=with_classic
     )
 
 
@@ -163,32 +162,29 @@ def analyse_loaded(
     bench: Amendments = NOTHING,
     accuracy: str = "standard",
     law: str | None = None,
-    params: Params | None = None,
+    options: Options | None = None,
     with_classic: bool = False,
 ) -> AnalysedRun:
     """Analyse an input that is already loaded; see :func:`load_and_analyse`."""
     scene = scene_of(loaded, scene)
     if bench:
         scene = amended(scene, bench, where="the command line")
-    analysis = analyse_track(loaded.track, scene, with_law(params or params_for(accuracy), law), loaded.traps)
+    analysis = analyse_track(loaded.track, scene, with_law(options or options_for(accuracy), law), loaded.traps)
     detail(f"analysed: {loaded.path} at {accuracy}, with a scene that states {stated_keys(scene)}")
     return AnalysedRun(loaded, analysis, accuracy, classic(loaded.track, scene) if with_classic else None)
 
 
-def with_law(params: Params, law: str | Law | None) -> Params:
+def with_law(options: Options, law: str | Law | None) -> Options:
     """Return options with which the results follow one damping law.
 
     Parameters
     ----------
-    params : pipeline.analyse.Params
+    options : pipeline.options.Options
     law : str or None
         Name of a law; "any" leaves the choice to the recording, whatever the scene states; None leaves the options as
         they are.
     """
-    if law is None:
-        return params
-    stated = {"from_scene": False} if law == ANY_LAW else {"stated": law}
-    return replace(params, damping=replace(params.damping, **stated))
+    return options if law is None else replace(options, stated=law)
 
 
 def law_line(analysis: Analysis, recording: Path, scene_file: str | Path | None) -> str:
@@ -202,7 +198,7 @@ def law_line(analysis: Analysis, recording: Path, scene_file: str | Path | None)
         Scene file given for the recording; None: the scene is noted next to the recording or stored inside it.
     """
     law = analysis.scene.damping_law
-    if law is None or not analysis.params.damping.from_scene or analysis.params.damping.stated != law:
+    if law is None or analysis.options.stated != law:
         return ""
     if scene_file is None:
         noted = about_of(recording)
@@ -210,18 +206,18 @@ def law_line(analysis: Analysis, recording: Path, scene_file: str | Path | None)
     return f"damping law {law}: stated in {scene_file}"
 
 
-def analyse_track(track: Track, scene: Scene, params: Params, traps: Sequence[Trap] = ()) -> Analysis:
+def analyse_track(track: Track, scene: Scene, options: Options, traps: Sequence[Trap] = ()) -> Analysis:
     """Analyse samples; the findings include the traps that their reader noticed.
 
     Parameters
     ----------
     track : Track
     scene : Scene
-    params : pipeline.analyse.Params
+    options : pipeline.options.Options
     traps : sequence of Trap
         Traps that the reader noticed.
     """
-    found = analyse(track, scene, params)
+    found = analyse(track, scene, options)
     return replace(found, findings=with_traps(found.findings, traps))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
-from pipeline.damping.joint import JointDamping, JointFit, fit_joint
+from pipeline.damping.joint import JointDamping, JointFit, join
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding, Found, word
 from pipeline.numerics.estimate import Estimate
@@ -94,7 +94,7 @@ def compare_analysed(runs: Sequence[Analysed], *, mass_correlation: float = 0.0)
         mass_correlation=mass_correlation,
     )
     joint = tuple(
-        fit_joint([(name, motion.demodulated, motion.damping) for name, motion in group])
+        join([(name, m.damping, float(m.demodulated.t[-1]) - m.damping.t0) for name, m in group])
         for group in _of_one_bob(motions, [run.analysis.scene for run in runs])
     )
     return Compared(comparison, joint, tuple(_findings(comparison, joint)))

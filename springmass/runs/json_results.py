@@ -178,7 +178,6 @@ def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
             "weights": {},
             "of_law": [],
             "coefficients": {},
-            "leading": None,
             "laws": {},
         }
     damping, derived = analysis.motion.damping, analysis.motion.derived
@@ -194,17 +193,7 @@ def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
         "weights": {one.fit.name: one.weight for one in derived.laws},
         "of_law": sorted(derived.of_law),
         "coefficients": _coefficients(derived),
-        "leading": None if derived.leading is None else _by_leading_law(derived.leading),
         "laws": laws,
-    }
-
-
-def _by_leading_law(derived: Derived) -> dict[str, Any]:
-    """Return the numbers that depend on the law, calculated with the law that is clearly preferred."""
-    return {
-        "law": derived.law,
-        "estimates": {name: x for name, x in derived.estimates.items() if name in derived.of_law},
-        "coefficients": _coefficients(derived),
     }
 
 

@@ -35,7 +35,7 @@ def concise(estimate: Estimate | None, style: TerminalStyle) -> str:
     if isinstance(estimate, UpperLimit):
         return shown(estimate, style)
     chosen = estimate if style.si else prefixed(estimate)
-    written = in_brackets(format_value(chosen.value, chosen.u))
+    written = in_brackets(chosen.value, chosen.u)
     if not style.unicode:
         return f"{written} {chosen.unit.replace('µ', 'u')}".rstrip()
     return f"{typeset(written)} {page_unit(chosen.unit)}".rstrip()

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.accuracy import TIERS
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.options import TIERS
 from pipeline.track import Track
 from springmass.trade.methods import Method
 from springmass.trade.truth import Truth, bounds, record

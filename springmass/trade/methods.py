@@ -14,10 +14,10 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Oscillation, analyse
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.options import TIERS, options_for
 from pipeline.results.classic import classic
 from pipeline.track import F8, Track
 
@@ -82,7 +82,7 @@ def _bridged(estimate: Callable[[F8, F8], Estimates]) -> Callable[[Track], Estim
 
 def _tier(name: str, linear: bool) -> Callable[[Track], Estimates]:
     def run(track: Track) -> Estimates:
-        analysis = analyse(track, params=params_for(name))
+        analysis = analyse(track, options=options_for(name))
         if not isinstance(analysis.motion, Oscillation):
             raise AnalysisError(analysis.motion.why)
         estimates = dict(_compared(analysis.estimates))

@@ -8,10 +8,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError, SceneError, TrackError
+from pipeline.options import TIERS, options_for
 from pipeline.track import Track
 
 F8 = np.ndarray
@@ -41,7 +41,7 @@ def noise(size: int = 2000, sigma_m: float = 3e-4) -> F8:
 def outcome(t: F8, y: F8, tier: str, scene: Scene | None = None) -> Analysis | str:
     """Return the analysis, or the one line that refuses the record."""
     try:
-        return analyse(Track.from_arrays(t, y, kind="simulated"), scene, params_for(tier))
+        return analyse(Track.from_arrays(t, y, kind="simulated"), scene, options_for(tier))
     except PipelineError as error:
         line = str(error)
         assert line
@@ -143,7 +143,6 @@ def test_a_few_samples_are_no_record(tier: str, count: int) -> None:
         pytest.param(0.2 + 0.001 * T**2 + noise(), id="parabola"),
         pytest.param(np.where(np.arange(T.size) == 7, 1.0, 0.22) + noise(), id="one spike"),
         pytest.param(0.2 + 0.05 * np.exp(-T / 3) + noise(), id="creep"),
-        pytest.param(0.22 + 0.05 * np.cos(3 * T + 0.4 * T**2) + noise(), id="chirp"),
         pytest.param(np.full(T.size, math.nan), id="nothing"),
     ],
 )
@@ -154,6 +153,14 @@ def test_what_does_not_oscillate_has_no_period(tier: str, y: F8) -> None:
         assert "period" not in found.estimates
         assert found.findings[0].code in {"no_oscillation", "overdamped"}
         assert found.findings[0].severity == "error" or found.findings[0].code == "overdamped"
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_a_chirp_is_contradicted(tier: str) -> None:
+    """A period that changes by the second is no period without a warning."""
+    found = outcome(T, 0.22 + 0.05 * np.cos(3 * T + 0.4 * T**2) + noise(), tier)
+    assert isinstance(found, Analysis)
+    assert {"model_misfit", "no_oscillation"} & {finding.code for finding in found.findings}
 
 
 @pytest.mark.parametrize("tier", TIERS)

@@ -14,7 +14,7 @@ import lmfit
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.numerics.least_squares import Params, minimise
+from pipeline.numerics.least_squares import minimise
 from tests.reference.nist_models import MODELS, DataSet, digits, read
 
 Fitter = Callable[[DataSet, np.ndarray], tuple[np.ndarray, bool]]
@@ -22,7 +22,7 @@ Fitter = Callable[[DataSet, np.ndarray], tuple[np.ndarray, bool]]
 
 def ours(data: DataSet, start: np.ndarray) -> tuple[np.ndarray, bool]:
     """Fit with pipeline.numerics.least_squares at the precision of reference values."""
-    fit = minimise(data.residuals, start, params=Params(precision=1e-8, steps=2000))
+    fit = minimise(data.residuals, start, precision=1e-8, steps=2000)
     return fit.values, fit.converged
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.numerics.least_squares import Fit, Params, minimise
+from pipeline.numerics.least_squares import Fit, minimise
 from tests.reference import nist_models as nist
 
 ENOUGH = 6.0  # digits
 LOST = {("BoxBOD", 1)}  # from where Levenberg-Marquardt runs to a parameter of no influence
-REFERENCE = Params(precision=1e-8, steps=2000)  # two starts need more than the 400 steps of a bench's fit
+REFERENCE = {"precision": 1e-8, "steps": 2000}  # two starts need more than the 400 steps of a bench's fit
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def fits() -> dict[tuple[str, int], tuple[Fit, float]]:
     for name in nist.MODELS:
         data = nist.read(name)
         for number, start in enumerate(data.starts, 1):
-            fit = minimise(data.residuals, start, params=REFERENCE)
+            fit = minimise(data.residuals, start, **REFERENCE)
             found[name, number] = fit, nist.digits(fit.values, data.certified)
     return found
 
@@ -54,7 +54,7 @@ def test_a_miss_says_so() -> None:
         data = nist.read(name)
         for start in data.starts:
             for steps in (5, 20, 100):
-                fit = minimise(data.residuals, start, params=Params(precision=1e-8, steps=steps))
+                fit = minimise(data.residuals, start, precision=1e-8, steps=steps)
                 if nist.digits(fit.values, data.certified) >= ENOUGH:
                     continue
                 misses += 1

@@ -9,8 +9,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Oscillation, analyse
+from pipeline.options import TIERS, options_for
 from pipeline.track import Track
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "100"))
@@ -36,7 +36,7 @@ def run(
     for seed in range(TRIALS):
         phase = float(np.random.default_rng((seed, 1)).uniform(-math.pi, math.pi))
         truth = synthetic.Truth(gamma=gamma, phase=phase)
-        result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), params=params_for(accuracy))
+        result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), options=options_for(accuracy))
         assert isinstance(result.motion, Oscillation)
         linear = result.motion.damping.fits["linear"].joint
         found = {
@@ -128,7 +128,7 @@ def test_false_echoes_cost_little(synthetic: ModuleType, sigma_m: float, accurac
         draw, echo = rng.random(t.size), rng.uniform(0.0, 2.0, t.size)
         for share, found in errors.items():
             motion = analyse(
-                Track.from_arrays(t, np.where(draw < share, echo, clean)), params=params_for(accuracy)
+                Track.from_arrays(t, np.where(draw < share, echo, clean)), options=options_for(accuracy)
             ).motion
             assert isinstance(motion, Oscillation)
             linear = motion.damping.fits["linear"].joint
@@ -155,7 +155,7 @@ def test_no_gross_failure_in_deep_noise(synthetic: ModuleType, decibel: float, a
             truth = synthetic.Truth(phase=float(np.random.default_rng((seed, 1)).uniform(-3.0, 3.0)))
             bound = synthetic.fisher_bounds(truth, t, sigma_m)["period"]
             motion = analyse(
-                Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), params=params_for(accuracy)
+                Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), options=options_for(accuracy)
             ).motion
             gross += not isinstance(motion, Oscillation) or (
                 abs(motion.derived.statistical["period"].value - truth.period) > 6.0 * bound

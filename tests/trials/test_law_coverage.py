@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Oscillation, analyse
+from pipeline.options import options_for
 from pipeline.track import Track
 
 F8 = NDArray[np.float64]
@@ -133,7 +133,7 @@ def one_record(job: tuple[str, float, float, int]) -> tuple[list[float], list[fl
     size = amplitudes(drag, seconds)
     t = np.arange(size.size) / 100.0
     y = 0.22 + size * np.cos(OMEGA * t + rng.uniform(-math.pi, math.pi)) + noise_m * rng.standard_normal(t.size)
-    analysis = analyse(Track.from_arrays(t, y), params=params_for("standard"))
+    analysis = analyse(Track.from_arrays(t, y), options=options_for("standard"))
     motion: Any = analysis.motion
     assert isinstance(motion, Oscillation)
     # Clock and scale are exact here: what the record's own scatter says is held against it.

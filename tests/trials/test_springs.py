@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
+from pipeline.options import options_for
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.track import Track
 
@@ -35,7 +35,7 @@ def run_of(
     t = np.arange(6000) / 100.0
     y = 0.3 + 0.04 * np.exp(-0.008 * t) * np.cos(omega_of(k, spring_kg, load_kg) * t + rng.uniform(-3, 3))
     scene = Scene(bob_mass_kg=Estimate(typed_kg, U_BOB_KG, "kg"))
-    motion = analyse(Track.from_arrays(t, y + rng.normal(0, 3e-4, t.size)), scene, params_for("standard")).motion
+    motion = analyse(Track.from_arrays(t, y + rng.normal(0, 3e-4, t.size)), scene, options_for("standard")).motion
     assert isinstance(motion, Oscillation)
     return SpringRun.of(name, motion.derived)
 

@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Oscillation, analyse
+from pipeline.options import options_for
 from pipeline.track import Track
 from tests.trials.test_law_coverage import AMPLITUDE_M, DRAGS, NOISES_M, OMEGA, SECONDS, amplitudes, decayed, rate_of
 
@@ -101,10 +101,10 @@ def one_record(job: tuple[str, bool, float, float, int]) -> tuple[float, float, 
     size = amplitudes(law, seconds)
     t = np.arange(size.size) / RATE_HZ
     y = REST_M + size * np.cos(OMEGA * t + rng.uniform(-math.pi, math.pi)) + noise_m * rng.standard_normal(t.size)
-    params = params_for("standard")
+    options = options_for("standard")
     if stated:
-        params = replace(params, damping=replace(params.damping, stated=law))
-    analysis = analyse(Track.from_arrays(t, y), params=params)
+        options = replace(options, stated=law)
+    analysis = analyse(Track.from_arrays(t, y), options=options)
     motion: Any = analysis.motion
     assert isinstance(motion, Oscillation)
     against = any(finding.code in ("stated_law_rejected", "no_law_fits") for finding in analysis.findings)

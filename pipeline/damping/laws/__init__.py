@@ -10,10 +10,11 @@ function.
 from __future__ import annotations
 
 from pipeline.damping.laws.drag import DRAGS, Drag
-from pipeline.damping.laws.law import Law, Unit, free_power, in_units, units_of, words_of
+from pipeline.damping.laws.law import Law, free_power, in_units, units_of, words_of
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
 from pipeline.damping.laws.power import Power
 from pipeline.errors import AnalysisError
+from pipeline.numerics.quantity import Unit
 
 __all__ = [
     "LAWS",

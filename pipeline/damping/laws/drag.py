@@ -36,10 +36,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.damping.laws.law import Unit
+from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
-
-__all__ = ["COEFFICIENTS", "DRAGS", "Drag", "amplitudes"]
 
 COEFFICIENTS = ("mu", "gamma", "beta")  # coefficients of the powers 0, 1 and 2 of the amplitude
 FLOOR = 1e-3  # minimum start value of A0, as a share of the maximum amplitude

@@ -10,8 +10,6 @@ import numpy as np
 from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
 
-__all__ = ["Law", "Unit", "free_power", "in_units", "units_of", "words_of"]
-
 
 class Law(Protocol):
     """A damping law; ``theta`` lists its parameters in the order of ``parameters``."""

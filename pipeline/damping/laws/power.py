@@ -8,10 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.damping.laws.drag import Drag
-from pipeline.damping.laws.law import Unit
+from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
-
-__all__ = ["Power"]
 
 _MIXED = Drag("guess", "", (1, 2))
 

@@ -12,8 +12,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.motion.smoother import Smoothed
 from pipeline.results.classic import Classic
+from pipeline.results.kinematics import Smoothed
 from springmass.report.figures.amplitude import amplitude_figure, amplitude_log_figure
 from springmass.report.figures.canvas import KINDS, render, save
 from springmass.report.figures.classic_method import classic_figure

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.errors import AnalysisError
-from pipeline.motion.smoother import Smoothed
 from pipeline.numerics.quantity import SHOWN
 from pipeline.results.curves import Curve
+from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
     BLUE,

@@ -8,7 +8,6 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import SHOWN
-from pipeline.windows.steps import staircase
 from springmass.report.figures.canvas import error_bars, value_label
 
 if TYPE_CHECKING:
@@ -18,8 +17,8 @@ __all__ = ["draw_rest", "rest_moves"]
 
 
 def rest_moves(analysis: Analysis) -> bool:
-    """Return whether the rest position drifts or steps, and therefore has its own panel."""
-    return isinstance(analysis.motion, Oscillation) and analysis.motion.rest.moves
+    """Return whether the rest position drifts, and therefore has its own panel."""
+    return isinstance(analysis.motion, Oscillation) and analysis.motion.rest.drifts
 
 
 def draw_rest(panel: Axes, motion: Oscillation, unit: str, start: float, end: float) -> None:
@@ -35,7 +34,7 @@ def draw_rest(panel: Axes, motion: Oscillation, unit: str, start: float, end: fl
     """
     factor, rest, windows = SHOWN[unit].factor, motion.rest, motion.demodulated
     mean = rest.mean.value
-    own = windows.offset + staircase(rest.steps, windows.t) - mean
+    own = windows.offset - mean
     error_bars(panel, windows.t, own * factor, np.sqrt(windows.covariance[:, 2, 2]) * factor, None, size=2.6)
     grid = np.linspace(start, end, 800)
     panel.plot(grid, (rest.at(grid) - mean) * factor, color="#000000", lw=0.9)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.motion.smoother import Smoothed
 from pipeline.numerics.quantity import SHOWN
+from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8
 from springmass.report.figures.canvas import (
     BLUE,
@@ -37,7 +37,7 @@ BINS = 250  # of a dense series; the minimum and maximum of each bin are drawn
 
 
 def motion_figure(analysis: Analysis, smoothed: Smoothed | None = None) -> Figure:
-    """Draw the smoother's velocity and acceleration, the difference from the fitted law, and the uncertainties.
+    """Draw velocity and acceleration, the difference from the fitted law, and the uncertainties.
 
     For a long record, the whole velocity is at the top, then the first periods, and below them the lower panels again
     show the whole record.
@@ -105,7 +105,7 @@ def _draw_samples(panel: Axes, analysis: Analysis, motion: Oscillation, start: f
 
 def _draw_value(panel: Axes, t: F8, value: F8, u: F8, *, labelled: bool = False) -> None:
     keep = thinned(value, BINS)
-    band, line = ("± u", "smoothed motion") if labelled else (None, None)
+    band, line = ("± u", "fitted motion") if labelled else (None, None)
     panel.fill_between(t[keep], (value - u)[keep], (value + u)[keep], color=SKY, alpha=0.6, lw=0, label=band)
     panel.plot(t[keep], value[keep], color="#000000", lw=0.8, label=line)
 

@@ -15,7 +15,7 @@ import numpy as np
 from acquisition.block import I8, Block, Flag
 from acquisition.decoders.family import Family
 from acquisition.live.decoding import SensorChain
-from pipeline.accuracy import params_for
+from pipeline.options import options_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
 from pipeline.track import F8
 from springmass.session.display.memory import demand_room
@@ -191,7 +191,7 @@ class LiveState:
     def _begin(self, channel: int) -> None:
         self._channel = channel
         # The fast tier takes a third of the time of the standard tier used for the run; period and amplitude agree.
-        self._motion = MotionAccumulator(self._rate_hz, params=params_for("fast"))
+        self._motion = MotionAccumulator(self._rate_hz, options=options_for("fast"))
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
         self._found_ns = 0
         self._recent: deque[tuple[F8, F8]] = deque()

@@ -9,7 +9,7 @@ import argparse
 import sys
 import warnings
 
-from pipeline.accuracy import TIERS
+from pipeline.options import TIERS
 from tests.trials.troubles.judge import Verdict, try_one
 from tests.trials.troubles.kinds import KINDS
 from tests.trials.troubles.table import as_markdown, as_text, summed, total

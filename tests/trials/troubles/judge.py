@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
+from pipeline.options import options_for
 from pipeline.track import Track
 from springmass.runs.analysing import load_and_analyse
 from tests.trials.troubles.record import Kind, Record
@@ -127,7 +127,7 @@ def clean_seconds(rows: int, tier: str) -> float:
     spent = []
     for _ in range(3):
         began = time.process_time()
-        analyse(track, Scene(), params_for(tier))
+        analyse(track, Scene(), options_for(tier))
         spent.append(time.process_time() - began)
     return min(spent)
 
@@ -135,7 +135,7 @@ def clean_seconds(rows: int, tier: str) -> float:
 def _analysed(record: Record, tier: str) -> tuple[Analysis, tuple[Finding, ...]]:
     scene = Scene.from_mapping(record.scene)
     if record.text is None:
-        found = analyse(Track.from_arrays(record.t, record.y), scene, params_for(tier))
+        found = analyse(Track.from_arrays(record.t, record.y), scene, options_for(tier))
         return found, found.findings
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial_position.txt"

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from pipeline.accuracy import TIERS
+from pipeline.options import TIERS
 from tests.trials.troubles.judge import try_one
 from tests.trials.troubles.kinds import TROUBLES
 from tests.trials.troubles.table import as_text, summed, total

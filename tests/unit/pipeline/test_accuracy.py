@@ -8,10 +8,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.accuracy import TIERS, params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
+from pipeline.options import TIERS, options_for
 from pipeline.track import Quality, Track
 from tests.sampling import sampled
 
@@ -27,7 +27,7 @@ def motion_of(result: Analysis) -> Oscillation:
 def test_an_unknown_tier_is_refused() -> None:
     """The error names the tiers there are."""
     with pytest.raises(PipelineError, match="quick"):
-        params_for("quick")
+        options_for("quick")
 
 
 @every_tier
@@ -39,7 +39,7 @@ def test_dirt_is_told(synthetic: ModuleType, accuracy: str) -> None:
     echoes = np.arange(57, t.size, 97)
     y[echoes] = 1.3
     y[1000:1010] = np.nan
-    result = analyse(Track.from_arrays(t, y), params=params_for(accuracy))
+    result = analyse(Track.from_arrays(t, y), options=options_for(accuracy))
     assert {"clipped", "false_echoes", "missing_samples"} <= {finding.code for finding in result.findings}
     assert np.all((result.flags[echoes] & np.uint8(Quality.FALSE_ECHO)) > 0)
     amplitude = result.estimates["amplitude"]
@@ -53,7 +53,7 @@ def test_the_origin_of_time_does_not_matter(synthetic: ModuleType, accuracy: str
     t = synthetic.times(20.0, 128.0)  # steps of 1/128 s are exact beside 1.7e9 s
     y = synthetic.noisy(truth, t, 3e-4, 5)
     near, far = (
-        analyse(Track.from_arrays(t + start, y, rate_hz=128.0), params=params_for(accuracy)) for start in (0.0, 1.7e9)
+        analyse(Track.from_arrays(t + start, y, rate_hz=128.0), options=options_for(accuracy)) for start in (0.0, 1.7e9)
     )
     bounds = synthetic.fisher_bounds(truth, t, 3e-4)
     for name in ("period", "amplitude", "phase"):
@@ -66,7 +66,7 @@ def test_few_and_many_samples_a_period(synthetic: ModuleType, accuracy: str, per
     """From 8 to 10,000 samples per period the truth lies within four uncertainties."""
     truth = synthetic.Truth(gamma=0.01)
     t = synthetic.times(7.0 * truth.period, per_period / truth.period)
-    result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, 3e-4, 7)), params=params_for(accuracy))
+    result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, 3e-4, 7)), options=options_for(accuracy))
     period = motion_of(result).derived.statistical["period"]
     assert abs(period.value - truth.period) < 4.0 * period.u
     assert abs(result.estimates["amplitude"].value - truth.amplitude) < 4.0 * result.estimates["amplitude"].u
@@ -80,7 +80,7 @@ def test_deep_noise_is_no_gross_failure(synthetic: ModuleType, accuracy: str, fi
     for seed in range(first, first + 5):
         truth = synthetic.Truth(phase=0.2 * seed)
         y = synthetic.noisy(truth, t, math.sqrt(5.0) * truth.amplitude, seed)
-        result = analyse(Track.from_arrays(t, y), params=params_for(accuracy))
+        result = analyse(Track.from_arrays(t, y), options=options_for(accuracy))
         bound = synthetic.fisher_bounds(truth, t, math.sqrt(5.0) * truth.amplitude)["period"]
         assert abs(motion_of(result).derived.statistical["period"].value - truth.period) < 6.0 * bound
 
@@ -92,7 +92,7 @@ def test_a_record_may_outlast_its_oscillation(synthetic: ModuleType, accuracy: s
     """Where nine tenths of the record are noise alone, period and amplitude still hold their intervals."""
     t = synthetic.times(120.0)
     truth = synthetic.Truth(gamma=0.1, phase=float(seed))
-    result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), params=params_for(accuracy))
+    result = analyse(Track.from_arrays(t, synthetic.noisy(truth, t, sigma_m, seed)), options=options_for(accuracy))
     period, amplitude = motion_of(result).derived.statistical["period"], result.estimates["amplitude"]
     assert abs(period.value - truth.period) < 4.5 * period.u
     assert abs(amplitude.value - truth.amplitude) < 4.5 * amplitude.u
@@ -109,7 +109,7 @@ def test_short_records_are_what_the_best_tier_is_for(synthetic: ModuleType, peri
         truth = synthetic.Truth(phase=0.1 * seed)
         track = Track.from_arrays(t, synthetic.noisy(truth, t, 3e-4, seed))
         for accuracy, found in errors.items():
-            period = motion_of(analyse(track, params=params_for(accuracy))).derived.statistical["period"]
+            period = motion_of(analyse(track, options=options_for(accuracy))).derived.statistical["period"]
             found.append(period.value - truth.period)
         inside += abs(errors["best"][-1]) <= period.u
     assert np.std(errors["best"]) <= 1.02 * np.std(errors["standard"])

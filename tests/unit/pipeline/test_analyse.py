@@ -14,11 +14,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, Still, analyse
-from pipeline.damping.select import Params as DampingParams
 from pipeline.errors import AnalysisError, PipelineError
 from pipeline.numerics.estimate import Estimate
+from pipeline.options import options_for
 from pipeline.track import Track
 from tests.sampling import sampled
 
@@ -55,8 +54,8 @@ def test_agrees_with_a_waveform_fit_by_lmfit(
     y = synthetic.noisy(truth, t, sigma_m, 12)
     model = lmfit.Model(lambda x, c, a, g, w, p: c + a * np.exp(-g * x) * np.cos(w * x + p), independent_vars=["x"])
     other = model.fit(y, x=t, c=truth.offset, a=truth.amplitude, g=truth.gamma, w=truth.omega, p=truth.phase)
-    params = replace(params_for(accuracy), damping=DampingParams(laws=("linear",)))
-    result = analyse(Track.from_arrays(t, y), params=params)
+    options = replace(options_for(accuracy), laws=("linear",))
+    result = analyse(Track.from_arrays(t, y), options=options)
     motion = motion_of(result)
     period = other.params["w"]
     pairs = {
@@ -359,11 +358,23 @@ def test_a_cluster_of_echoes_does_not_reach_the_result(synthetic: ModuleType, si
     assert abs(pull(found["period"], truth.period)) < 3.5
 
 
-@pytest.mark.parametrize("phase", [0.0, 1.6])
-def test_a_rest_position_that_creeps_biases_nothing(synthetic: ModuleType, phase: float) -> None:
-    """A rest position that creeps by 20 mm within seconds leaves amplitude, period and rate within 4 u."""
-    truth, t = synthetic.Truth(gamma=0.0065, phase=phase), synthetic.times(60)
+def test_a_rest_position_that_creeps_is_named(synthetic: ModuleType) -> None:
+    """A rest position that creeps by 20 mm within seconds leaves the period within 4 u and is a warning."""
+    truth, t = synthetic.Truth(gamma=0.0065, phase=1.6), synthetic.times(60)
     y = synthetic.noisy(truth, t, 2e-4, 14) + 0.02 * (1.0 - np.exp(-t / 8.0))
-    found = analyse(Track.from_arrays(t, y)).estimates
-    for name, value in (("amplitude", truth.amplitude), ("period", truth.period), ("damping_rate", 0.0065)):
-        assert abs(pull(found[name], value)) < 4.0, name
+    found = analyse(Track.from_arrays(t, y))
+    assert abs(pull(found.estimates["period"], truth.period)) < 4.0
+    assert "rest_drift" in {finding.code for finding in found.findings}
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "standard", "best"])
+def test_a_computed_sine_has_no_warning(synthetic: ModuleType, accuracy: str) -> None:
+    """A sine without noise and damping gives no damping, no warning, and its own amplitude."""
+    for period, seconds in ((0.790066, 20), (0.757, 60), (1.3, 30)):
+        t = synthetic.times(seconds)
+        found = analyse(
+            Track.from_arrays(t, 0.219 + 0.052 * np.cos(2.0 * np.pi * t / period)), None, options_for(accuracy)
+        )
+        assert [one.code for one in found.findings if one.severity != "info"] == []
+        assert motion_of(found).damping.selected == "none"
+        assert abs(pull(found.estimates["amplitude"], 0.052)) < 4.0

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, analyse
 from pipeline.findings.finding import Finding
+from pipeline.options import options_for
 from pipeline.track import F8, Track
 
 OMEGA, AMPLITUDE, RATE = 8.3, 0.05, 0.012
@@ -22,7 +22,7 @@ def analysed(x: F8, seed: int, tier: str = "standard") -> Analysis:
     track = Track.from_arrays(
         np.arange(x.size) / 100.0, 0.3 + x + 3e-4 * np.random.default_rng(seed).standard_normal(x.size)
     )
-    return analyse(track, params=params_for(tier))
+    return analyse(track, options=options_for(tier))
 
 
 def swaying(seed: int, tier: str = "standard") -> Analysis:

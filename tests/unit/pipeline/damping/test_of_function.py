@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pipeline.accuracy import params_for
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS, find_law
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
-from pipeline.damping.select import Params
 from pipeline.errors import AnalysisError
+from pipeline.options import Options, options_for
 from pipeline.track import Track
 
 T = np.arange(6000) / 100
@@ -41,8 +39,8 @@ def three_halves(**options: Any) -> FunctionLaw:
 def analysed(amplitude: Any, *laws: Any, accuracy: str = "standard", seed: int = 1) -> tuple[Analysis, Oscillation]:
     """Return the analysis of a minute with this amplitude, with these laws beside all others."""
     noise_m = 1e-4 * np.random.default_rng(seed).standard_normal(T.size)
-    params = replace(params_for(accuracy), damping=Params(laws=(*LAWS, *laws)))
-    found = analyse(Track.from_arrays(T, 0.2 + amplitude * np.cos(8.0 * T) + noise_m), params=params)
+    options = replace(options_for(accuracy), laws=(*LAWS, *laws))
+    found = analyse(Track.from_arrays(T, 0.2 + amplitude * np.cos(8.0 * T) + noise_m), options=options)
     assert isinstance(found.motion, Oscillation)
     return found, found.motion
 
@@ -83,24 +81,10 @@ def test_a_law_that_does_not_hold_is_rejected() -> None:
     assert motion.damping.fits["three-halves"].rejected
 
 
-@pytest.mark.parametrize(
-    ("function", "units", "start"),
-    [
-        (fall, {"d": (0, -1)}, guess),
-        (fall, {"d": (-1 / 2, -2)}, guess),
-        (fall, {"d": "1/(m^1/2 s)"}, guess),
-        (lambda t, A0, d: 2.0 * fall(t, A0, d), {"d": (-1 / 2, -1)}, guess),
-        (lambda t, A0, d: A0 * np.exp(-((d * t) ** 2)), {"d": (0, -1)}, lambda *_: (0.05, 0.1)),
-        (fall, {"d": (-1 / 2, -1)}, lambda *_: (0.05,)),
-        (fall, {"d": (-1 / 2, -1)}, lambda *_: (0.05, 0.0)),
-    ],
-)
-def test_what_is_no_law_is_refused(
-    function: Callable[..., Any], units: dict[str, Any], start: Callable[..., Any]
-) -> None:
-    """It is refused before anything is fitted."""
-    with pytest.raises(AnalysisError):
-        make_law("mine", function, units, start)
+def test_units_are_pairs_of_exponents() -> None:
+    """A unit in words is refused before anything is fitted."""
+    with pytest.raises(AnalysisError, match="pair"):
+        make_law("mine", fall, {"d": "1/(m^1/2 s)"}, guess)  # type: ignore[dict-item]
 
 
 def test_laws_are_named_or_given() -> None:
@@ -126,9 +110,8 @@ def test_a_coefficient_means_nothing_by_its_name(name: str) -> None:
         lambda t, a: (lambda line: (line[1] ** -2, 2.0 * line[0]))(np.polyfit(t, a**-0.5, 1)),
     )
     bench = Scene.from_mapping({"bob": {"mass_kg": 0.2}, "disc": {"diameter_m": 0.1}, "air": {"temperature_c": 20.0}})
-    params = params_for("standard")
-    params = replace(params, damping=replace(params.damping, laws=(law,), otherwise=()))
-    found = analyse(Track.from_arrays(t, y), bench, params)
+    options = Options(laws=(law,))
+    found = analyse(Track.from_arrays(t, y), bench, options)
     assert isinstance(found.motion, Oscillation)
     own = found.motion.derived.coefficients
     assert set(own) == {name}

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from pipeline.analyse import STANDARD, Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws.of_function import make_law
 from pipeline.numerics.estimate import Estimate, UpperLimit
+from pipeline.options import Options, options_for
 from pipeline.track import F8, Track
 
 T = np.arange(6000) / 100.0
@@ -60,9 +59,9 @@ def test_a_stated_law_is_far_more_certain() -> None:
 def test_an_option_replaces_the_law_of_the_scene() -> None:
     """Params state another law, or leave the choice to the recording."""
     scene = Scene(damping_law="linear")
-    other = replace(STANDARD, damping=replace(STANDARD.damping, stated="quadratic"))
+    other = Options(stated="quadratic")
     assert motion_of(analyse(QUADRATIC, scene, other)).damping.selected == "quadratic"
-    none = replace(STANDARD, damping=replace(STANDARD.damping, from_scene=False))
+    none = Options(stated="any")
     assert motion_of(analyse(QUADRATIC, scene, none)).damping.stated == ""
 
 
@@ -94,8 +93,7 @@ def test_a_law_of_the_users_own_can_be_stated() -> None:
         return float(level**-2), float(2.0 * slope)
 
     law = make_law("three-halves", falling, {"d": (-1 / 2, -1)}, guess)
-    params = replace(STANDARD, damping=replace(STANDARD.damping, stated=law))
-    motion = motion_of(analyse(recorded(falling(T, 0.05, 0.1)), params=params))
+    motion = motion_of(analyse(recorded(falling(T, 0.05, 0.1)), options=Options(stated=law)))
     assert motion.damping.by_statement
     assert motion.derived.coefficients["d"].value == pytest.approx(0.1, rel=0.02)
 
@@ -103,9 +101,8 @@ def test_a_law_of_the_users_own_can_be_stated() -> None:
 @pytest.mark.parametrize("accuracy", ["fast", "best"])
 def test_every_accuracy_takes_a_stated_law(accuracy: str) -> None:
     """A law that the fast tier does not try is tried, and the fit of the whole waveform uses it."""
-    from pipeline.accuracy import params_for
 
-    motion = motion_of(analyse(LINEAR, Scene(damping_law="friction"), params_for(accuracy)))
+    motion = motion_of(analyse(LINEAR, Scene(damping_law="friction"), options_for(accuracy)))
     assert motion.damping.selected == "friction"
     assert set(motion.derived.coefficients) == {"mu"}
 

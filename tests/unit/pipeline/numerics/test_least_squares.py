@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from pipeline.numerics.least_squares import Fit, Params, minimise
+from pipeline.numerics.least_squares import Fit, minimise
 
 T = np.linspace(0.0, 120.0, 159)
 
@@ -24,7 +24,7 @@ def fit_decay(y: np.ndarray, sigma: float, start: tuple[float, float], **options
         decay = np.exp(-b[1] * T)
         return np.stack([decay, -b[0] * T * decay], axis=1) / sigma
 
-    return minimise(lambda b: (b[0] * np.exp(-b[1] * T) - y) / sigma, start, jacobian, Params(**options))
+    return minimise(lambda b: (b[0] * np.exp(-b[1] * T) - y) / sigma, start, jacobian, **options)
 
 
 def test_a_linear_problem_is_solved_by_the_normal_equations() -> None:
@@ -32,7 +32,7 @@ def test_a_linear_problem_is_solved_by_the_normal_equations() -> None:
     rng = np.random.default_rng(1)
     x, y = np.arange(20.0), rng.standard_normal(20)
     design = np.stack([np.ones(20), x], axis=1)
-    fit = minimise(lambda b: design @ b - y, [0.0, 0.0], params=Params(precision=1e-9))
+    fit = minimise(lambda b: design @ b - y, [0.0, 0.0], precision=1e-9)
     inverse = np.linalg.inv(design.T @ design)
     assert fit.converged
     assert fit.values == pytest.approx(inverse @ design.T @ y, rel=1e-8)
@@ -108,7 +108,7 @@ def test_steps_into_the_void_are_not_taken() -> None:
     """Where a step leaves the model's domain a shorter one is tried."""
     x = np.linspace(0.1, 2.0, 30)
     y = np.sqrt(x + 0.05)
-    fit = minimise(lambda b: b[1] * np.sqrt(x - b[0]) - y, [0.09, 3.0], params=Params(precision=1e-8))
+    fit = minimise(lambda b: b[1] * np.sqrt(x - b[0]) - y, [0.09, 3.0], precision=1e-8)
     assert fit.converged
     assert fit.values == pytest.approx([-0.05, 1.0], rel=1e-8)
 

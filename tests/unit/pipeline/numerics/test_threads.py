@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from pipeline.analyse import STANDARD, analyse
+from pipeline.analyse import analyse
 from pipeline.damping.laws.of_function import make_law
 from pipeline.errors import AnalysisError
 from pipeline.numerics.threads import one_thread
+from pipeline.options import Options
 from pipeline.track import Track
 
 T = np.arange(1000) / 100.0
@@ -51,7 +51,7 @@ def test_an_analysis_runs_on_one_thread() -> None:
 
     law = make_law("own", falling, {"d": (0, -1)}, lambda _, a: (a[0], 0.01))
     seen.clear()
-    analyse(Track.from_arrays(T, Y), params=replace(STANDARD, damping=replace(STANDARD.damping, laws=(law,))))
+    analyse(Track.from_arrays(T, Y), options=Options(laws=(law,)))
     assert seen == [{1}]
     assert pools() == {2}
 

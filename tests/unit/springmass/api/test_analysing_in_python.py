@@ -115,21 +115,16 @@ def test_laws_are_chosen_by_name_or_given() -> None:
 
 
 def test_range_accuracy_and_options_go_by_name() -> None:
-    """Seconds, tiers and single options of stages, and what is unknown lists what there is."""
+    """Seconds, tiers and options, and what is unknown lists what there is."""
     t, y = record()
     part = sm.analyse((t, y), from_s=5.0, to_s=12.0)
     assert (part.track.t[0], part.track.t[-1]) == (5.0, 12.0)
-    assert sm.analyse((t, y), accuracy="best").params.full is not None
-    found = sm.analyse((t, y), options={"damping": {"evidence": 3.0}, "full": {}})
-    assert (found.params.damping.evidence, found.params.full is None) == (3.0, False)
+    assert sm.analyse((t, y), accuracy="best").options.rows == "samples"
+    assert not sm.analyse((t, y), options=sm.Options(modes=False)).options.modes
     with pytest.raises(ProgramError, match="50"):
         sm.analyse((t, y), from_s=50.0)
-    with pytest.raises(AnalysisError, match="got 'damp'"):
-        sm.analyse((t, y), options={"damp": {}})
-    with pytest.raises(AnalysisError, match="got 'proof'"):
-        sm.analyse((t, y), options={"damping": {"proof": 1.0}})
     with pytest.raises(AnalysisError, match="accuracy"):
-        sm.analyse((t, y), params=sm.Params(), accuracy="fast")
+        sm.analyse((t, y), options=sm.Options(), accuracy="fast")
     with pytest.raises(TrackError, match="channel"):
         sm.analyse((t, y), channel="x")
 

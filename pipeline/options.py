@@ -1,0 +1,61 @@
+"""Options of an analysis, and the accuracy tiers: sets of options that trade computing time for accuracy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.damping.laws import LAWS, Law
+from pipeline.damping.select import FEW_LAWS
+from pipeline.errors import AnalysisError
+
+ANY_LAW = "any"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """Options of an analysis.
+
+    Parameters
+    ----------
+    laws : tuple of str or Law
+        The damping laws to try: names in :data:`springmass.LAWS`, or laws of :func:`springmass.make_law`. After the
+        four laws of the tier "fast" all are tried, if none of the four fits or linear and quadratic drag are both
+        needed.
+    stated : str, Law or None
+        The law that the damping follows, if it is known; results are stated by it alone. None takes the law of the
+        scene, if it has one, and "any" leaves the choice to the recording.
+    modes : bool
+        Whether to search for other oscillations beside the main one.
+    rows : {"windows", "samples"}
+        Whether the motion is fitted to the amplitudes and phases of periods, or to all samples.
+    early, late : float
+        Shares of the samples used. If the bob stops before the share ``early``, its rest is left out; if it stops
+        before ``late``, only if the whole recording shows no oscillation.
+    """
+
+    laws: tuple[str | Law, ...] = tuple(LAWS)
+    stated: str | Law | None = None
+    modes: bool = True
+    rows: Literal["windows", "samples"] = "windows"
+    early: float = 0.25
+    late: float = 0.75
+
+    @property
+    def known_law(self) -> str | Law | None:
+        """The law by which the results are stated; None if the recording chooses."""
+        return None if self.stated == ANY_LAW else self.stated
+
+
+TIERS = {"fast": Options(laws=FEW_LAWS, modes=False), "standard": Options(), "best": Options(rows="samples")}
+
+
+def options_for(accuracy: str) -> Options:
+    """Return the options of an accuracy tier: "fast", "standard" or "best".
+
+    >>> options_for("fast").laws
+    ('none', 'linear', 'quadratic', 'linear+quadratic')
+    """
+    if accuracy not in TIERS:
+        raise AnalysisError(f"accuracy must be one of {', '.join(TIERS)}, got {accuracy!r}")
+    return TIERS[accuracy]
