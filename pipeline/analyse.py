@@ -24,7 +24,7 @@ from pipeline.checks.oscillation import check_sinusoid, typical_miss
 from pipeline.checks.plausibility import check_plausibility
 from pipeline.checks.residuals import residuals_of
 from pipeline.checks.sensor import find_smoothing, held, held_count
-from pipeline.damping.select import Damping, fit_damping
+from pipeline.damping.select import Damping, fit_laws
 from pipeline.errors import AnalysisError
 from pipeline.findings.damping import damping_findings
 from pipeline.findings.finding import Found, worded
@@ -41,8 +41,9 @@ from pipeline.findings.parts import part_findings
 from pipeline.findings.samples import COARSE, clock_findings, held_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion import overdamped
-from pipeline.motion.equation_fit import EquationFit, EquationMisfit, fit_equation
-from pipeline.motion.fitted import Fitted, fit_by_equation, fit_by_windows, fit_waveform
+from pipeline.motion.averaged import Fitted, fit_windows
+from pipeline.motion.by_samples import fit_samples
+from pipeline.motion.equation import fit_equation
 from pipeline.motion.overdamped import Overdamped, find_overdamped, spring_constant
 from pipeline.motion.two_modes import TwoModes, find_two_modes
 from pipeline.numerics.estimate import Estimate
@@ -119,7 +120,8 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         return _without_period(samples, why, scene, options)
 
     windows, disturbances = separate(samples, cycles, windows, modes=options.modes)
-    damping = fit_damping(windows, _start_s(samples, windows.angular_frequency), options.laws, options.known_law)
+    start_s = _start_s(samples, windows.angular_frequency)
+    damping = fit_laws(windows, start_s, options.laws, options.known_law, track.unit)
 
     # For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.
     solved = fit_equation(samples, windows, damping, stopped=part.stopped)
@@ -127,16 +129,16 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         relaxed = find_overdamped(samples)
         if isinstance(relaxed, Overdamped):
             return _overdamped(samples, relaxed, scene, options)
-    if isinstance(solved, EquationFit):
-        fitted = fit_by_equation(solved, samples, windows)
+    if isinstance(solved, Fitted):
+        fitted = solved
     else:
-        fitted = fit_by_windows(windows, disturbances, damping)
+        fitted = fit_windows(windows, disturbances, damping)
         if options.rows == "samples":
-            fitted = fit_waveform(fitted, samples)
+            fitted = fit_samples(fitted, samples)
         two = find_two_modes(samples) if typical_miss(fitted) > BEATING else None
         if two is not None:
             return _two_modes(samples, two, scene, options)
-    return _oscillation(samples, part, fitted, solved, scene, options)
+    return _oscillation(samples, part, fitted, solved if isinstance(solved, str) else "", scene, options)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,9 +219,9 @@ def _start_s(samples: Conditioned, omega: float) -> float:
     return begin if first - begin < 2.0 * math.pi / omega else first
 
 
-def _may_be_overdamped(windows: Demodulated, damping: Damping, solved: EquationFit | EquationMisfit | None) -> bool:
+def _may_be_overdamped(windows: Demodulated, damping: Damping, solved: Fitted | str | None) -> bool:
     """Return whether the damping is strong and, if the equation of motion was fitted, linear."""
-    linear = not isinstance(solved, EquationFit) or solved.damping.best is solved.damping.of_powers(1)
+    linear = not isinstance(solved, Fitted) or solved.damping.best is solved.damping.of_powers(1)
     return linear and damping.best.rate_at_start() / windows.angular_frequency > overdamped.LEAST_DAMPING
 
 
@@ -227,18 +229,17 @@ def _oscillation(
     samples: Conditioned,
     part: _FreePart,
     fitted: Fitted,
-    solved: EquationFit | EquationMisfit | None,
+    refused: str,
     scene: Scene,
     options: Options,
 ) -> Analysis:
     """Run checks, results and findings, in this order, for an oscillation fitted by any method."""
     track, unit = samples.track, samples.track.unit
-    fitted = fitted.in_unit(unit)
     windows, damping, phase, disturbances = fitted.demodulated, fitted.damping, fitted.phase, fitted.disturbances
-    rest, waveform = fitted.rest, fitted.waveform.with_disturbances(disturbances)
+    rest = fitted.rest
     instrument = Instrument.of(track)
     smoothing = SensorFilter.of(scene, track.rate_hz)
-    by_windows = not isinstance(solved, EquationFit)
+    by_windows = fitted.method != "equation"
 
     misfits: list[Misfit] = []
     found: list[Found] = []
@@ -247,7 +248,7 @@ def _oscillation(
     found += plausibility_findings(plausible)
     # Strong damping distorts every period, which would look like harmonics; its fit describes the whole motion anyway.
     rounding_m = median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
-    residuals = residuals_of(samples, windows, disturbances, phase) if by_windows else None
+    residuals = residuals_of(samples, windows, disturbances, damping, phase) if by_windows else None
     unexplained, shortest = residuals, 1
     if residuals is not None:
         shape = find_harmonics(residuals, max(0.5 * (samples.quantum_m or 0.0), rounding_m))
@@ -298,10 +299,13 @@ def _oscillation(
             by_chance=echoes_by_chance(samples.flags, windows, CLIP_SIGMAS),
         ),
         scene_findings(scene, effects),
-        fit_findings(fitted.full, solved),
+        fit_findings(fitted, refused),
         clock_findings(track, instrument),
     )
-    motion = Oscillation(windows, disturbances, damping, phase, rest, waveform, fitted.full, part.cycles, derived)
+    waveform = fitted.waveform
+    motion = Oscillation(
+        windows, disturbances, damping, phase, rest, waveform, fitted.method, fitted.why, part.cycles, derived
+    )
     return Analysis(track, scene, options, samples, motion, effects, findings, derived.estimates)
 
 

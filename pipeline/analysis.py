@@ -9,7 +9,7 @@ from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.averaged import Fitted
 from pipeline.motion.overdamped import Overdamped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.motion.phase import PhaseFit
+from pipeline.motion.averaged import Phase
 from pipeline.track import U8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
@@ -92,7 +92,7 @@ def echoes_by_chance(before: U8, demodulated: Demodulated, clip_sigmas: float) -
     )
 
 
-def find_clusters(track: Track, demodulated: Demodulated, phase: PhaseFit) -> Clusters:
+def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> Clusters:
     """Count clusters of false echoes.
 
     Parameters
@@ -100,7 +100,7 @@ def find_clusters(track: Track, demodulated: Demodulated, phase: PhaseFit) -> Cl
     track : Track
     demodulated : Demodulated
         The demodulation, with its flags and the residuals of flagged samples.
-    phase : PhaseFit
+    phase : Phase
 
     Notes
     -----

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.checks.residuals import Residuals
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.averaged import Fitted
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING

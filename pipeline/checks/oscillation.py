@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.averaged import Fitted
 from pipeline.numerics.quantity import amount, noun
 from pipeline.samples.condition import Conditioned
 from pipeline.track import UNUSABLE
@@ -67,7 +67,7 @@ def typical_miss(fitted: Fitted) -> float:
     The weights are the amplitudes of the windows.
     """
     demodulated, phase = fitted.demodulated, fitted.phase
-    expected = phase.damping.best.amplitude(demodulated.t - phase.t0) * np.exp(1j * phase.total(demodulated.t))
+    expected = fitted.damping.best.amplitude(demodulated.t - phase.t0) * np.exp(1j * phase.total(demodulated.t))
     own = demodulated.amplitude * np.exp(1j * demodulated.phase)
     size = np.abs(own)
     missed = np.abs(own - expected) / np.maximum(size, 1e-12 * float(size.max()))

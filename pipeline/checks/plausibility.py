@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.checks.misfit import Misfit
-from pipeline.motion.phase import PhaseFit
+from pipeline.motion.averaged import Phase
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import UNUSABLE
@@ -56,7 +56,7 @@ class Plausibility:
     misfits: tuple[Misfit, ...]
 
 
-def check_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase: PhaseFit) -> Plausibility:
+def check_plausibility(conditioned: Conditioned, demodulated: Demodulated, phase: Phase) -> Plausibility:
     """Compare a motion with the limits for a bob on a spring and for a distance sensor.
 
     Parameters

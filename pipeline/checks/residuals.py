@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.motion.phase import PhaseFit
+from pipeline.damping.select import Damping
+from pipeline.motion.averaged import Phase
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
@@ -63,7 +64,7 @@ class Residuals:
 
 
 def residuals_of(
-    conditioned: Conditioned, demodulated: Demodulated, disturbances: Disturbances, phase: PhaseFit
+    conditioned: Conditioned, demodulated: Demodulated, disturbances: Disturbances, damping: Damping, phase: Phase
 ) -> Residuals | None:
     """Return the residuals of a run; None if it has too few samples for the checks.
 
@@ -83,7 +84,7 @@ def residuals_of(
     if disturbances.modelled and locked:
         values = values + replace(disturbances.sideways, modes=locked).position(t[rows])
     step = seconds / int(rows[-1] - rows[0])
-    size = np.abs(phase.damping.best.amplitude(np.maximum(t[rows] - phase.t0, 0.0)))
+    size = np.abs(damping.best.amplitude(np.maximum(t[rows] - phase.t0, 0.0)))
     falls = bool(np.isfinite(size).all() and size[0] > 0.0)
     return Residuals(
         values,

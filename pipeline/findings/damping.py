@@ -57,9 +57,7 @@ def _reasons(damping: Damping) -> dict[str, str]:
     reasons = {reason: ", ".join(laws) for reason, laws in by_reason.items() if reason in ("misfit", "negative")}
     if "misfit" in by_reason:
         reasons["selected"] = f"{words_of(best.law)}{_chi2(best)}"
-    failed = [fit for fit in damping.fits.values() if fit.rejection == "not converged"]
-    unfitted = [f"{words_of(fit.law)}, no convergence after {fit.tried}" for fit in failed]
-    unfitted += [f"{name}, because {why}" for name, why in damping.unfitted.items()]
+    unfitted = [f"{name}, because {why}" for name, why in damping.unfitted.items()]
     return reasons | ({"unfitted": "; ".join(unfitted)} if unfitted else {})
 
 

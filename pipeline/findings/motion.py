@@ -13,11 +13,8 @@ from pipeline.checks.model import Contradiction, ModelCheck
 from pipeline.checks.plausibility import Plausibility
 from pipeline.checks.sensor import Smoothing
 from pipeline.findings.finding import Found
-from pipeline.motion.equation_fit import EquationFit, EquationMisfit
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.averaged import Fitted, Rest
 from pipeline.motion.overdamped import Overdamped
-from pipeline.motion.waveform import Rest
-from pipeline.motion.waveform_fit import FullFit
 from pipeline.numerics.quantity import amount
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import model_error
@@ -36,14 +33,14 @@ def overdamped_findings(found: Overdamped) -> Iterator[Found]:
         yield Found("overdamped", {**rates, "why": found.why})
 
 
-def fit_findings(full: FullFit | None, solved: EquationFit | EquationMisfit | None) -> Iterator[Found]:
-    """Yield what the fits of the whole waveform and of the equation of motion came to."""
-    if full is not None and not full.converged:
-        yield Found("not_converged", {"tried": full.tried})
-    if isinstance(solved, EquationFit):
-        yield Found("strongly_damped", {"why": solved.why})
-    elif solved is not None:
-        yield Found("not_converged", {"why": solved.why})
+def fit_findings(fitted: Fitted, misfit: str) -> Iterator[Found]:
+    """Yield what the fits of the samples came to; ``misfit`` says why the equation of motion was not fitted."""
+    if fitted.method == "equation":
+        yield Found("strongly_damped", {"why": fitted.why})
+    elif fitted.why:
+        yield Found("not_converged", {"tried": fitted.why})
+    if misfit:
+        yield Found("not_converged", {"why": misfit})
 
 
 def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Found]:
@@ -56,16 +53,16 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Foun
         lost = {"periods": demodulated.lost, "all_periods": demodulated.lost + windows}
         yield Found("missing_samples", lost, "warning")
     if phase.backbone is not None:
-        start = phase.damping.best.joint["A0"].value
+        start = fitted.damping.best.joint["A0"].value
         shift = phase.backbone.value * start**2 / omega
         # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
-        if abs(shift) > (phase.damping.best.rate_at_start() / omega) ** 2:
+        if abs(shift) > (fitted.damping.best.rate_at_start() / omega) ** 2:
             numbers = {"relative_shift": shift, "amplitude_m": start}
             yield Found("amplitude_dependent_frequency", {**numbers, "higher" if shift > 0 else "lower": abs(shift)})
     # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
     if rest.drifts and rest.drift_m > float(np.max(errors)):
-        yield _rest_drift(rest, phase.damping.best.damping_rate().u)
+        yield _rest_drift(rest, fitted.damping.best.damping_rate().u)
     yield from _modes(fitted, rest.mean.unit)
 
 

@@ -154,7 +154,7 @@ def _searched(
         # A copy, because MINPACK overwrites the first array that it receives.
         return residual.copy() if at.tobytes() == start else residuals(at)
 
-    @_remembering
+    @remembering
     def slopes(at: F8) -> F8:
         slope = np.asarray(jacobian(at), np.float64)
         if not np.isfinite(slope).all():
@@ -195,18 +195,6 @@ def _judged(values: F8, residual: F8, slope: F8, largest: F8, steps: int, precis
     return _failed(values, residual, f"{ended}: {_shown(values)}", steps)
 
 
-def evaluated_once(both: Callable[[F8], tuple[F8, F8]]) -> tuple[Callable[[F8], F8], Callable[[F8], F8]]:
-    """Split a function that evaluates residuals and Jacobian together into two functions.
-
-    Parameters
-    ----------
-    both : callable
-        Maps (p,) to (n,) and (n, p). Its result for the last parameters is cached.
-    """
-    at = _remembering(both)
-    return lambda theta: at(theta)[0], lambda theta: at(theta)[1]
-
-
 def central_differences(function: Callable[[F8], F8], theta: F8) -> F8:
     """Return the derivatives (n, p) of a function from (p,) to (n,); steps are relative, and absolute near zero."""
     columns = []
@@ -219,7 +207,7 @@ def central_differences(function: Callable[[F8], F8], theta: F8) -> F8:
     return np.stack(columns, axis=1)
 
 
-def _remembering(function: Callable[[F8], T]) -> Callable[[F8], T]:
+def remembering(function: Callable[[F8], T]) -> Callable[[F8], T]:
     """Cache a function's result for its last parameters, because MINPACK's wrapper evaluates the start twice."""
     last: list[tuple[bytes, T]] = []
 

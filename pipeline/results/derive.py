@@ -21,8 +21,7 @@ from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Law, free_power
 from pipeline.damping.select import Damping
-from pipeline.motion.phase import PhaseFit
-from pipeline.motion.waveform import Rest
+from pipeline.motion.averaged import Phase, Rest
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.robust import mad_sigma
 from pipeline.registry.quantities import QUANTITIES
@@ -185,7 +184,7 @@ class Derived:
 def derive(
     demodulated: Demodulated,
     damping: Damping,
-    phase: PhaseFit,
+    phase: Phase,
     rest: Rest,
     scene: Scene,
     effects: tuple[Effect, ...],
@@ -370,7 +369,7 @@ _FORMULAS = (
 def _terms(
     demodulated: Demodulated,
     damping: Damping,
-    phase: PhaseFit,
+    phase: Phase,
     rest: Rest,
     scene: Scene,
     effects: tuple[Effect, ...],
@@ -544,7 +543,7 @@ def _of_law(fit: LawFit, elapsed: F8) -> tuple[F8, F8]:
     return values, np.stack([by_start, fit.slopes_of_rate(), by_size])
 
 
-def _start_phase(phase: PhaseFit, slope: Any, inputs: Inputs, dof: float) -> Any:
+def _start_phase(phase: Phase, slope: Any, inputs: Inputs, dof: float) -> Any:
     """Return the phase at the start, from the phase in the middle of the fitted line and the error of its slope."""
     omega, at_start = phase.angular_frequency, phase.phase
     way = phase.t0 - phase.middle

@@ -23,8 +23,7 @@ from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
-from pipeline.motion.phase import PhaseFit
-from pipeline.motion.waveform import Rest
+from pipeline.motion.averaged import Phase, Rest
 from pipeline.numerics.quantity import Unit, amount
 from pipeline.registry.effects import check_effect
 from pipeline.windows.disturbances import Disturbances
@@ -54,7 +53,7 @@ class Effect:
 def tabulate(
     scene: Scene,
     damping: Damping,
-    phase: PhaseFit,
+    phase: Phase,
     rest: Rest,
     *,
     noise_m: float,
@@ -190,7 +189,7 @@ def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[
     yield Effect("friction", None, mu, Unit(1, -1).of(unit), mu is not None, why)
 
 
-def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
+def _backbone(phase: Phase, damping: Damping) -> Effect:
     name = "amplitude_dependent_frequency"
     if phase.backbone is None:
         return Effect(name, None, None, "1", False, "a constant frequency describes the phase: an ideal spring's")
