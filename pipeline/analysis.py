@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
@@ -25,16 +25,15 @@ from pipeline.windows.cycles import Cycles
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Oscillation(Fitted):
-    """An oscillation, strongly damped or not: its fit and the results derived from it.
-
-    Parameters
-    ----------
-    cycles : Cycles
-    derived : Derived
-    """
+    """An oscillation, strongly damped or not: its fit and the results derived from it."""
 
     cycles: Cycles
     derived: Derived
+
+    @classmethod
+    def of(cls, fitted: Fitted, cycles: Cycles, derived: Derived) -> Oscillation:
+        """Return a fit with its results."""
+        return cls(**{each.name: getattr(fitted, each.name) for each in fields(fitted)}, cycles=cycles, derived=derived)
 
 
 @dataclass(frozen=True, slots=True)

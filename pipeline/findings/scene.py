@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
-from pipeline.findings.finding import Found
+from pipeline.registry.found import Found
 from pipeline.results.effects import Effect
 
 

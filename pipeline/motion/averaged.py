@@ -349,3 +349,18 @@ def wrapped(angle: float) -> float:
     """Return the angle in rad wrapped into (-pi, pi]."""
     turned = math.remainder(angle, 2.0 * math.pi)
     return math.pi if turned == -math.pi else turned
+
+
+def typical_miss(fitted: Fitted) -> float:
+    """Return the weighted median difference of windows from the fitted oscillation, over their amplitudes.
+
+    The weights are the amplitudes of the windows.
+    """
+    windows, phase = fitted.demodulated, fitted.phase
+    expected = fitted.damping.best.amplitude(windows.t - phase.t0) * np.exp(1j * phase.total(windows.t))
+    own = windows.amplitude * np.exp(1j * windows.phase)
+    size = np.abs(own)
+    missed = np.abs(own - expected) / np.maximum(size, 1e-12 * float(size.max()))
+    order = np.argsort(missed)
+    middle = int(np.searchsorted(np.cumsum(size[order]), 0.5 * float(size.sum())))
+    return float(missed[order][middle])

@@ -21,7 +21,7 @@ from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Law, free_power
 from pipeline.damping.select import Damping
-from pipeline.motion.averaged import Phase, Rest
+from pipeline.motion.averaged import Fitted, Phase
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.robust import mad_sigma
 from pipeline.registry.quantities import QUANTITIES
@@ -29,7 +29,7 @@ from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, estimate_of, function_of, joint_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
-from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
 # Relative standard uncertainty of a clock from the specification of its crystal: 50 ppm is the half-width of a
@@ -182,42 +182,16 @@ class Derived:
 
 
 def derive(
-    demodulated: Demodulated,
-    damping: Damping,
-    phase: Phase,
-    rest: Rest,
-    scene: Scene,
-    effects: tuple[Effect, ...],
-    *,
-    instrument: Instrument,
-    misfits: tuple[Misfit, ...] = (),
-    smoothing: SensorFilter | None = None,
+    track: Track, fitted: Fitted, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...] = ()
 ) -> Derived:
     """Calculate all results of a run and propagate their uncertainties.
 
-    Parameters
-    ----------
-    demodulated, damping, phase, rest
-        Outputs of the stages with the same names.
-    scene : Scene
-        The scene; results that depend on values missing in it are left out.
-    effects : tuple of Effect
-        The effects table, which says which masses are included.
-    instrument : Instrument
-        Clock and scale of the sensor.
-    misfits : tuple of Misfit
-        Contradictions between the record and its model; they are inputs of kind B with the mean zero.
-    smoothing : SensorFilter, optional
-        The filter of the sensor in the scene, for which amplitude and phase are corrected.
+    Results that depend on values missing in the scene are left out. The effects table says which masses are included.
+    Misfits are inputs of kind B with the mean zero. Amplitude and phase are corrected for the filter of the sensor that
+    the scene states.
 
-    Returns
-    -------
-    Derived
-
-    Notes
-    -----
-    Uncertainties are propagated to first order [1]_ by the ``uncertainties`` package, with one variable for each input.
-    The clock's rate r and the scale s of the distances are uncertain. The results are:
+    Uncertainties are propagated to first order (JCGM 100:2008) by the ``uncertainties`` package, with one variable for
+    each input. The clock's rate r and the scale s of the distances are uncertain. The results are:
 
     - frequency and period: :math:`\\omega = r\\omega_r`, with :math:`\\omega_r` from the record,
       :math:`f = \\omega/2\\pi` and :math:`T = 2\\pi/\\omega`;
@@ -231,7 +205,7 @@ def derive(
     - Reynolds number: :math:`Re = \\rho v_\\mathrm{rms} D/\\eta` for the whole record, and with
       :math:`\\omega A_0/\\sqrt 2` at its start;
     - Keulegan-Carpenter number: :math:`KC = 2\\pi A_0/D`;
-    - drag coefficient: :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
+    - drag coefficient: :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` (K. Lelas, R. Pezer, arXiv:2502.07458).
 
     If an acceleration of amplitude a is recorded, the amplitude of the displacement is
     :math:`a/(\\omega^2 + \\lambda^2)`; for a velocity it is :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`. Results that need
@@ -241,18 +215,11 @@ def derive(
     Results that depend on the damping law are averages over laws
     (:func:`pipeline.damping.average.average_over_laws`): :math:`x = \\sum_i w_i x_i` and
     :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
-
-    References
-    ----------
-    .. [1] JCGM 100:2008, "Guide to the expression of uncertainty in measurement".
-    .. [2] K. Lelas, R. Pezer, arXiv:2502.07458.
     """
     inputs = Inputs()
-    laws = _Laws(damping, inputs, demodulated)
-    unit = rest.mean.unit
-    terms, coefficients = _terms(
-        demodulated, damping, phase, rest, scene, effects, instrument, misfits, smoothing, laws, inputs
-    )
+    laws = _Laws(fitted.damping, inputs, fitted.demodulated)
+    unit = track.unit
+    terms, coefficients = _terms(track, fitted, scene, effects, misfits, laws, inputs)
     found: dict[str, tuple[Any, str]] = {}
     parts: dict[str, tuple[Any, str]] = {}
     for formula in _FORMULAS:
@@ -262,7 +229,7 @@ def derive(
             of_run[formula.name] = x, formula.unit_in(unit)
     parts |= {name: (terms[name], "") for name in ("rates", "lengths")}
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
-    law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == damping.selected else ""
+    law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == fitted.damping.selected else ""
     return Derived(
         estimates={name: budgets[name].estimate for name in found},
         coefficients={name: limited(laws.stated.law, name, budgets[name].estimate) for name in coefficients},
@@ -367,30 +334,27 @@ _FORMULAS = (
 
 
 def _terms(
-    demodulated: Demodulated,
-    damping: Damping,
-    phase: Phase,
-    rest: Rest,
+    track: Track,
+    fitted: Fitted,
     scene: Scene,
     effects: tuple[Effect, ...],
-    instrument: Instrument,
     misfits: tuple[Misfit, ...],
-    smoothing: SensorFilter | None,
     laws: _Laws,
     inputs: Inputs,
 ) -> tuple[dict[str, Any], dict[str, tuple[Any, str]]]:
     """Return the terms of the formulas by name, as far as record and scene give them, and the coefficients."""
+    demodulated, damping, phase, rest = fitted.demodulated, fitted.damping, fitted.phase, fitted.rest
+    instrument, unit = Instrument.of(track), track.unit
     ambient = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
     amiss = _Amiss(misfits, inputs)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
-    unit = rest.mean.unit
     scale = ambient.scale(instrument) if unit == "m" else 1.0
     windows = phase.residual.size
     # With one or two windows the uncertainty comes from the samples.
     free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
     omega = slope * rate
-    filtered = _Filtered(smoothing, omega, inputs)
+    filtered = _Filtered(SensorFilter.of(scene, track.rate_hz), omega, inputs)
     lengths = scale * amiss.over("amplitude", laws.values[0]) / filtered.gain
     rates = rate * amiss.over("damping_rate", laws.values[1])
     start = laws.start * lengths

@@ -1,4 +1,4 @@
-"""Oscillation: whether a motion whose spectrum has a peak really is an oscillation."""
+"""Whether a motion whose spectrum has a peak really is an oscillation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from pipeline.motion.averaged import Fitted
 from pipeline.numerics.quantity import amount, noun
 from pipeline.samples.condition import Conditioned
 from pipeline.track import UNUSABLE
@@ -24,11 +23,6 @@ def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOsci
     """Return why the motion is no oscillation, although its spectrum has a peak; None if it is one.
 
     A step or a ramp has a peak in its spectrum too.
-
-    Parameters
-    ----------
-    conditioned, demodulated
-        Outputs of the stages with the same names.
     """
     most = demodulated.amplitude.size * 9 // 10
     size = float(np.partition(demodulated.amplitude, most)[most])
@@ -59,18 +53,3 @@ def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
     bins = ((turns - np.floor(turns)) * FOLDED).astype(np.int64) % FOLDED
     means = np.bincount(bins, left, FOLDED) / np.maximum(np.bincount(bins, minlength=FOLDED), 1)
     return demodulated.t.size >= 4 and float(np.var(left - means[bins])) < ALIKE * float(np.var(left))
-
-
-def typical_miss(fitted: Fitted) -> float:
-    """Return the weighted median difference of windows from the fitted oscillation, over their amplitudes.
-
-    The weights are the amplitudes of the windows.
-    """
-    demodulated, phase = fitted.demodulated, fitted.phase
-    expected = fitted.damping.best.amplitude(demodulated.t - phase.t0) * np.exp(1j * phase.total(demodulated.t))
-    own = demodulated.amplitude * np.exp(1j * demodulated.phase)
-    size = np.abs(own)
-    missed = np.abs(own - expected) / np.maximum(size, 1e-12 * float(size.max()))
-    order = np.argsort(missed)
-    middle = int(np.searchsorted(np.cumsum(size[order]), 0.5 * float(size.sum())))
-    return float(missed[order][middle])
