@@ -214,7 +214,7 @@ def remembering(function: Callable[[F8], T]) -> Callable[[F8], T]:
     def at(theta: F8) -> T:
         key = theta.tobytes()
         if not last or last[0][0] != key:
-            last[:] = [(key, function(theta))]
+            last[:] = [(key, function(theta.copy()))]  # MINPACK overwrites its parameters
         return last[0][1]
 
     return at
