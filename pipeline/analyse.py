@@ -69,6 +69,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
 
     Examples
     --------
+    >>> import numpy as np
     >>> t = np.arange(1000) / 100
     >>> rng = np.random.default_rng(1)
     >>> y = 0.2 + 0.05 * np.exp(-0.01 * t) * np.cos(8.3 * t) + 1e-4 * rng.standard_normal(1000)

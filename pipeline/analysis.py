@@ -38,15 +38,9 @@ class Oscillation(Fitted):
 
 @dataclass(frozen=True, slots=True)
 class Still:
-    """A recording without a motion that the stages can fit.
+    """A recording without a motion that the stages can fit."""
 
-    Parameters
-    ----------
-    why : str
-        The reason, one sentence.
-    """
-
-    why: str
+    why: str  # the reason, one sentence
 
 
 Motion = Oscillation | Overdamped | Still

@@ -103,16 +103,6 @@ def choose(fits: Mapping[str, Weighed], evidence: float, span: Callable[[str], F
 
     If all laws are rejected, the law that fits best is selected and no law is admissible.
 
-    Parameters
-    ----------
-    fits : mapping of str to fit
-    evidence : float
-        A law is not admissible if its BIC exceeds the lowest BIC by more than this.
-    span : callable
-        Returns the largest and the smallest amplitude, m, of a law over the points.
-
-    Notes
-    -----
     A law that contains the selected one as a special case is left out of the admissible laws on two conditions. Its
     further coefficient improves nothing: its BIC is higher by more than 2. Its damping, with twice its uncertainty, is
     within a tenth of the simpler law's at both ends of the span. The lower end of the span is at most a third of the

@@ -38,32 +38,17 @@ STEPS = 60  # maximum number of trial steps: of the fits that converged on 96 re
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """The result of a fit.
+    """The result of a fit."""
 
-    Parameters
-    ----------
-    values : (p,) float64
-    covariance : (p, p) float64
-        :math:`(J^T J)^{-1}`, for residuals in units of their standard uncertainties. Multiply it by
-        ``cost / (n - p)`` if the uncertainties are known only up to a factor. NaN if the fit has not converged.
-    residual : (n,) float64
-        Residuals at ``values``.
-    cost : float
-        Sum of squared residuals.
-    converged : bool
-    tried : str
-        What was done and how it ended, worded for a finding.
-    steps : int
-        Number of evaluations of the residuals.
-    """
-
-    values: F8
+    values: F8  # (p,)
+    # (p, p) :math:`(J^T J)^{-1}`, for residuals in units of their standard uncertainties. Multiply it by ``cost / (n -
+    # p)`` if the uncertainties are known only up to a factor. NaN if the fit has not converged.
     covariance: F8
-    residual: F8
-    cost: float
+    residual: F8  # (n,) residuals at ``values``
+    cost: float  # sum of squared residuals
     converged: bool
-    tried: str
-    steps: int
+    tried: str  # what was done and how it ended, worded for a finding
+    steps: int  # number of evaluations of the residuals
 
 
 class _NoDerivativeError(ArithmeticError):
@@ -87,45 +72,20 @@ def minimise(
 ) -> Fit:
     """Find the parameters that minimise the sum of squared residuals.
 
-    Parameters
-    ----------
-    residuals : callable
-        Maps (p,) float64 to (n,) float64: the difference of model and data over the standard uncertainty. It may
-        return non-finite values where the model has no value; such steps are not taken.
-    start : (p,) array_like
-    jacobian : callable, optional
-        Maps (p,) to (n, p): derivatives of the residuals. The default is central differences, which are accurate to
-        about ten digits.
-    precision : float
-        Stop when the remaining step is this fraction of the parameters' standard uncertainties, as estimated from the
-        residuals; 1e-8 is for reference values.
-    steps : int
-        Maximum number of trial steps; each takes one evaluation of the residuals.
+    Check ``converged`` before using the numbers. ``residuals`` gives the difference of model and data over the standard
+    uncertainty, at least as many as parameters. It may return non-finite values where the model has no value; such
+    steps are not taken. ``jacobian`` is by central differences if there is none, which are accurate to about ten
+    digits. The search stops when the remaining step is ``precision`` of the parameters' standard uncertainties, as
+    estimated from the residuals; 1e-8 is for reference values.
 
-    Returns
-    -------
-    Fit
-        Check ``converged`` before using its numbers.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer residuals than parameters, or no parameters. The caller can rule this out beforehand.
-
-    Notes
-    -----
     Where the relative offset is ``precision``, the remaining step lowers the sum of squares by the fraction
     :math:`\\mathrm{precision}^2 p/(n-p)`, which is the search's tolerance. The end is judged by the offset itself [1]_:
     the length of the residuals' projection on the columns of the Jacobian, relative to the length of the residuals.
     It does not depend on the units or scales of the parameters. An offset within rounding error is accepted too.
 
-    References
-    ----------
     .. [1] D. M. Bates, D. G. Watts, "A relative offset orthogonality convergence criterion for nonlinear least
        squares", Technometrics 23 (1981) 179, doi:10.1080/00401706.1981.10486257.
 
-    Examples
-    --------
     >>> t = np.linspace(0, 5, 50)
     >>> fit = minimise(lambda b: b[0] * np.exp(-b[1] * t) - 3.0 * np.exp(-0.7 * t), [1.0, 0.0])
     >>> fit.converged, fit.values.round(9)

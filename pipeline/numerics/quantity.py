@@ -9,21 +9,11 @@ from fractions import Fraction
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """Name and display unit of the values in one unit.
+    """Name and display unit of the values in one unit."""
 
-    Parameters
-    ----------
-    noun : str
-        Name of one value.
-    unit : str
-        Unit in which sentences and figures write the value.
-    factor : float
-        Factor from the record's unit to ``unit``.
-    """
-
-    noun: str
-    unit: str
-    factor: float
+    noun: str  # name of one value
+    unit: str  # unit in which sentences and figures write the value
+    factor: float  # factor from the record's unit to ``unit``
 
 
 SHOWN = {
@@ -90,8 +80,6 @@ class Unit:
 def number(value: float, form: str = "") -> str:
     """Write a number, by default an integer or three significant digits, without an exponent if it has a usual size.
 
-    Examples
-    --------
     >>> number(12172), number(5.98123), number(23164.2), number(140, ".2g"), number(3e-5, ".1g"), number(1e-9)
     ('12,172', '5.98', '23,200', '140', '0.00003', '1e-09')
     """
@@ -106,8 +94,6 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
 
     In other units than m, where typical sizes are unknown, four digits replace a fixed number of decimals.
 
-    Examples
-    --------
     >>> amount(0.00234, "m"), amount(23.945, "m", ".4g"), amount(0.0234, "rad"), amount(1.2345678, "V", ".1f")
     ('2.3 mm', '23.95 m', '0.023 rad', '1.235 V')
     """
@@ -127,8 +113,6 @@ def noun(unit: str) -> str:
 def plural(unit: str) -> str:
     """Return the plural noun for values of a record in this unit.
 
-    Examples
-    --------
     >>> plural("m"), plural("rad/s")
     ('distances', 'angular velocities')
     """

@@ -40,33 +40,22 @@ U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated w
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """The results in Table 1; quantities that only curves and comparisons need are calculated on access.
+    """The results in Table 1; quantities that only curves and comparisons need are calculated on access."""
 
-    Parameters
-    ----------
-    estimates : mapping of str to Estimate
-        Estimates with all known contributions to the uncertainty, including clock and scale.
-    coefficients : mapping of str to Estimate
-        Coefficients of the law ``laws[0]``, with all known contributions; coefficients that are not determined are
-        upper limits. The law is a stated one if there is one. Otherwise it is linear and quadratic drag together if the
-        record allows it, or the selected law.
-    budgets : mapping of str to Budget
-        Contributions of the inputs to every estimate and coefficient.
-    laws : tuple of Weighted
-        The laws over which amplitude and damping rate are averaged; the coefficients are those of the first law.
-    parts : mapping of str to (variable, str)
-        Variables with units, from which the properties below are read; those that the scene does not determine are
-        missing.
-    law : str
-        Name of the law by which the results are stated; empty if they are an average over laws. They count as an
-        average also if the record selects one drag and the results use both, of which it is a special case.
-    """
-
+    # Estimates with all known contributions to the uncertainty, including clock and scale.
     estimates: Mapping[str, Estimate]
+    # Coefficients of the law ``laws[0]``, with all known contributions; coefficients that are not determined are upper
+    # limits. The law is a stated one if there is one. Otherwise it is linear and quadratic drag together if the record
+    # allows it, or the selected law.
     coefficients: Mapping[str, Estimate]
-    budgets: Mapping[str, Budget]
+    budgets: Mapping[str, Budget]  # contributions of the inputs to every estimate and coefficient
+    # The laws over which amplitude and damping rate are averaged; the coefficients are those of the first law.
     laws: tuple[Weighted, ...]
+    # Variables with units, from which the properties below are read; those that the scene does not determine are
+    # missing.
     parts: Mapping[str, tuple[Any, str]]
+    # Name of the law by which the results are stated; empty if they are an average over laws. They count as an average
+    # also if the record selects one drag and the results use both, of which it is a special case.
     law: str
 
     @cached_property
@@ -155,12 +144,6 @@ class Derived:
         """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known.
 
         Return None if the record does not determine the displacement.
-
-        Parameters
-        ----------
-        damping : Damping
-        demodulated : Demodulated
-            Demodulation of the same run.
         """
         unit = "J/kg" if self.effective_mass_kg is None else "J"
         if self.half_stiffness is None:
@@ -168,14 +151,7 @@ class Derived:
         return energy_curve(damping, demodulated, self.half_stiffness, self.laws, unit)
 
     def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
-        """Return the drag coefficient against amplitude with its band; None if it is not determined.
-
-        Parameters
-        ----------
-        damping : Damping
-        demodulated : Demodulated
-            Demodulation of the same run.
-        """
+        """Return the drag coefficient against amplitude with its band; None if it is not determined."""
         if self.drag_length is None:
             return None
         return drag_curve(damping, demodulated, self.drag_length, self.laws)
@@ -247,22 +223,14 @@ def limited(law: Law, name: str, estimate: Estimate) -> Estimate:
 
 @dataclass(frozen=True)
 class _Formula:
-    """One row of the table: a quantity and its expression.
+    """One row of the table: a quantity and its expression."""
 
-    Parameters
-    ----------
-    name : str
-        Name of an estimate in :data:`pipeline.registry.quantities.QUANTITIES`, or of an entry of
-        :attr:`Derived.parts`.
-    expression : callable
-        Function whose parameters are the names of the terms that it needs, from :func:`_terms` or from rows above. If a
-        term is missing, the quantity is left out.
-    units : mapping of str to str
-        Unit of the quantity for each unit of the record, if it differs from the registry.
-    """
-
+    # Name of an estimate in :data:`pipeline.registry.quantities.QUANTITIES`, or of an entry of :attr:`Derived.parts`.
     name: str
+    # Function whose parameters are the names of the terms that it needs, from :func:`_terms` or from rows above. If a
+    # term is missing, the quantity is left out.
     expression: Callable[..., Any]
+    # Unit of the quantity for each unit of the record, if it differs from the registry.
     units: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property

@@ -23,24 +23,16 @@ MOST_LEFT = 1.5  # residual over noise above which the fit misses a part as larg
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Smoothed:
-    """The bob's motion along the line of sight.
+    """The bob's motion along the line of sight."""
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        The track's times.
-    position, u_position : (n,) float64, m
-        Distance from the sensor without sideways modes.
-    velocity, u_velocity : (n,) float64, m/s
-        Velocity of the oscillation about the rest position.
-    acceleration, u_acceleration : (n,) float64, m/s^2
-    """
-
-    t: F8
+    t: F8  # (n,) s, the track's times
+    # position, u_position: (n,) m, distance from the sensor without sideways modes.
     position: F8
     u_position: F8
+    # velocity, u_velocity: (n,) m/s, velocity of the oscillation about the rest position.
     velocity: F8
     u_velocity: F8
+    # acceleration, u_acceleration: (n,) m/s^2.
     acceleration: F8
     u_acceleration: F8
 
