@@ -22,7 +22,7 @@ from pipeline.findings.parts import part_findings
 from pipeline.findings.samples import clock_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion.averaged import Fitted, fit_windows, typical_miss
-from pipeline.motion.by_samples import fit_samples
+from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
 from pipeline.motion.overdamped import LEAST_DAMPING, Overdamped, find_overdamped
 from pipeline.motion.two_modes import find_two_modes
@@ -138,7 +138,8 @@ def _averaged(
     windows: Demodulated, disturbances: Disturbances, laws: Damping, samples: Conditioned, options: Options
 ) -> Fitted:
     fitted = fit_windows(windows, disturbances, laws)
-    return fit_samples(fitted, samples) if options.rows == "samples" else fitted
+    by_samples = options.rows == "samples" or windows.t.size < FEW_WINDOWS
+    return fit_samples(fitted, samples) if by_samples else fitted
 
 
 def _may_relax(fitted: Fitted, laws: Damping) -> bool:

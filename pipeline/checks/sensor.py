@@ -14,6 +14,9 @@ from pipeline.track import F8
 
 ALIKE = 0.4  # correlation of neighbouring residuals that shows a filter: a running mean over two samples gives 0.5
 STEADY = 2.0  # maximum ratio of the covariances in the halves: noise is constant, residuals of the motion decay
+# Minimum fall of the correlation from one sample to the next, over the mean fall within the correlation length: 1 for a
+# running mean, 2 for a lag. A motion or a curve that is smooth by itself falls far less from the first to the second.
+CUSP = 0.5
 EQUAL = 0.4  # share of neighbours with the same value above which readings are held: over two samples it is a half
 LINES = 3.6  # twice the samples per bend above which readings are joined by lines: noise bends nearly every sample
 
@@ -68,8 +71,14 @@ def smoothed(residual: Residual) -> Outcome | None:
     A running mean over N samples correlates white noise over N samples, :math:`1 + 2\\sum\\rho_l = N`, takes
     :math:`(N\\omega h)^2/24` of the amplitude and is :math:`Nh/2` late. A first-order lag with the same sum takes
     three times as much and is as late. The correlations do not tell which it is, so the larger loss is taken. A filter
-    in the scene may explain a quarter of it.
+    in the scene may explain a quarter of it, and a scene that states no filter is believed.
+
+    A filter cannot make more of noise than its own correlation, which falls from the first sample on. Where it does
+    not, the residual is not noise that a filter has smoothed, and shows no filter.
     """
+    stated = residual.filter
+    if stated is not None and stated.mean_samples.value == 1.0 and stated.lag_s.value == 0.0:
+        return None
     if not residual.enough or math.isinf(residual.lags) or not residual.noisy:
         return None
     whole, mask = residual.on_grid()
@@ -79,10 +88,12 @@ def smoothed(residual: Residual) -> Outcome | None:
     if not (variance > 0.0 and first > ALIKE * variance and 0.0 < max(each) < STEADY * min(each)):
         return None
     count, turn = correlation_length(whole), residual.turn
+    if (1.0 - first / variance) * count < CUSP:
+        return None
     # The fit of a window has taken away three of its L/N independent values.
     count /= max(1.0 - 3.0 * count / residual.per_window, 0.25)
     loss = min((count * turn) ** 2 / 8.0, 1.0)
-    expected = 0.0 if residual.filter is None else 1.0 - residual.filter.gain(turn / residual.step_s)
+    expected = 0.0 if stated is None else 1.0 - stated.gain(turn / residual.step_s)
     u_amplitude_m = residual.fitted.damping.best.joint["A0"].u
     if loss * residual.amplitude_m < 0.5 * u_amplitude_m or loss < 4.0 * expected:
         return None

@@ -21,7 +21,7 @@ from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated, model_error
 
-FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law
+FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law; with fewer the samples do
 STEPS = 25  # maximum number of evaluations of the model in one fit
 # A law that is fitted in addition to the selected and the admissible ones, even if the windows contradict it: the
 # single exponential is the usual reference for comparisons.
@@ -48,7 +48,7 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
     """
     windows, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
     few = windows.t.size < FEW_WINDOWS and not damping.by_statement
-    laws, thetas = _short(windows, damping.t0) if few else _considered(damping)
+    laws, thetas = _short(windows, damping) if few else _considered(damping)
     first, *others = laws
     unit_m, level = abs(float(thetas[first][0])) or 1.0, fitted.rest.mean.value
     rows = _rows(fitted, samples, level, unit_m)
@@ -98,11 +98,16 @@ def _considered(damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
     return {n: x.law for n, x in fits.items()}, {n: x.joint.values for n, x in fits.items()}
 
 
-def _short(windows: Demodulated, t0: float) -> tuple[dict[str, Law], dict[str, F8]]:
-    """Return linear drag and no damping, which are all that a record of few periods can distinguish."""
-    amplitude, rate = float(windows.amplitude[0]), float(windows.decay[0])
-    start = amplitude * math.exp(rate * (float(windows.t[0]) - t0))
+def _short(windows: Demodulated, damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
+    """Return linear drag and no damping, which are all that a record of few periods can distinguish.
+
+    A built-in law that is stated is fitted as well, although the windows did not determine it.
+    """
+    amplitude, rate, t = float(windows.amplitude[0]), float(windows.decay[0]), windows.t - damping.t0
+    start = amplitude * math.exp(rate * float(t[0]))
     thetas = {"linear": np.array([start, rate]), "none": np.array([amplitude])}
+    if damping.stated in LAWS.keys() - thetas.keys():
+        thetas[damping.stated] = LAWS[damping.stated].guess(t, windows.amplitude)
     return {name: LAWS[name] for name in thetas}, thetas
 
 
@@ -166,9 +171,12 @@ def _refined(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
 
 
 def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
-    """Select no damping or linear drag by BIC; the noise is unknown, so it uses the logarithm of the residuals."""
+    """Select no damping or linear drag by BIC; the noise is unknown, so it uses the logarithm of the residuals.
+
+    A stated law is selected if it was fitted.
+    """
     found = {}
-    for name in (name for name in ("none", "linear") if name in fits):
+    for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
         one, law = fits[name], LAWS[name]
         size, count = len(law.parameters), float(one.fit.residual.size)
         joint = joint_of(law, one.values[:size], one.covariance[:size, :size], damping.best.joint.units[0])
@@ -177,7 +185,10 @@ def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
     least = min(one.bic for one in found.values())
     selected = next(name for name, one in found.items() if one.bic - least < BARE_MENTION)
     admissible = tuple(name for name, one in found.items() if one.bic - least <= EVIDENCE)
-    return replace(damping, fits=found, selected=selected, admissible=admissible)
+    if damping.stated in found:
+        selected, admissible = damping.stated, (damping.stated,)
+    unfitted = {name: why for name, why in damping.unfitted.items() if name not in found}
+    return replace(damping, fits=found, selected=selected, admissible=admissible, unfitted=unfitted)
 
 
 def _phase(phase: Phase, windows: Demodulated, best: _OfLaw, unit_m: float) -> Phase:
