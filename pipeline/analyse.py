@@ -128,9 +128,8 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
 
 def _uncut(part: FreePart) -> tuple[Conditioned, Demodulated]:
     """Return the samples without the crests that are cut off, and their windows."""
-    samples, windows = part.samples, demodulate(part.samples, part.cycles)
-    if (cut := find_cuts(samples, part.cycles, windows)) is None:
-        return samples, windows
+    if (cut := find_cuts(part.samples, part.cycles, part.windows)) is None:
+        return part.samples, part.windows
     return cut, demodulate(cut, part.cycles)
 
 

@@ -19,7 +19,7 @@ from pipeline.numerics.least_squares import Fit, central_differences
 from pipeline.numerics.regression import solve_weighted
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality
-from pipeline.windows.demodulate import Demodulated, model_error
+from pipeline.windows.demodulate import Demodulated, model_error, with_prior
 
 FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law; with fewer the samples do
 STEPS = 25  # maximum number of evaluations of the model in one fit
@@ -70,13 +70,15 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
         start = found.values
     if not found.converged:
         return replace(fitted, why=found.tried)
-    fits = {first: _described(model, found, rows, unit_m, windows.t.size)}
+    stated, count = samples.track.sigma_m, windows.t.size
+    stated = None if stated is None else stated / unit_m
+    fits = {first: _described(model, found, rows, unit_m, count, stated)}
     tail = found.values[len(model.law.parameters) :]
     for name in others:
         other = replace(model, law=laws[name])
         own = fit(other, rows, np.concatenate([in_units(laws[name], thetas[name], length_m=unit_m), tail]), STEPS)
         if own.converged:
-            fits[name] = _described(other, own, rows, unit_m, windows.t.size)
+            fits[name] = _described(other, own, rows, unit_m, count, stated)
     damping = _selected(damping, fits) if few else _refined(damping, fits)
     best = fits[damping.selected]
     flags = fitted.disturbances.conditioned.flags.copy()
@@ -145,8 +147,8 @@ def _model(fitted: Fitted, rows: Rows, law: Law) -> Averaged:
     )
 
 
-def _described(model: Averaged, found: Fit, rows: Rows, unit_m: float, windows: int) -> _OfLaw:
-    """Return a fit with its values and covariance in the record's unit."""
+def _described(model: Averaged, found: Fit, rows: Rows, unit_m: float, windows: int, stated: float | None) -> _OfLaw:
+    """Return a fit with its values and covariance in the record's unit; a noise may be stated for its samples."""
 
     def in_metres(values: F8) -> F8:
         theta, turning, rest = model.split(values)
@@ -155,7 +157,7 @@ def _described(model: Averaged, found: Fit, rows: Rows, unit_m: float, windows: 
 
     count = found.values.size + (0 if rows.columns is None else rows.columns.shape[1])
     dof = max(float(np.count_nonzero(rows.used) - count), 1.0)
-    covariance = covariance_of(found, model, rows, math.sqrt(found.cost / dof), windows)
+    covariance = covariance_of(found, model, rows, with_prior(math.sqrt(found.cost / dof), dof, stated), windows)
     turn = central_differences(in_metres, found.values)
     return _OfLaw(model, found, in_metres(found.values), turn @ covariance @ turn.T, dof)
 

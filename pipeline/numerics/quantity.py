@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from functools import cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,22 +60,27 @@ class Unit:
         >>> Unit(1, -1, less="n").of("rad/s"), Unit(-2, -1, radian=1).of("1")
         ('(rad/s)^(1-n)/s', 'rad/s')
         """
-        symbol, _, divisor = unit.partition("/")
-        powers, above, below = {"rad": self.radian}, list[str](), list[str]()
-        seconds = self.second
-        if unit != "1" and self.less:
-            above.append(f"{f'({unit})' if divisor else unit}^({self.metre:g}-{self.less})")
-        elif unit != "1":
-            powers[symbol] = powers.get(symbol, 0.0) + self.metre
-            seconds -= self.metre * {"": 0.0, "s": 1.0, "s^2": 2.0}[divisor]
-        for name, exponent in (powers | {"s": seconds}).items():
-            size = Fraction(abs(exponent)).limit_denominator(1000)
-            if exponent:
-                (above if exponent > 0.0 else below).append(name if size == 1 else f"{name}^{size}")
-        if not below:
-            return " ".join(above) or ("1" if self.metre else "")
-        divided_by = below[0] if len(below) == 1 else f"({' '.join(below)})"
-        return f"{' '.join(above) or '1'}/{divided_by}"
+        return _of(self, unit)
+
+
+@cache
+def _of(each: Unit, unit: str) -> str:
+    symbol, _, divisor = unit.partition("/")
+    powers, above, below = {"rad": each.radian}, list[str](), list[str]()
+    seconds = each.second
+    if unit != "1" and each.less:
+        above.append(f"{f'({unit})' if divisor else unit}^({each.metre:g}-{each.less})")
+    elif unit != "1":
+        powers[symbol] = powers.get(symbol, 0.0) + each.metre
+        seconds -= each.metre * {"": 0.0, "s": 1.0, "s^2": 2.0}[divisor]
+    for name, exponent in (powers | {"s": seconds}).items():
+        size = Fraction(abs(exponent)).limit_denominator(1000)
+        if exponent:
+            (above if exponent > 0.0 else below).append(name if size == 1 else f"{name}^{size}")
+    if not below:
+        return " ".join(above) or ("1" if each.metre else "")
+    divided_by = below[0] if len(below) == 1 else f"({' '.join(below)})"
+    return f"{' '.join(above) or '1'}/{divided_by}"
 
 
 def number(value: float, form: str = "") -> str:

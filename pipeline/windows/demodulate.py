@@ -204,7 +204,7 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     squares = np.sum(weights * solution.residual**2, axis=1)
     noise = np.sqrt(squares / np.maximum(counts - 3, 1))
     pooled = math.sqrt(np.sum(squares[good]) / max(np.sum(counts[good] - 3), 1))
-    pooled = _with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
+    pooled = with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
     # A window's own noise is uncertain by about a tenth, so it is shrunk towards the record's.
     prior = 30.0
     shrunk = ((prior * pooled**2 + counts * noise**2) / (prior + counts))[good]
@@ -235,7 +235,7 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     )
 
 
-def _with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
+def with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
     """Return the record's noise, combined with the noise that sensor or scene states if the two agree.
 
     A stated noise counts as much as thirty samples, so it matters only to records of a few periods.

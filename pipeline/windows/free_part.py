@@ -12,7 +12,7 @@ from pipeline.samples.condition import Conditioned, condition
 from pipeline.samples.stopping import moving_part
 from pipeline.track import Quality
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
-from pipeline.windows.demodulate import demodulate
+from pipeline.windows.demodulate import Demodulated, demodulate
 from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part, long_after_stop
 from pipeline.windows.sinusoid import check_sinusoid
 
@@ -32,6 +32,7 @@ class FreePart:
     samples: Conditioned
     segments: Segments | None
     cycles: Cycles
+    windows: Demodulated
     stopped: bool
 
 
@@ -62,8 +63,8 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
             return cycles
         samples, segments = trial, later.within(segments)
         cycles = trimmed
+    windows = demodulate(samples, cycles)
     for _ in range(MOST_PARTS):
-        windows = demodulate(samples, cycles)
         outside = find_free_part(samples, windows)
         if outside is None:
             break
@@ -72,7 +73,8 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
         if isinstance(trimmed, NoOscillation):
             break
         samples, segments, cycles, stopped = shorter, outside.within(segments), trimmed, stops
-    return FreePart(samples, segments, cycles, stopped)
+        windows = demodulate(samples, cycles)
+    return FreePart(samples, segments, cycles, windows, stopped)
 
 
 def _cycles(samples: Conditioned, early: float, late: float) -> tuple[Cycles | NoOscillation, bool]:
