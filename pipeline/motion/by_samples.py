@@ -22,6 +22,7 @@ from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated, model_error, with_prior
 
 FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law; with fewer the samples do
+ROUNDS = 5  # maximum number of rounds of clipping and refitting
 STEPS = 25  # maximum number of evaluations of the model in one fit
 # A law that is fitted in addition to the selected and the admissible ones, even if the windows contradict it: the
 # single exponential is the usual reference for comparisons.
@@ -64,9 +65,9 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
     for _ in range(1 if model.area is None else 2):
         if model.area is not None:  # until the last round the backbone's column belongs to other amplitudes
             model = replace(model, area=area_of(model.law, model.split(start)[0], model.t0, model.middle, model.last))
-        found, rows = clipped(
-            model, rows, start, least_m=least_m / unit_m, noise_m=windows.noise_m / unit_m, steps=STEPS
-        )
+        # Few periods cannot tell false echoes from a motion that the model does not describe; the windows' stand.
+        scale = {"least_m": least_m / unit_m, "noise_m": windows.noise_m / unit_m}
+        found, rows = clipped(model, rows, start, **scale, rounds=1 if few else ROUNDS, steps=STEPS)
         start = found.values
     if not found.converged:
         return replace(fitted, why=found.tried)
