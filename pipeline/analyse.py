@@ -1,7 +1,7 @@
 """The analysis: from a track to estimates and findings, one stage after the other.
 
-Read :func:`analyse` from top to bottom. Each stage is a function whose result is a noun. A sample is flagged by
-the conditioning, by the windows and by the fit, which only add flags.
+Read :func:`analyse` from top to bottom. Each stage is a function whose result is a noun. A sample is flagged in three
+places: by the conditioning, by the windows and by the last fit, which may take back only a window's false echo.
 """
 
 from __future__ import annotations

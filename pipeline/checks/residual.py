@@ -46,7 +46,13 @@ class Residual:
     phase: F8  # of the oscillation, rad
     relative: F8 | None  # amplitude over that at the first sample; None if it cannot be calculated
     rows: NDArray[np.int64]  # indices of the samples
+    noise_m: float  # standard deviation of one sample
+    rounding_m: float  # error of the sinusoid of a window, which is larger than the noise of computed records
+    amplitude_m: float  # mean amplitude
     seconds: float
+    step_s: float  # mean time between samples
+    turn: float  # increase of the phase from sample to sample, rad
+    per_window: int  # number of samples in a window
     lags: float = 1.0  # number of samples up to which correlations are explained
 
     @property
@@ -55,40 +61,9 @@ class Residual:
         return self.values.size >= FEWEST and self.seconds > 0.0
 
     @property
-    def noise_m(self) -> float:
-        """Standard deviation of one sample."""
-        return self.fitted.demodulated.noise_m
-
-    @property
-    def rounding_m(self) -> float:
-        """Error of the sinusoid of a window, which is larger than the noise of computed records."""
-        windows = self.fitted.demodulated
-        return median(model_error(windows.amplitude, windows.decay, windows.angular_frequency))
-
-    @property
     def noisy(self) -> bool:
         """Whether there is noise, and not only rounding or coarse steps, which the finding "quantised" reports."""
         return self.noise_m > max(self.rounding_m, (self.samples.quantum_m or 0.0) / COARSE)
-
-    @property
-    def amplitude_m(self) -> float:
-        """Mean amplitude."""
-        return float(np.mean(np.abs(self.fitted.demodulated.amplitude)))
-
-    @property
-    def step_s(self) -> float:
-        """Mean time between samples."""
-        return self.seconds / int(self.rows[-1] - self.rows[0])
-
-    @property
-    def turn(self) -> float:
-        """Increase of the phase from sample to sample, rad."""
-        return self.fitted.phase.angular_frequency.value * self.step_s
-
-    @property
-    def per_window(self) -> int:
-        """Number of samples in a window."""
-        return self.values.size // self.fitted.demodulated.t.size
 
     def on_grid(self) -> tuple[F8, F8]:
         """Return the residual of all samples (n,), 0 where none was used, and 1 where one was used."""
@@ -112,5 +87,20 @@ def residual_of(samples: Conditioned, fitted: Fitted, filter_: SensorFilter | No
     size = np.abs(fitted.damping.best.amplitude(np.maximum(t[rows] - fitted.damping.t0, 0.0)))
     falls = bool(size.size and np.isfinite(size).all() and size[0] > 0.0)
     seconds = float(t[rows[-1]] - t[rows[0]]) if rows.size else 0.0
-    relative = size / size[0] if falls else None
-    return Residual(samples, fitted, filter_, values, fitted.phase.total(t[rows]), relative, rows, seconds)
+    step_s = seconds / max(int(rows[-1] - rows[0]), 1) if rows.size else 0.0
+    return Residual(
+        samples,
+        fitted,
+        filter_,
+        values,
+        fitted.phase.total(t[rows]),
+        size / size[0] if falls else None,
+        rows,
+        windows.noise_m,
+        median(model_error(windows.amplitude, windows.decay, windows.angular_frequency)),
+        float(np.mean(np.abs(windows.amplitude))),
+        seconds,
+        step_s,
+        fitted.phase.angular_frequency.value * step_s,
+        rows.size // windows.t.size,
+    )

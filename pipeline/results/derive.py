@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.bench.added_mass import ADDED_MASS_SHAPE
-from pipeline.bench.instrument import U_CRYSTAL, Instrument
+from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
@@ -32,9 +32,6 @@ from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
-# Relative standard uncertainty of a clock from the specification of its crystal: 50 ppm is the half-width of a
-# rectangular distribution. It does not decrease by averaging.
-U_CLOCK_NOMINAL = U_CRYSTAL
 U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
 
 
