@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -43,14 +44,12 @@ def folded_shape(residual: Residual) -> Outcome | None:
     orders = np.arange(2, min(HIGHEST, int(math.pi / residual.turn) - 1) + 1)
     if not orders.size:
         return None
-    powers = np.ones((orders.size, residual.values.size))
-    mean, chance = _folded(residual, bins, orders, powers)
+    mean, chance = _folded(residual, bins, orders, None)
     falls = False
     if relative is not None:
-        decaying = relative ** orders[:, None]
-        falling = _folded(residual, bins, orders, decaying)
+        falling = _folded(residual, bins, orders, relative)
         if falls := float(np.min(falling[1])) < float(np.min(chance)):
-            (mean, chance), powers = falling, decaying
+            mean, chance = falling
     stands = np.flatnonzero(chance < FALSE_ALARM)
     each = np.real(mean[stands, None] * np.exp(1j * orders[stands, None] * CENTRES))
     wave = each.sum(axis=0)
@@ -79,30 +78,39 @@ def folded_shape(residual: Residual) -> Outcome | None:
     else:
         way = {"near_peak_m" if abs(wave[BINS // 2]) > abs(wave[0]) else "far_peak_m": peak_m}
     numbers = None if share < TOLD else {"peak_m": peak_m, "share": share, **way}
-    return Outcome("not_sinusoidal", numbers, misfit, np.sum(each[:, bins] * powers[stands], axis=0))
+    explained = np.zeros(bins.size)
+    for one, k in zip(each, order.tolist(), strict=True):
+        explained += one[bins] if not falls or relative is None else one[bins] * relative**k
+    return Outcome("not_sinusoidal", numbers, misfit, explained)
 
 
 def _folded(
-    residual: Residual, bins: NDArray[np.int64], orders: NDArray[np.int64], weights: F8
+    residual: Residual, bins: NDArray[np.int64], orders: NDArray[np.int64], relative: F8 | None
 ) -> tuple[NDArray[np.complex128], F8]:
-    """Return harmonics (o,), m, proportional to weights (o, k), and the probability of each by chance.
+    """Return harmonics (o,), m, steady or proportional to a power of the amplitude, and the chance of each.
 
     Each harmonic is the weighted mean of least-squares fits to the parts of the run.
     """
-    counts = np.diff(-(-np.arange(PARTS + 1) * residual.values.size // PARTS))
-    place = np.repeat(BINS * np.arange(PARTS), counts) + bins
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    mean, chance = np.zeros(orders.size, np.complex128), np.ones(orders.size)
-    for i, (order, weight) in enumerate(zip(orders.tolist(), weights, strict=True)):
-        sums = np.bincount(place, residual.values * weight, PARTS * BINS).reshape(PARTS, BINS)
-        own = np.add.reduceat(weight**2, starts)
-        share = own / own.sum()
-        each = 2.0 * (sums @ np.exp(-1j * order * CENTRES)) / np.maximum(own, 1e-300)
-        mean[i] = share @ each
-        # Parts in which the harmonic is weak contain little information and have little weight.
-        known = 1.0 / float(share @ share)
-        scatter = float(share**2 @ np.abs(each - mean[i]) ** 2) * known / max(known - 1.0, 1e-9)
-        variance = max(scatter, 4.0 * residual.noise_m**2 / float(own.sum()))
-        if known > 2.0 and variance > 0.0:
-            chance[i] = (1.0 + abs(mean[i]) ** 2 / variance / (known - 1.0)) ** (1.0 - known)
-    return mean, chance
+    waves = np.exp(-1j * orders[:, None] * CENTRES)
+    each, own = np.zeros((PARTS, orders.size), np.complex128), np.zeros((PARTS, orders.size))
+    edges = -(-np.arange(PARTS + 1) * bins.size // PARTS)
+    for part, (first, stop) in enumerate(itertools.pairwise(edges.tolist())):
+        rows = slice(first, stop)
+        weight = np.ones(stop - first) if relative is None else relative[rows]
+        for i in range(orders.size):
+            if relative is not None:  # the first order is 2
+                weight = weight * relative[rows]
+            if relative is not None or i == 0:
+                sums = np.bincount(bins[rows], residual.values[rows] * weight, BINS)
+            own[part, i] = weight @ weight
+            each[part, i] = 2.0 * (waves[i] @ sums) / max(own[part, i], 1e-300)
+    share = own / own.sum(axis=0)
+    mean = np.sum(share * each, axis=0)
+    # Parts in which the harmonic is weak contain little information and have little weight.
+    known = 1.0 / np.sum(share**2, axis=0)
+    scatter = np.sum(share**2 * np.abs(each - mean) ** 2, axis=0) * known / np.maximum(known - 1.0, 1e-9)
+    variance = np.maximum(scatter, 4.0 * residual.noise_m**2 / own.sum(axis=0))
+    judged = (known > 2.0) & (variance > 0.0)
+    f = np.abs(mean) ** 2 / np.where(judged, variance, 1.0)
+    chance = np.where(judged, (1.0 + f / np.where(judged, known - 1.0, 1.0)) ** (1.0 - known), 1.0)
+    return mean, np.asarray(chance)

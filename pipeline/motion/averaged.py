@@ -63,7 +63,11 @@ class Phase:
 
     def total(self, t: F8) -> F8:
         """Return the total phase in rad at times t (n,)."""
-        return _turns(t, self.middle, self.area) @ self.coefficients - _delay(t, self.lag)
+        level, slope, *bend = self.coefficients.tolist()
+        total = level + slope * (t - self.middle)
+        if self.area is not None:
+            total += bend[0] * np.interp(t, *self.area)
+        return np.asarray(total - _delay(t, self.lag))
 
     def rate(self, amplitude: F8) -> F8:
         """Return the angular frequency in rad/s at amplitudes (n,)."""
@@ -193,7 +197,8 @@ def assembled(
         return np.asarray(growth * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
 
     rms_m = math.sqrt(float(left @ left) / left.size)
-    waveform = Waveform(position + disturbances.position, moving, residual, rms_m)
+    whole = position + disturbances.position if disturbances else position
+    waveform = Waveform(whole, moving, residual, rms_m)
     return Fitted(windows, disturbances, damping, phase, rest, waveform, method, "")
 
 
