@@ -13,7 +13,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.judge import judge
-from pipeline.closed import overdamped, two_modes, without_period
+from pipeline.closed import overdamped, still, two_modes, without_period
 from pipeline.damping.select import Damping, fit_laws
 from pipeline.findings.damping import damping_findings
 from pipeline.findings.finding import worded
@@ -21,7 +21,7 @@ from pipeline.findings.motion import fit_findings, motion_findings
 from pipeline.findings.parts import part_findings
 from pipeline.findings.samples import clock_findings, sample_findings
 from pipeline.findings.scene import scene_findings
-from pipeline.motion.averaged import Fitted, fit_windows, typical_miss
+from pipeline.motion.averaged import Fitted, check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
 from pipeline.motion.overdamped import LEAST_DAMPING, Overdamped, find_overdamped
@@ -96,9 +96,12 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     fitted = solved if isinstance(solved, Fitted) else _averaged(windows, disturbances, laws, samples, options)
     if _may_relax(fitted, laws) and isinstance(relaxed := find_overdamped(samples), Overdamped):
         return overdamped(samples, relaxed, scene, options)
-    beating = fitted.method != "equation" and typical_miss(fitted) > BEATING
-    if beating and (two := find_two_modes(samples)) is not None:
+    missed = 0.0 if fitted.method == "equation" else typical_miss(fitted)
+    incoherent = check_coherence(fitted, missed)
+    if (incoherent or missed > BEATING) and (two := find_two_modes(samples)) is not None:
         return two_modes(samples, two, scene, options)
+    if incoherent is not None:
+        return still(samples, incoherent, scene, options)
 
     found, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz))
     effects = tabulate(track, fitted, scene)

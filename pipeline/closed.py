@@ -31,7 +31,7 @@ def without_period(samples: Conditioned, why: NoOscillation, scene: Scene, optio
         return overdamped(samples, relaxed, scene, options)
     if (two := find_two_modes(samples)) is not None:
         return two_modes(samples, two, scene, options)
-    return _still(samples, relaxed or why, scene, options)
+    return still(samples, relaxed or why, scene, options)
 
 
 def overdamped(samples: Conditioned, found: Overdamped, scene: Scene, options: Options) -> Analysis:
@@ -46,7 +46,7 @@ def two_modes(samples: Conditioned, two: TwoModes, scene: Scene, options: Option
     return _ended(samples, Still(two.why), (finding,), {**_at_rest(samples), **two.estimates}, scene, options)
 
 
-def _still(samples: Conditioned, why: NoOscillation, scene: Scene, options: Options) -> Analysis:
+def still(samples: Conditioned, why: NoOscillation, scene: Scene, options: Options) -> Analysis:
     """Return the analysis of a recording without a motion to fit."""
     findings = [Found("no_oscillation", {"why": why.why})]
     if (count := held_count(samples)) > 1:

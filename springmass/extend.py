@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from acquisition.recordings.families.declared import dialect
     from acquisition.recordings.questions import Missing, MissingItem, Question
     from acquisition.recordings.recording import Original, Recording, Trap
-    from acquisition.recordings.tables.dialect import Header, text_format
-    from acquisition.recordings.tables.format import ColumnFormat
+    from acquisition.recordings.sampling.timing import Formula
+    from acquisition.recordings.tables.format import ColumnFormat, text_format
     from acquisition.recordings.tables.headings import Heading
-    from acquisition.recordings.tables.table import Column, Formula, Table
+    from acquisition.recordings.tables.table import Column, Header, Table
     from acquisition.source import SourceInfo
     from pipeline.damping.laws.law import Law
     from pipeline.damping.laws.of_function import make_law
@@ -102,10 +102,10 @@ _WHERE = {
     "acquisition.recordings.families.declared": ("dialect",),
     "acquisition.recordings.questions": ("Missing", "MissingItem", "Question"),
     "acquisition.recordings.recording": ("Original", "Recording", "Trap"),
-    "acquisition.recordings.tables.dialect": ("Header", "text_format"),
-    "acquisition.recordings.tables.format": ("ColumnFormat",),
+    "acquisition.recordings.sampling.timing": ("Formula",),
+    "acquisition.recordings.tables.format": ("ColumnFormat", "text_format"),
     "acquisition.recordings.tables.headings": ("Heading",),
-    "acquisition.recordings.tables.table": ("Column", "Formula", "Table"),
+    "acquisition.recordings.tables.table": ("Column", "Header", "Table"),
     "acquisition.source": ("SourceInfo",),
     "pipeline.damping.laws.law": ("Law",),
     "pipeline.damping.laws.of_function": ("make_law",),

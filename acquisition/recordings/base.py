@@ -54,17 +54,12 @@ class Format(Protocol):
             Used in messages and as the recording's name; it is not opened.
         data : bytes
             The content of the file.
-        channel : str, optional
-            The quantity or column to read.
+        channel, run, time : str, optional
+            The column to read, its run and the column of its times, if the file leaves them open.
         rate_hz : float, optional
             The rate if the file does not state it, Hz. It is an error if the file contradicts it.
-        unit : str, optional
-            The unit of the channel if the file does not state it.
-        run : str, optional
-            The run to read if the file contains several. ``run``, ``time`` and ``time_unit`` are passed only if they
-            are given.
-        time, time_unit : str, optional
-            The column that contains the times, and their unit, if the file does not state them.
+        unit, time_unit : str, optional
+            The units of the channel and of the times if the file does not state them.
 
         Raises
         ------

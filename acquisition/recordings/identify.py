@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import cast
+from typing import Any, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.extensions import entry_points_of, load_entry
@@ -70,19 +70,13 @@ def open_recording(
     path: str | os.PathLike[str],
     *,
     format: str | None = None,
-    channel: str | None = None,
-    rate_hz: float | None = None,
-    unit: str | None = None,
-    run: str | None = None,
-    time: str | None = None,
-    time_unit: str | None = None,
     velocity_path: str | os.PathLike[str] | None = None,
+    **answers: Any,
 ) -> Recording:
     """Read a recording of another program; if anything is missing or faulty, the error says so in one line.
 
-    By default the format is identified by content. ``channel``, ``rate_hz``, ``unit``, ``run``, ``time`` and
-    ``time_unit`` are what the file does not state or leaves open; see :meth:`springmass.extend.Format.read`. A velocity
-    file is joined with the position file by time.
+    By default the format is identified by content. The answers are what the file does not state or leaves open; see
+    :meth:`springmass.extend.Format.read`. A velocity file is joined with the position file by time.
     """
     name = os.fspath(path)
     reader = get_format(format) if format else _recognise(name, read_bytes(path, HEAD_BYTES))
@@ -93,10 +87,8 @@ def open_recording(
             problem = f"format {reader.name} has no velocity files, got {os.fspath(velocity_path)}"
             raise UnknownFormat(name, problem, "leave the velocity file out")
         velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
-        return cast(Recording, read_pair((name, data), velocity, rate_hz=rate_hz))
-    optional = {"run": run, "time": time, "time_unit": time_unit}
-    answers = {name: value for name, value in optional.items() if value is not None}
-    return reader.read(name, data, channel=channel, rate_hz=rate_hz, unit=unit, **answers)
+        return cast(Recording, read_pair((name, data), velocity, rate_hz=answers.get("rate_hz")))
+    return reader.read(name, data, **{name: answer for name, answer in answers.items() if answer is not None})
 
 
 def inspect(path: str | os.PathLike[str]) -> Inspection:

@@ -10,9 +10,6 @@ from acquisition.block import UNITS
 
 LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
 """Units of length, each with the power of ten that converts it to metres."""
-TIMES = {"s": 0, "ms": -3, "us": -6, "ns": -9, "min": 0, "h": 0}
-"""Units of time, each with the power of ten that, together with :func:`time_factor`, converts it to seconds."""
-_TIME_FACTORS = {"min": 60.0, "h": 3600.0}
 
 _OTHERS = {
     "length": {"in": 0, "ft": 0},
@@ -81,6 +78,13 @@ MEASURES = {
     for unit, power in units.items()
 }
 """The measure of each unit that a channel may have."""
+TIMES = {
+    **{unit: Measure("time", unit, power) for unit, power in (("s", 0), ("ms", -3), ("us", -6), ("ns", -9))},
+    "min": Measure("time", "min", 0, 60.0),
+    "h": Measure("time", "h", 0, 3600.0),
+}
+"""The measure of each unit that times may have."""
+NUMBER = MEASURES["1"]
 
 
 def unit_words(unit: str) -> str:
@@ -104,11 +108,6 @@ def measure_of(unit: str) -> Measure | None:
     return MEASURES.get(unit_words(unit))
 
 
-def time_power(unit: str) -> int | None:
-    """Return the power of ten that converts a time to seconds; None if the unit is not a unit of time."""
+def time_unit(unit: str) -> Measure | None:
+    """Return the measure of a unit of time; None for any other text."""
     return TIMES.get(unit_words(unit))
-
-
-def time_factor(unit: str) -> float:
-    """Return the factor, besides the power of ten, that converts a time to seconds; for example 60 for minutes."""
-    return _TIME_FACTORS.get(unit_words(unit), 1.0)

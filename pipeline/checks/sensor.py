@@ -17,22 +17,25 @@ STEADY = 2.0  # maximum ratio of the covariances in the halves: noise is constan
 # Minimum fall of the correlation from one sample to the next, over the mean fall within the correlation length: 1 for a
 # running mean, 2 for a lag. A motion or a curve that is smooth by itself falls far less from the first to the second.
 CUSP = 0.5
-EQUAL = 0.4  # share of neighbours with the same value above which readings are held: over two samples it is a half
-LINES = 3.6  # twice the samples per bend above which readings are joined by lines: noise bends nearly every sample
+LINES = 1.8  # samples per bend, over those of white noise, above which readings are joined by lines
+STEPS = 2.4  # maximum bend by rounding, over the noise, up to which bends by noise show
 
 
 def held_count(samples: Conditioned) -> int:
     """Return the number of samples over which each reading is held; 1 if every sample is new.
 
-    Readings in coarse steps repeat too, but new ones have values that occurred before. Readings at rest repeat for
-    longer than others.
+    Readings in coarse steps are repeated too, but they change at any row. Held ones change only at every k-th row.
     """
     y = samples.track.y[samples.used]
     changes = np.flatnonzero(np.diff(y))
-    if not 8 <= changes.size <= (1.0 - EQUAL) * y.size or np.unique(y).size < 0.5 * changes.size:
+    if not 8 <= changes.size <= 0.6 * y.size:
         return 1
-    runs = np.diff(changes)
-    return round(y.size / changes.size) if np.quantile(runs, 0.95) <= np.median(runs) + 1.0 else 1
+    for k in range(min(y.size // 8, 200), 1, -1):
+        most = int(np.bincount(changes % k).max())
+        # By chance, each row of a cycle has a k-th of the changes; with the correct k, one row has nearly all of them.
+        if most > 0.9 * changes.size and most > 2.5 * changes.size / k:
+            return k
+    return 1
 
 
 def held_numbers(count: int, step_s: float) -> dict[str, float | None]:
@@ -55,10 +58,13 @@ def held(residual: Residual) -> Outcome | None:
     if repeats == 1:
         y = samples.track.y[samples.used]
         rounding = max(2.02 * (samples.quantum_m or 0.0), 1e-12 * float(np.ptp(y)))
-        # A reading between two samples bends the line at both.
-        count, late = 2.0 / max(float(np.mean(np.abs(np.diff(y, 2)) > rounding)), 1e-3), 0.0
-        if count < LINES or rounding > 1.1 * residual.noise_m:
+        # White noise of deviation s bends the line by more than x at a share erfc(x/(sqrt(12) s)) of the samples.
+        white = math.erfc(rounding / (math.sqrt(12.0) * max(residual.noise_m, 1e-300)))
+        share = max(float(np.mean(np.abs(np.diff(y, 2)) > rounding)), 1e-3)
+        if rounding > STEPS * residual.noise_m or share > white / LINES:
             return None
+        # A reading between two samples bends the line at both.
+        count, late = 2.0 * white / share, 0.0
     loss = min((2.0 - late) * (count * turn) ** 2 / 24.0, 1.0)
     amplitude_m, phase_rad = residual.amplitude_m * loss, late * 0.5 * (count - 1.0) * turn
     misfit = Misfit(name="held_samples", amplitude_m=amplitude_m, phase_rad=phase_rad)

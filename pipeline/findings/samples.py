@@ -32,7 +32,7 @@ def sample_findings(
     """
     track, quantum_m = conditioned.track, conditioned.quantum_m
     counts, n = count_quality(flags), len(track)
-    levels_m = [cut.from_m for cut in conditioned.cuts]
+    levels_m = [cut.from_m for cut in conditioned.cuts] or conditioned.plateaus_m
     move = _distance_to_move(levels_m, swing_m) if swing_m is not None and track.unit == "m" else {}
     for cut in conditioned.cuts:
         numbers = {
@@ -46,7 +46,8 @@ def sample_findings(
         }
         yield Found("clipped", {**numbers, **move})
     if counts["clipped"] and not conditioned.cuts:
-        yield Found("clipped", {"samples": counts["clipped"], "n": n, **move})
+        levels = {f"level_{i}_m": level for i, level in enumerate(conditioned.plateaus_m, 1)}
+        yield Found("clipped", {"samples": counts["clipped"], "n": n, **levels, **move})
     if (echoes := counts["false_echo"]) and not by_chance:
         numbers = {"samples": echoes, "n": n, "share": echoes / n}
         if clusters is not None and clusters.count:

@@ -29,6 +29,7 @@ from pipeline.numerics.regression import (
     solve_weighted,
 )
 from pipeline.track import F8, UNUSABLE
+from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 from pipeline.windows.disturbances import Disturbances
 
@@ -41,6 +42,7 @@ NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact fo
 DEGREE = 6  # maximum degree of the polynomial of a drifting rest position
 # Minimum decrease of the BIC for a bent phase or a drifting rest position; 10 is "very strong" evidence.
 EVIDENCE = 10.0
+FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
 REJECTION = 1e-3  # probability that the chi-square test rejects residuals that are only noise
 
 
@@ -354,6 +356,20 @@ def wrapped(angle: float) -> float:
     """Return the angle in rad wrapped into (-pi, pi]."""
     turned = math.remainder(angle, 2.0 * math.pi)
     return math.pi if turned == -math.pi else turned
+
+
+def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
+    """Return why a motion is no oscillation, although single periods look like one; None if it is one.
+
+    Amplitude and phase of a window form a phasor, which the damping law and the fit of the phase predict. Random
+    phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
+    differ from it by less, ``typical``.
+    """
+    if typical < ASTRAY or fitted.demodulated.t.size < FEWEST:
+        return None
+    return NoOscillation(
+        f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"
+    )
 
 
 def typical_miss(fitted: Fitted) -> float:

@@ -13,7 +13,7 @@ from pipeline.damping.law_fit import LawFit, joint_of
 from pipeline.damping.laws import LAWS, Law, in_units
 from pipeline.damping.select import EVIDENCE, Damping
 from pipeline.motion.averaged import DEGREE, Averaged, Fitted, Phase, Rest, area_of, assembled, wrapped
-from pipeline.motion.fit import Rows, clipped, covariance_of, fit
+from pipeline.motion.fit import Bools, Rows, clipped, covariance_of, fit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit, central_differences
 from pipeline.numerics.regression import solve_weighted
@@ -53,7 +53,9 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
     first, *others = laws
     unit_m, level = abs(float(thetas[first][0])) or 1.0, fitted.rest.mean.value
     rows = _rows(fitted, samples, level, unit_m)
-    model = _model(fitted, rows, laws[first])
+    # The lag is that of the windows' law; a law that is tried in its place has its own, which is constant.
+    lags = {name: None if few and name in ("none", "linear") else phase.lag for name in laws}
+    model = replace(_model(fitted, rows, laws[first]), lag=lags[first])
     rest, turning = (
         np.zeros(model.degree + 1),
         phase.coefficients * np.array([1.0, 1.0, unit_m**2])[: phase.coefficients.size],
@@ -76,14 +78,14 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
     fits = {first: _described(model, found, rows, unit_m, count, stated)}
     tail = found.values[len(model.law.parameters) :]
     for name in others:
-        other = replace(model, law=laws[name])
+        other = replace(model, law=laws[name], lag=lags[name])
         own = fit(other, rows, np.concatenate([in_units(laws[name], thetas[name], length_m=unit_m), tail]), STEPS)
         if own.converged:
             fits[name] = _described(other, own, rows, unit_m, count, stated)
     damping = _selected(damping, fits) if few else _refined(damping, fits)
     best = fits[damping.selected]
-    flags = fitted.disturbances.conditioned.flags.copy()
-    flags[((flags & UNUSABLE) == 0) & ~rows.used] |= np.uint8(Quality.FALSE_ECHO)
+    free = fitted.disturbances.conditioned
+    flags = rows.marked(free.flags, free.used, rows.y - rows.left(best.model, best.fit.values))
     return assembled(
         replace(windows, flags=flags),
         fitted.disturbances,
@@ -104,13 +106,18 @@ def _considered(damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
 def _short(windows: Demodulated, damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
     """Return linear drag and no damping, which are all that a record of few periods can distinguish.
 
-    A built-in law that is stated is fitted as well, although the windows did not determine it.
+    A built-in law that is stated is fitted as well, although the windows did not determine it, and the laws that fit
+    the windows if linear drag contradicts these.
     """
     amplitude, rate, t = float(windows.amplitude[0]), float(windows.decay[0]), windows.t - damping.t0
     start = amplitude * math.exp(rate * float(t[0]))
     thetas = {"linear": np.array([start, rate]), "none": np.array([amplitude])}
     if damping.stated in LAWS.keys() - thetas.keys():
         thetas[damping.stated] = LAWS[damping.stated].guess(t, windows.amplitude)
+    linear = damping.fits.get("linear")
+    if linear is not None and linear.rejected:
+        others = {n: x for n, x in damping.considered.items() if n in LAWS.keys() - thetas.keys()}
+        thetas |= {name: other.joint.values for name, other in others.items()}
     return {name: LAWS[name] for name in thetas}, thetas
 
 
@@ -129,12 +136,16 @@ def _rows(fitted: Fitted, samples: Conditioned, level: float, unit_m: float) -> 
     t = np.where(np.isfinite(track.t), track.t, fitted.phase.middle)
     y = (np.where(known, track.y, level) - level) / unit_m
     columns = fitted.disturbances.columns(samples.track.t)
-    return Rows(t, y, candidates, usable & ((flags & UNUSABLE) == 0), columns=columns if columns.size else None)
+
+    def near_plateau(position: F8) -> Bools:
+        return free.near_plateau(level + unit_m * position, fitted.demodulated.noise_m)
+
+    used = usable & ((flags & UNUSABLE) == 0)
+    return Rows(t, y, candidates, used, 1.0, columns if columns.size else None, near_plateau)
 
 
 def _model(fitted: Fitted, rows: Rows, law: Law) -> Averaged:
     phase, free = fitted.phase, fitted.disturbances.conditioned
-    few = fitted.demodulated.t.size < FEW_WINDOWS  # then only laws are tried whose lag is constant
     degree = min(DEGREE, fitted.demodulated.t.size // 4 - 1) if fitted.rest.drifts else 0
     return Averaged(
         law,
@@ -144,7 +155,7 @@ def _model(fitted: Fitted, rows: Rows, law: Law) -> Averaged:
         float(np.max(np.abs(rows.t - phase.middle))),
         degree,
         phase.area,
-        None if few and not fitted.damping.by_statement else phase.lag,
+        None,
     )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.samples.stopping import stop_row
-from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
 
@@ -126,7 +127,8 @@ def _rows(samples: Conditioned, windows: Demodulated, damping: Damping) -> Rows:
     quantum = (samples.quantum_m or 0.0) / math.sqrt(12.0)
     expected_m = max(samples.noise_m, quantum, 1e-9 * abs(float(damping.best.joint.values[0])))
     # False echoes of the windows that the solution explains return later.
-    return Rows(t, track.y, within, within & ((windows.flags & UNUSABLE) == 0), expected_m)
+    used_first = within & ((windows.flags & UNUSABLE) == 0)
+    return Rows(t, track.y, within, used_first, expected_m, None, partial(samples.near_plateau, noise_m=expected_m))
 
 
 def _first_solution(models: Sequence[Solved], rows: Rows, windows: Demodulated, damping: Damping) -> F8:
@@ -249,10 +251,10 @@ def _described(
     """
     theta, best, unit = model.full(own.values), damping.best, samples.track.unit
     still, y, v, natural = theta[: len(STATE)].tolist()
-    position, flags = model.motion.position(rows.t, theta), samples.flags.copy()
+    position = model.motion.position(rows.t, theta)
     residual = samples.track.y - position
     rms_m = math.sqrt(float(np.mean(residual[rows.used] ** 2)))
-    flags[rows.candidates & ~rows.used] |= np.uint8(Quality.FALSE_ECHO)
+    flags = rows.marked(samples.flags, rows.candidates, position)
     stops = best.amplitude(np.array([np.max(rows.t)]))[0] <= 0.0
     why = (
         f"the damping ratio is {best.rate_at_start() / natural:.2g} at the first sample"

@@ -19,11 +19,11 @@ from pipeline.numerics import least_squares
 from pipeline.numerics.least_squares import STEPS, Fit
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import mad_sigma
-from pipeline.track import F8
+from pipeline.track import F8, U8, Quality
+from pipeline.windows.demodulate import CLIP_SIGMAS
 
 Bools = NDArray[np.bool_]
 
-CLIP_SIGMAS = 4.0  # residuals beyond this many standard deviations are false echoes and are excluded from the fit
 # Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
 # with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
 STEADY = 1e-4
@@ -59,6 +59,18 @@ class Rows:
     used: Bools
     u: float = 1.0  # standard uncertainty of a sample
     columns: F8 | None = None
+    near_plateau: Callable[[F8], Bools] | None = None  # whether a model (n,) is too close to a clipping level
+
+    def on_plateau(self, position: F8) -> Bools:
+        """Return where noise decides whether a sample is clipped, for a model of all samples."""
+        return np.zeros(self.t.size, np.bool_) if self.near_plateau is None else self.near_plateau(position)
+
+    def marked(self, flags: U8, among: Bools, position: F8) -> U8:
+        """Return flags with those samples among some that are not used marked as clipped or as false echoes."""
+        flags, out, crest = flags.copy(), among & ~self.used, self.on_plateau(position)
+        flags[out & crest] |= np.uint8(Quality.CLIPPED)
+        flags[out & ~crest] |= np.uint8(Quality.FALSE_ECHO)
+        return flags
 
     def residuals(self, model: Model) -> Callable[[F8], tuple[F8, Callable[[], F8]]]:
         """Return a function of the parameters that gives the residuals over u and their derivatives."""
@@ -109,8 +121,9 @@ def clipped(
         found = fit(model, rows, start, steps)
         left = rows.left(model, found.values)
         spread = mad_sigma(left[rows.candidates])
+        candidates = rows.candidates & ~rows.on_plateau(rows.y - left)
         near = rows.used if spread > MORE_THAN_NOISE * noise_m else np.abs(left) <= CLIP_SIGMAS * max(spread, least_m)
-        chosen = rows.candidates & near
+        chosen = candidates & near
         if (count := int(np.count_nonzero(chosen))) < 2 * start.size:
             few = replace(found, converged=False, tried=f"only {count} samples lie on the model")
             return few, replace(rows, used=chosen)
@@ -124,12 +137,15 @@ def covariance_of(found: Fit, model: Model, rows: Rows, noise: float, periods: i
     """Return the covariance (p, p) of a fit's parameters for residuals of standard deviation ``noise``, over u.
 
     If residuals are not white it is that of the score summed over whole periods, including the correlation between
-    neighbouring periods, where it exceeds the white covariance significantly.
+    neighbouring periods, where it exceeds the white covariance significantly. Over few periods, correlated samples
+    count as fewer.
     """
     inverse, u = found.covariance, np.sqrt(np.diag(found.covariance)) * noise
     factors = np.ones(u.size)
     starts = np.arange(0, rows.t.size, max(round(rows.t.size / max(periods, 1)), 1), dtype=np.int64)
-    if starts.size >= FEWEST_PERIODS and np.all(u > 0):
+    if starts.size < FEWEST_PERIODS:
+        return np.asarray(inverse * noise**2 * correlation_length(found.residual))
+    if np.all(u > 0):
         scores = np.zeros((rows.t.size, u.size))
         scores[rows.used] = rows.residuals(model)(found.values)[1]() * found.residual[:, None]
         for k, pull in enumerate((np.add.reduceat(scores, starts, axis=0) @ inverse / u).T):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -16,12 +17,16 @@ from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
 QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
 TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
+CREST_SIGMAS = 3.5  # distance from a plateau within which noise decides whether a sample is clipped
 BLOCK = 256  # samples over which a local curvature is estimated
 LARGEST = 1e100  # magnitude of a measured value; anything beyond is a missing sample
 ROUNDING = 1e-9  # fraction of the largest value; smaller differences are rounding errors of one value
 # Distance of a false echo from the median of the five samples around it, beyond what curvature explains, in standard
 # deviations of the noise.
 SPIKE_SIGMAS = 8.0
+# Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an unclipped
+# crest the ratio is 1 / (sqrt 2 - 1) = 2.4.
+CONTRAST = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +50,11 @@ class Conditioned:
     flags: U8  # (n,) the track's own flags and those found here
     # Standard deviation of the white noise from fourth differences, m; independent of any model of the motion.
     noise_m: float
+    plateaus_m: tuple[float, ...]  # distances at which the record is clipped
     # Resolution of the distances: the track's, or a coarser one that the distances themselves show.
     quantum_m: float | None
-    cuts: tuple[Cut, ...] = ()  # cuts found by the sinusoid; see :mod:`pipeline.windows.clipping`
+    clipped_from_m: tuple[float, ...] = ()  # for each plateau, the distance beyond which samples were flagged
+    cuts: tuple[Cut, ...] = ()  # found by the sinusoid, which replace the plateaus; see pipeline.windows.clipping
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -59,9 +66,21 @@ class Conditioned:
         """Return the record with values (n,) subtracted from its distances; flags and times are kept."""
         return replace(self, track=replace(self.track, y=self.track.y - taken_m))
 
+    def near_plateau(self, model_m: F8, noise_m: float) -> NDArray[np.bool_]:
+        """Return where a model is so close to a plateau that noise decides whether a sample is clipped.
+
+        The model selects the samples to leave out there, not their own noise, so the remaining samples are not biased.
+        """
+        near = np.zeros(model_m.shape, np.bool_)
+        middle = float(np.median(model_m)) if self.clipped_from_m else 0.0
+        for bottom in self.clipped_from_m:
+            sign = 1.0 if bottom > middle else -1.0
+            near |= sign * model_m > sign * bottom - CREST_SIGMAS * noise_m
+        return near
+
 
 def condition(track: Track) -> Conditioned:
-    """Flag missing samples, duplicate and backward times, and isolated false echoes.
+    """Flag missing samples, duplicate and backward times, isolated false echoes and clipped plateaus.
 
     Noise is estimated from fourth differences. A motion of amplitude A and angular frequency :math:`\\omega`, sampled
     every :math:`h`, contributes only :math:`A (\\omega h)^4` to them. The median of their absolute values is taken, so
@@ -95,9 +114,22 @@ def condition(track: Track) -> Conditioned:
     flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
     y_kept, rows = y[~spikes], rows[~spikes]
     noise_m = fourth_difference_noise(y_kept)
+    plateaus: list[float] = []
+    bottoms: list[float] = []
     ordered = np.sort(y_kept)
+    found = [
+        (sign, *_plateau(sign * y_kept, increasing, max(noise_m, half_step)))
+        for sign, increasing in ((1.0, ordered), (-1.0, -ordered[::-1]))
+    ]
+    # A record that lies mostly on plateaus is a step or a bob at rest, not a clipped motion.
+    if sum(members.size for _, _, _, members in found) <= 0.6 * y_kept.size:
+        for sign, level, bottom, members in found:
+            if members.size:
+                plateaus.append(sign * level)
+                bottoms.append(sign * bottom)
+                flags[rows[members]] |= np.uint8(Quality.CLIPPED)
     quantum_m = coarsest_step(ordered, track.quantum_m)
-    return Conditioned(track, flags, noise_m, quantum_m)
+    return Conditioned(track, flags, noise_m, tuple(plateaus), quantum_m, tuple(bottoms))
 
 
 def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
@@ -234,3 +266,68 @@ def _median_of_five(a: F8, b: F8, c: F8, d: F8, e: F8) -> F8:
     low = np.maximum(np.minimum(a, b), np.minimum(c, d))
     high = np.minimum(np.maximum(a, b), np.maximum(c, d))
     return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), e))
+
+
+def _cut_often(y: F8, band: NDArray[np.bool_], low: float) -> bool:
+    """Return whether the motion enters a band from below ``low`` at least twice, for a few samples each time.
+
+    A bob that settles there enters once, and a hand that holds it there makes one stay longer than all others together.
+    """
+    state = np.where(band, 1, np.where(y < low, -1, 0))
+    inside = state[state != 0] > 0
+    visit = np.cumsum(np.concatenate([inside[:1], inside[1:] & ~inside[:-1]]))
+    stays = np.bincount(visit[inside])[1:]
+    return bool(stays.size >= 2 and stays.max() <= 0.5 * stays.sum())
+
+
+def _plateau(y: F8, ordered: F8, noise_m: float) -> tuple[float, float, NDArray[np.int64]]:
+    """Find a clipped plateau at the upper end of ``y``; ``ordered`` contains its values in increasing order.
+
+    A clipped record has many samples in a band a few sigma wide, with almost none above it and few beneath. For an
+    unclipped crest, the number of samples grows as the square root of the depth below the crest.
+    """
+    none = np.empty(0, np.int64)
+    low, high = ordered[0], ordered[-1]
+    if (level := _saturated(y, ordered)) is not None:
+        return level, level, np.flatnonzero(y >= level)
+    width = 6.0 * noise_m
+    if high - low < 6.0 * width or width == 0.0:
+        return 0.0, 0.0, none
+    first = int(np.searchsorted(ordered, low + 0.6 * (high - low)))
+    upper = ordered[first:]
+    few = math.ceil(max(0.02 * y.size, 8))
+    # Bands that begin at these indices contain enough samples.
+    starts = np.flatnonzero(upper[few - 1 :] <= upper[: max(upper.size - few + 1, 0)] + width)
+    if not starts.size:
+        return 0.0, 0.0, none
+    counts = np.searchsorted(upper, upper[starts] + width, side="right") - starts
+    fullest = int(np.argmax(counts))
+    start, inside = int(starts[fullest]), int(counts[fullest])
+    bottom = upper[start]
+    above = upper.size - start - inside
+    beneath = first + start - int(np.searchsorted(ordered, bottom - width))
+    if above > 0.1 * inside or inside < CONTRAST * (beneath + 1):
+        return 0.0, 0.0, none
+    band = (y >= bottom) & (y <= bottom + width)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], band.astype(np.int8), [0]])))
+    if np.median(edges[1::2] - edges[::2]) < 3 or not _cut_often(y, band, bottom - 3.0 * width):
+        return 0.0, 0.0, none
+    # Samples in heavy tails of the noise lie above the band but still belong to the plateau.
+    members = np.flatnonzero(y >= bottom)
+    return float(np.median(y[band])), float(bottom), members
+
+
+def _saturated(y: F8, ordered: F8) -> float | None:
+    """Return the value at which a sensor clips its noisy signal at the top, or None where it does not."""
+    few = max(int(0.02 * y.size), 8)
+    level = float(ordered[-max(few // 2, 1)])
+    first, last = np.searchsorted(ordered, level), np.searchsorted(ordered, level, side="right")
+    inside = int(last - first)
+    if inside < few or ordered.size - last > 0.1 * inside or first == 0:
+        return None
+    next_lower = ordered[first - 1]
+    beneath = int(first - np.searchsorted(ordered, next_lower))
+    margin = 0.05 * (level - float(ordered[0]))
+    if inside < CONTRAST * (beneath + 1) or not _cut_often(y, y >= level, level - margin):
+        return None
+    return level

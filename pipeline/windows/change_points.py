@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
@@ -9,6 +10,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 
 I8 = NDArray[np.int64]
@@ -81,6 +83,33 @@ def find_changes(t: F8, y: F8, u: F8) -> tuple[Change, ...]:
         if index + 1 in found:
             found[index + 1] = min(found.pop(index), found[index + 1])
     return tuple(Change(index, found[index]) for index in sorted(found))
+
+
+def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
+    """Return (n,) bool: True for single outliers, caused by clusters of echoes or by a jump within a window.
+
+    Parameters
+    ----------
+    y, u : (m, n) float64
+        Components and their standard uncertainties.
+    false_alarm : float
+        Maximum probability that noise makes any point an outlier.
+
+    Notes
+    -----
+    Such a point lies far from interpolations between its neighbours and from extrapolations of the two points before or
+    after it. The first and last two points are never outliers. The maximum of n normal deviations in two components
+    exceeds :math:`\\sqrt{2 \\ln(n/\\alpha)}` with probability :math:`\\alpha`. A mean of two neighbours adds half the
+    variance.
+    """
+    if y.shape[1] < 5:
+        return np.zeros(y.shape[1], np.bool_)
+    before2, before, here, after, after2 = (y[:, k : y.shape[1] - 4 + k] for k in range(5))
+    expected = (0.5 * (before + after), 0.5 * (before2 + after2), 2.0 * before - before2, 2.0 * after - after2)
+    off = np.min([np.abs(here - each) for each in expected], axis=0)
+    usual = np.maximum(math.sqrt(1.5) * u[:, 2:-2], [[mad_sigma(each)] for each in off])
+    far = math.sqrt(2.0 * math.log(y.shape[1] / false_alarm))
+    return np.concatenate([[False, False], np.any(off > far * usual, axis=0), [False, False]])
 
 
 def _starts(size: int, length: int) -> I8:

@@ -1,6 +1,7 @@
 """Clipping: crests cut off by a fixed object or a lost target, found by comparison with the middle of the swing.
 
-The plateau may change from crest to crest, lie at both ends, or end after the first cycles.
+A level plateau shows in the distances alone (:mod:`pipeline.samples.condition`). A plateau that changes from crest to
+crest, lies at both ends or ends after the first cycles does not; it shows in comparison with the middle of the swing.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ class _End:
 
 
 def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated) -> Conditioned | None:
-    """Return the record with every cut crest flagged, or None if no cuts show.
+    """Return the record with every cut crest flagged, or None if no cuts show beyond those flagged already.
 
     Every window's sinusoid is fitted to the middle of its swing. Let :math:`z_j` be the shortfall of the median of
     crest j in standard uncertainties. Crests 1 to n are cut if n maximises :math:`\\sum_{j \\le n} z_j/\\sqrt n` and
@@ -86,6 +87,8 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
     if not any(_cut_windows(unexplained, sign, least_m) for sign in (1.0, -1.0)):
         return None
     flags = conditioned.flags.copy()
+    seen = slice(int(cycles.bounds[0]), int(cycles.bounds[-1]))
+    flags[seen] = flags[seen] & ~np.uint8(Quality.CLIPPED) | conditioned.track.flags[seen]
     windows = Windows.cut(replace(conditioned, flags=flags), cycles.bounds)
     least = max(least_m, windows.tiny)
     whole = _of_windows(windows, demodulated)
@@ -107,7 +110,8 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
         beyond = _beyond(fit, [end]) & fit.judged
         cuts.append(_described(end, fit, windows, conditioned, beyond))
         flags[windows.rows[beyond]] |= np.uint8(Quality.CLIPPED)
-    return replace(conditioned, flags=flags, cuts=tuple(cuts))
+    levels_m = tuple(cut.level_m for cut in cuts)
+    return replace(conditioned, flags=flags, plateaus_m=levels_m, clipped_from_m=(), cuts=tuple(cuts))
 
 
 def _of_windows(windows: Windows, demodulated: Demodulated) -> _Fit:

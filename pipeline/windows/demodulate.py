@@ -9,7 +9,7 @@ fit and the tuning of its basis. This module contains the passes: let clusters g
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -82,6 +82,11 @@ def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
     _rescue(windows, basis, solution, spread, tuning)
     _clip(windows, basis, solution, spread, rough)
     weights = solution.weights
+    if conditioned.clipped_from_m:
+        level = _typical(_spread(windows.usable, solution.residual), windows, solution)
+        crest = conditioned.near_plateau(windows.y - solution.residual + windows.level, level)
+        windows = replace(windows, usable=np.where(crest, 0.0, windows.usable))
+        weights = np.where(crest, 0.0, weights)
     # Fit again with each window's own frequency and decay.
     tuning = retune(windows, solution, tuning.angular_frequency)
     basis = windows.basis(tuning.turning, tuning.decay)
@@ -217,6 +222,10 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     inside = windows.placed & good[:, None]
     echoes = inside & (windows.usable > 0) & (weights == 0)
     flags[windows.rows[echoes]] |= np.uint8(Quality.FALSE_ECHO)
+    crests = inside & (windows.usable == 0)
+    if crests.any():
+        crests &= flags[windows.rows] == 0
+        flags[windows.rows[crests]] |= np.uint8(Quality.CLIPPED)
     residual = np.full(len(conditioned.track), np.nan)
     residual[windows.rows[inside]] = solution.residual[inside]
     return Demodulated(

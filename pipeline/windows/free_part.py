@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned, condition
 from pipeline.samples.stopping import moving_part
 from pipeline.track import Quality
@@ -18,7 +17,7 @@ from pipeline.windows.sinusoid import check_sinusoid
 
 MOST_PARTS = 4  # maximum number of times that a freely moving part is sought within the part found before
 LEAST_HALVED = 128  # minimum number of samples of which the later half may show a motion
-CLEAR = 0.05  # maximum noise over the amplitude for a motion that only the later half shows
+CLEAR = 0.1  # maximum noise over the largest amplitude of a motion that only the later half shows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,11 +54,11 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
         half_s = float(np.median(t))
         later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
         trial = condition(later.flagged(samples.track))
-        trimmed, stopped = _cycles(trial, early, late)
+        trimmed, stopped = _cycles(trial, late, late)
         if isinstance(trimmed, NoOscillation):
             return cycles
         windows = demodulate(trial, trimmed)
-        if windows.noise_m > CLEAR * median(windows.amplitude) or check_sinusoid(trial, windows) is not None:
+        if windows.noise_m > CLEAR * float(np.max(windows.amplitude)) or check_sinusoid(trial, windows) is not None:
             return cycles
         samples, segments = trial, later.within(segments)
         cycles = trimmed

@@ -19,7 +19,7 @@ from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.samples.stopping import moving_part
 from pipeline.track import F8, Quality, Track
-from pipeline.windows.change_points import FALSE_ALARM, find_changes
+from pipeline.windows.change_points import FALSE_ALARM, find_changes, lone_points
 from pipeline.windows.demodulate import FINEST, Demodulated
 
 MOST_DECAY = 300.0  # largest exponent of a decay, against overflow
@@ -249,8 +249,10 @@ class _Series:
         """Split windows first to stop - 1 at their jumps."""
         if stop - first < NEAR:
             return [_Part(first, stop, False)] if stop > first else []
-        changes = find_changes(self.t[first:stop], self.values[:, first:stop], self.u[:, first:stop])
-        edges = [first, *(first + change.index for change in changes), stop]
+        values, u = self.values[:, first:stop], self.u[:, first:stop]
+        rows = np.flatnonzero(~lone_points(values, u, FALSE_ALARM))
+        changes = find_changes(self.t[first + rows], values[:, rows], u[:, rows])
+        edges = [first, *(first + int(rows[change.index]) for change in changes), stop]
         return [_Part(a, b, False) for a, b in itertools.pairwise(edges)]
 
 

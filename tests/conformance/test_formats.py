@@ -378,7 +378,7 @@ CASES = [
     Case("motion-sensor", "position-no-header", lambda t, x: motion_position(t, x, header=0)),
     Case("motion-sensor", "position-no-error", lambda t, x: motion_position(t, x, error=False)),
     Case("motion-sensor", "position-UTF-16", lambda t, x: motion_position(t, x).decode().encode("utf-16")),
-    Case("motion-sensor", "velocity", motion_velocity, offset_known=False),
+    Case("motion-sensor", "velocity", motion_velocity, quantum_m=None, offset_known=False),
     Case("lvm", "one-tab", lvm),
     Case("lvm", "one-comma", lambda t, x: lvm(t, x, mark=",")),
     Case("lvm", "multi-decimal-comma", lambda t, x: lvm(t, x, "Multi", ";", ",")),

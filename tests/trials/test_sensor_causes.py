@@ -112,5 +112,4 @@ def test_numbers_hold_or_the_cause_is_named(shape: Callable[[Bench], F8]) -> Non
             wrong += 1
             by.update(off)
     print(f"\n{shape.__name__}: {TRIALS} records, {right} right, {wrong} wrong and not named {dict(by)}; {dict(codes)}")
-    # Straight lines that are rounded to a third of the noise look like coarse steps.
-    assert wrong <= (0.15 if shape is interpolated_and_printed else 0.05) * TRIALS
+    assert wrong <= 0.05 * TRIALS

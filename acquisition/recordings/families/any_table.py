@@ -19,9 +19,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import clock_s, parse_number
-from acquisition.recordings.tables.dialect import Header, text_format
-from acquisition.recordings.tables.headings import Heading, is_time, name_and_unit, split_heading
+from acquisition.recordings.tables.format import text_format
+from acquisition.recordings.tables.headings import Heading, headings_of, is_time, split_heading
 from acquisition.recordings.tables.layout import (
     Layout,
     are_row_numbers,
@@ -31,9 +32,9 @@ from acquisition.recordings.tables.layout import (
     times_by_name,
     times_by_steps,
 )
-from acquisition.recordings.tables.table import Formula
+from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text, decode
-from acquisition.recordings.units import measure_of, time_power
+from acquisition.recordings.units import measure_of, time_unit
 
 _MONITOR = re.compile(
     r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",
@@ -92,7 +93,7 @@ def header(lines: Sequence[str]) -> Header | None:
         table.at,
         table.mark,
         [marked(at, each) for at, each in enumerate(headings)],
-        formula,
+        formula=formula,
         title=table.preamble[0] if table.preamble else "",
         ragged=len(values) > 1,
         traps=tuple(traps),
@@ -104,7 +105,7 @@ def header(lines: Sequence[str]) -> Header | None:
 def _headed(lines: Sequence[str]) -> Header | None:
     """Read headings with units in line 1, times first: these need no rows to be certain."""
     cells, mark = split_heading(lines[0])
-    headings = [Heading(*name_and_unit(cell)) for cell in cells]
+    headings = headings_of(cells)
     if len(headings) < 2 or not is_time(headings[0].name) or not all(each.unit for each in headings):
         return None
     cell = lines[1].split(mark)[0].strip(' "') if len(lines) > 1 else ""
@@ -118,7 +119,7 @@ def _units_beside(table: Layout) -> tuple[list[Heading], set[int]]:
     """Return the headings, with units taken from columns of units to the right of the numbers, and these columns."""
     headings, words = list(table.headings), set()
     for column, cells in enumerate(zip(*table.rows, strict=True)):
-        known = measure_of(cells[0]) is not None or time_power(cells[0]) is not None
+        known = measure_of(cells[0]) is not None or time_unit(cells[0]) is not None
         if column and known and parse_number(cells[0]) is None and len(set(cells)) == 1 and not headings[column].name:
             headings[column - 1] = replace(headings[column - 1], unit=headings[column - 1].unit or cells[0])
             words.add(column)

@@ -25,7 +25,7 @@ from acquisition.recordings.tables.text import HEAD_BYTES
 MOST_BYTES = 1 << 28
 """Maximum unpacked size of all parts of a file, bytes; one hour of a phone's sensor data takes a tenth of it."""
 _MAGIC = b"PK\x03\x04"
-_CONTAINERS = ("workbook", "zip")
+_NOT_INSIDE = ("motion-sensor", "workbook", "zip")  # the first sums velocities only in a file of its own
 _MOST_MEMBERS = 2000
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError)
 """Exceptions that zipfile raises for damaged or encrypted files and for unknown kinds of compression."""
@@ -114,7 +114,7 @@ def _evidence(head: bytes) -> str:
 
 
 def _tables(path: str, data: bytes) -> list[Table]:
-    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in _CONTAINERS]
+    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in _NOT_INSIDE]
 
     def reader(name: str, data: bytes) -> Callable[[], Sequence[Table]] | None:
         family = next((each for each in families if each.recognises(data[:HEAD_BYTES])), None)

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
 from acquisition.errors import AcquisitionError
 from acquisition.recordings.base import dialect_folder
-from acquisition.recordings.tables.dialect import Header, text_format
-from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.sampling.timing import Formula
+from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
-from acquisition.recordings.tables.table import Formula
-from acquisition.recordings.units import TIMES, time_power
+from acquisition.recordings.tables.table import Header
+from acquisition.recordings.units import TIMES, time_unit
 from acquisition.regular_file import open_regular_text
-
-_SEPARATORS = {"tab": "\t", "blank": "", ";": ";", ",": ",", "|": "|"}
 
 
 class _Column(msgspec.Struct, forbid_unknown_fields=True):
@@ -26,14 +24,18 @@ class _Column(msgspec.Struct, forbid_unknown_fields=True):
     time: bool = False
     aside: bool = False
 
+    def __post_init__(self) -> None:
+        if self.time and self.unit and time_unit(self.unit) is None:
+            raise ValueError(f'unit of a time must be one of {", ".join(TIMES)}, got "{self.unit}"')
+
 
 class _Declared(msgspec.Struct, forbid_unknown_fields=True):
     begins: Annotated[str, msgspec.Meta(pattern=r"\S")]
     column: Annotated[list[_Column], msgspec.Meta(min_length=1)]
     title: str = ""
-    separator: str = ","
+    separator: Literal["tab", "blank", ";", ",", "|"] = ","
     heading: Annotated[int, msgspec.Meta(ge=0, le=1000)] = 1
-    rate_hz: Annotated[float, msgspec.Meta(gt=0)] | None = None
+    rate_hz: Annotated[float, msgspec.Meta(gt=0, lt=1e12)] | None = None
 
 
 def dialects() -> Iterator[ColumnFormat]:
@@ -67,17 +69,6 @@ def dialect(path: str, text: str) -> ColumnFormat:
         raise AcquisitionError(f"{path}: {' '.join(str(error).split())}; correct it") from error
     except msgspec.DecodeError as error:
         raise AcquisitionError(f"{path}: expected TOML, got {error}; repair or remove it") from error
-    if declared.separator not in _SEPARATORS:
-        allowed = ", ".join(f'"{each}"' for each in _SEPARATORS)
-        raise AcquisitionError(f'{path}: separator must be one of {allowed}, got "{declared.separator}"')
-    for number, each in enumerate(declared.column, 1):
-        if each.time and each.unit and time_power(each.unit) is None:
-            allowed = ", ".join(TIMES)
-            raise AcquisitionError(
-                f'{path}: column {number}: unit of a time must be one of {allowed}, got "{each.unit}"'
-            )
-    if declared.rate_hz == float("inf"):
-        raise AcquisitionError(f"{path}: rate_hz must be a positive number, got inf")
     name = Path(path).stem
     headings = [
         Heading(each.name, each.unit, role="time" if each.time else "aside" if each.aside else "channel")
@@ -90,7 +81,8 @@ def dialect(path: str, text: str) -> ColumnFormat:
         if not lines[0].lstrip("\ufeff").startswith(declared.begins):
             return None
         why = f'line 1 begins with "{declared.begins}", as {name}.toml says'
+        mark = {"tab": "\t", "blank": ""}.get(declared.separator, declared.separator)
         title = lines[0].strip() if declared.heading else ""
-        return Header(why, declared.heading, _SEPARATORS[declared.separator], headings, formula, title=title)
+        return Header(why, declared.heading, mark, headings, formula=formula, title=title)
 
     return text_format(name, declared.title or f"declared in {Path(path).name}", header)

@@ -23,15 +23,16 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 from acquisition.recordings.tables.cells import parse_number
-from acquisition.recordings.tables.dialect import Header, text_format
+from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import (
     Heading,
-    guess_delimiter,
+    headings_of,
     is_time,
     name_and_unit,
     split_heading,
     words,
 )
+from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Line, Text
 
 _CAPSTONE = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+|Run \d+)")
@@ -105,7 +106,7 @@ def phyphox(lines: Sequence[str]) -> Header | None:
     if not _QUOTED.fullmatch(lines[0]):
         return None
     cells, mark = split_heading(lines[0])
-    headings = [Heading(*name_and_unit(cell)) for cell in cells]
+    headings = headings_of(cells)
     if len(headings) < 2 or not is_time(headings[0].name) or not headings[0].unit:
         return None
     begin = f'"{headings[0].name} ({headings[0].unit})"'
@@ -116,7 +117,7 @@ def tracker(lines: Sequence[str]) -> Header | None:
     """Read the line of headings, which is line 1, or line 2 below the name of the mass."""
     for at, line in enumerate(lines[:2]):
         cells, mark = _tracker_cells(line)
-        headings = [Heading(*name_and_unit(cell)) for cell in cells]
+        headings = headings_of(cells)
         names = [each.name for each in headings]
         if len(names) < 2 or names[0] != "t" or not _COORDINATES & set(names):
             continue
@@ -127,7 +128,7 @@ def tracker(lines: Sequence[str]) -> Header | None:
             return None
         mass = " ".join(above)
         why = f'line {at + 1} is "{" ".join(cells)}"' + (f' below "{mass}"' if at else "")
-        return Header(why, at + 1, mark or guess_delimiter(row), headings, title=mass)
+        return Header(why, at + 1, mark, headings, title=mass)
     return None
 
 
@@ -170,7 +171,7 @@ def _vernier_headings(lines: Sequence[str]) -> list[Heading]:
     """Combine long names with units; the units are in the last of two or three lines."""
     names = [cell.strip() for cell in lines[0].rstrip().split("\t")]
     if len(lines) == 1:
-        return [Heading(*name_and_unit(name)) for name in names]
+        return headings_of(names)
     units = [cell.strip().strip("()") for cell in lines[-1].split("\t")]
     units += [""] * (len(names) - len(units))
     return [Heading(name, unit) for name, unit in zip(names, units, strict=False)]

@@ -23,11 +23,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acquisition.errors import FormatError
+from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import name_and_unit
 from acquisition.recordings.tables.rows import read_rows
-from acquisition.recordings.tables.table import Column, Formula, Table
+from acquisition.recordings.tables.table import Column, Table
 from acquisition.recordings.tables.text import Line, Text, decode, is_text, text_of
 
 _MAGIC = "LabVIEW Measurement"
@@ -129,8 +130,9 @@ def _of_segment(
     if cells and cells[-1] == "Comment":
         cells.pop()
     first = Line(names.number + 1, names.next, names.next, "")
-    read, lines, traps = read_rows(path, text, first, mark, stop=stop)
-    read += [Column("", "", np.empty(0), np.empty(0, np.int8))] * (len(cells) - len(read))
+    table = read_rows(path, text, first, mark, stop=stop)
+    none = Column("", "", np.empty(0), np.empty(0, np.int8))
+    read = [*table.columns, *[none] * (len(cells) - len(table.columns))]
     beside = tuple(replace(column, name=name) for name, column in zip(cells, read, strict=False))
     mode = (top.first_of("X_Columns") or "One").lower()
     for at in range(1, len(cells), 2 if mode == "multi" else 1):
@@ -138,15 +140,14 @@ def _of_segment(
         timed = (segment.of_column("X_Dimension", at) or segment.first_of("X_Dimension") or "Time") == "Time"
         time = None if mode == "no" or not timed else beside[at - 1 if mode == "multi" else 0]
         aside = segment.of_column("Samples", at) == "0"
-        yield Table(
-            (replace(beside[at], name=name, unit=unit, aside=aside),),
+        yield replace(
+            table,
+            columns=(replace(beside[at], name=name, unit=unit, aside=aside),),
             times=None if time is None else replace(time, unit="s"),
             formula=_formula(segment, at) if timed else None,
             run=run,
             start_time=_start_time(segment, at),
             ragged=True,
-            traps=traps,
-            lines=lines,
             beside=beside,
         )
 

@@ -29,8 +29,7 @@ from acquisition.block import F8
 from acquisition.errors import FormatError
 from acquisition.recordings.families.dialects import logger_pro, phyphox, tracker
 from acquisition.recordings.tables.cells import parse_number
-from acquisition.recordings.tables.dialect import text_format
-from acquisition.recordings.tables.format import ColumnFormat
+from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading, Role, is_time, name_and_unit, numbered_apart
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Table, side_by_side
@@ -81,8 +80,8 @@ def _numbers(cells: Iterable[str]) -> F8:
 
 def _tables_of(columns: Sequence[tuple[Heading, F8]], run: str = "") -> list[Table]:
     """Return the tables of columns that have been read; shorter ones end in NaN."""
-    read = [Column(each.name, each.unit, values) for each, values in columns]
-    return side_by_side(read, [each for each, _ in columns], run=run)
+    read = tuple(Column(each.name, each.unit, values) for each, values in columns)
+    return side_by_side(Table(read), [each for each, _ in columns], run)
 
 
 def _begins(head: bytes, root: re.Pattern[str]) -> bool:
@@ -202,8 +201,7 @@ def _cassy_text(path: str, text: Text) -> list[Table]:
     tab = text.data.rfind(b"\t", first.start, text.stop)
     end = next((line.next for line in text.lines(tab)), text.stop)
     stop = end if b"\n" in text.data[end : text.stop] else text.stop
-    columns, rows, traps = read_rows(path, text, first, "\t", stop=stop)
-    return side_by_side(columns, headings, Table((), ragged=True, traps=traps, lines=rows))
+    return side_by_side(replace(read_rows(path, text, first, "\t", stop=stop), ragged=True), headings)
 
 
 def _described(path: str, above: Sequence[str], width: int) -> list[Heading]:

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import FormatError
+from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import is_time
-from acquisition.recordings.tables.table import Column, Formula, Table
+from acquisition.recordings.tables.table import Column, Table
 
 _MAGIC = b"TDSm"
 _UNITS = ("unit_string", "NI_UnitDescription", "wf_yunit_string", "Unit")

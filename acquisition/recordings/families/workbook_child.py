@@ -19,7 +19,6 @@ from typing import Any
 _DIGITS = 15
 _BLANK = str.maketrans("\t\r\n", "   ")
 
-
 Cell = float | str
 
 
@@ -34,7 +33,7 @@ def read_sheets(data: bytes, most_letters: int) -> list[tuple[str, list[list[Cel
         rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
         columns = []
         for column in zip(*rows, strict=True):
-            columns.append([_rounded(cell) if _is_number(cell) else _word(cell) for cell in column])
+            columns.append([_plain(cell) for cell in column])
             letters += sum(len(cell) if isinstance(cell, str) else 8 for cell in columns[-1])
             if letters > most_letters:
                 raise ValueError("its cells are too many or too long")
@@ -42,18 +41,10 @@ def read_sheets(data: bytes, most_letters: int) -> list[tuple[str, list[list[Cel
     return sheets
 
 
-def _rounded(number: float) -> Cell:
-    """Round to the digits that spreadsheet programs show and compute with; infinite numbers become text."""
-    return float(f"{number:.{_DIGITS}g}") if math.isfinite(number) else str(number)
-
-
-def _is_number(cell: object) -> bool:
-    """Return whether a cell is a number; an xls has two types of numbers."""
-    return isinstance(cell, (int, float)) and not isinstance(cell, bool)
-
-
-def _word(cell: object) -> str:
-    """Return a cell that is not a number as text; a duration is given in seconds."""
+def _plain(cell: object) -> Cell:
+    """Return a number with the digits that spreadsheet programs show and compute with; text for any other cell."""
+    if isinstance(cell, (int, float)) and not isinstance(cell, bool):
+        return float(f"{cell:.{_DIGITS}g}") if math.isfinite(cell) else str(cell)
     if isinstance(cell, datetime.timedelta):
         return f"{cell.total_seconds():g}"
     if isinstance(cell, datetime.datetime):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,6 @@ from acquisition.block import B1, F8, I8, U8, Flag
 _USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
 _SHARE_ON_GRID = 0.5
 _PROBE = 2048
-_BLOCK = 16384
 
 
 class Grid(NamedTuple):
@@ -117,67 +115,37 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
     return step, relative_u
 
 
-def snap(t: F8, grid: Grid, resolution: float, out: F8 | None = None) -> tuple[F8, B1]:
+def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, B1]:
     """Replace each time by the nearest grid point if the two agree within the rounding of the printed time.
 
-    Return the times and a mask of those that agree. ``out`` may receive the times; it may be ``t`` itself.
+    Return the times and a mask of those that agree.
     """
-    snapped = np.empty(t.size) if out is None else out
-    agrees = np.empty(t.size, bool)
-    for start in range(0, t.size, _BLOCK):  # blocks that fit into the cache are much faster
-        rows = slice(start, start + _BLOCK)
-        exact = grid.time(grid.nearest(t[rows]))
-        agrees[rows] = np.abs(exact - t[rows]) <= resolution * 0.5001
-        snapped[rows] = exact if agrees[rows].all() else np.where(agrees[rows], exact, t[rows])
-    return snapped, agrees
+    exact = grid.time(grid.nearest(t))
+    agrees = np.abs(exact - t) <= resolution * 0.5001
+    return np.where(agrees, exact, t), agrees
 
 
-def place_unread(t: F8, unread: B1, grid: Grid | None, cut: str, decimals: int) -> F8:
-    """Return the times of all rows; infer those of unread rows from the grid and the neighbouring rows.
+def place_unread(t: F8, unread: B1, grid: Grid | None) -> F8:
+    """Return the times of all rows; NaN for an unread row if nothing shows that it was a sample.
 
-    The time of an unread row is its printed time or NaN. ``cut`` is the first cell of an incomplete last row, or empty;
-    it must begin like the next time with its decimals. A time that cannot be inferred is NaN, because nothing shows
-    that the row was a sample.
+    An unread row has a time if the unread rows exactly fill the grid between two others, or if its printed time (a NaN
+    if that was not read either) is the one that its row number predicts. Without a grid it must lie between the others.
     """
     out = np.where(unread, np.nan, t)
-    for start, stop in _runs(unread):
-        before = float(t[start - 1]) if start else -np.inf
-        after = float(t[stop]) if stop < t.size else np.inf
-        inside = bool(np.isfinite(after - before))
-        if grid is not None and inside and round((after - before) * grid.rate_hz) == stop - start + 1:
-            out[start:stop] = grid.time(grid.nearest(np.array([before]))[0] + 1 + np.arange(stop - start))
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], unread.view(np.int8), [0]))))
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        own = t[start:stop]
+        before, after = t[start - 1] if start else -np.inf, t[stop] if stop < t.size else np.inf
+        if grid is None:
+            out[start:stop] = np.where(np.isfinite(after - before) & (before < own) & (own < after), own, np.nan)
             continue
-        last = before
-        for row in range(start, stop):
-            time = float(t[row])
-            fits = inside
-            if grid is not None and np.isfinite(time):
-                time = float(grid.time(grid.nearest(np.array([time])))[0])
-                # At either end of the file only the expected step is accepted, because a digit may be damaged.
-                steps = time - before, row - start + 1
-                steps = steps if start else (after - time, stop - row)
-                fits = inside or abs(steps[0] * grid.rate_hz - steps[1]) < 0.5
-            if fits and last < time < after:
-                out[row] = last = time
-        if cut and stop == t.size and np.isnan(out[-1]) and grid is not None and np.isfinite(last):
-            follows = float(grid.time(grid.nearest(np.array([last])) + 1)[0])
-            if f"{follows:.{decimals}f}".startswith(cut):
-                out[-1] = follows
+        # As numbers of steps of the grid: the printed time, and what the rows above and below predict.
+        first, printed, last = ((each - grid.origin_s) * grid.rate_hz for each in (before, own, after))
+        above, below = first + 1 + np.arange(own.size), last - 1 - np.arange(own.size)[::-1]
+        fills = np.abs(above - below) < 0.5
+        alike = (np.abs(printed - above) < 0.5) | (np.abs(printed - below) < 0.5)
+        out[start:stop] = np.where(fills | alike, grid.time(np.rint(np.where(fills, above, printed))), np.nan)
     return out
-
-
-def _runs(mask: B1) -> Iterator[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.view(np.int8), [0]))))
-    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-
-
-def _even(t: F8, longest: float) -> bool:
-    """Return whether every step is positive and at most ``longest``."""
-    for start in range(0, t.size - 1, _BLOCK):
-        steps = np.diff(t[start : start + _BLOCK + 1])
-        if not (steps.min() > 0 and steps.max() <= longest):
-            return False
-    return True
 
 
 def time_flags(t: F8, step: float) -> U8:
@@ -187,7 +155,8 @@ def time_flags(t: F8, step: float) -> U8:
     ahead of its neighbours, only that time is flagged, and not all the times after it.
     """
     flags = np.zeros(t.size, np.uint8)
-    if t.size == 0 or _even(t, 1.5 * step):
+    steps = np.diff(t)
+    if not steps.size or (steps.min() > 0 and steps.max() <= 1.5 * step):
         return flags
     spike = np.zeros(t.size, bool)
     spike[:-1] = (t[:-1] > t[1:]) & (np.concatenate(([-np.inf], t[:-2])) < t[1:])

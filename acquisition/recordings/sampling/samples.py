@@ -35,11 +35,9 @@ def place(rows: Rows, timing: Timing) -> F8:
         return t
     if t is None:
         raise ValueError("without times only a grid has times of rows")
-    if not unread.any():
-        return t if grid is None else snap(t, grid, timing.resolution_s, out=t)[0]
     if grid is not None:
         t[~unread] = snap(t[~unread], grid, timing.resolution_s)[0]
-    return place_unread(t, unread, grid, rows.last_cell if unread[-1] else "", rows.decimals)
+    return place_unread(t, unread, grid) if unread.any() else t
 
 
 def flags_of(t: F8, value: F8, unread: B1, rate_hz: float) -> U8:

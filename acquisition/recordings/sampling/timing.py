@@ -24,15 +24,22 @@ _REGULAR_INTERVALS = 0.9  # minimum share of intervals that differ from the medi
 _SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; two rows may be two sensors
 
 
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """Times ``start_s + i * step_s`` as stated in a header, and the number of samples, if the header states it."""
+
+    start_s: float
+    step_s: float
+    samples: int | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
     """The rows of one channel, before they become samples; every array has one element for each row.
 
-    ``printed`` are the times as printed, s, or None; ``value`` the values in SI or a power of ten of it, NaN if unread
-    or absent. ``remark`` marks rows of text between samples, which are not samples. ``time_resolution`` (s) and
-    ``resolution`` are the last printed digits, the latter 0 for binary values. ``tolerance`` is half the last digit of
-    each time, if the times are compared with a formula in the header. ``cut`` says that the last row is incomplete,
-    ``last_cell`` is its first cell, and ``decimals`` the number of printed decimals of a time.
+    ``printed`` are the times as printed, s, or None; ``value`` the values in SI, NaN if unread or absent. ``remark``
+    marks rows of text between samples, which are not samples. ``time_resolution`` (s) and ``resolution`` are the last
+    printed digits, the latter 0 for binary values. ``cut`` says that the last row is incomplete.
     """
 
     printed: F8 | None
@@ -42,10 +49,7 @@ class Rows:
     line: Callable[[int], int]
     time_resolution: float
     resolution: float
-    tolerance: F8 | None = None
     cut: bool = False
-    last_cell: str = ""
-    decimals: int = 0
 
     @property
     def numbers(self) -> I8:
@@ -137,25 +141,21 @@ def _jitter(printed: F8) -> tuple[float, float] | None:
     return (low, high) if high - low <= _SHARE_OF_JITTER * middle else None
 
 
-def find_timing(
-    path: str, rows: Rows, formula: tuple[float, float, int | None] | None, rate_hz: float | None
-) -> tuple[Timing, list[Trap]]:
+def find_timing(path: str, rows: Rows, formula: Formula | None, rate_hz: float | None) -> tuple[Timing, list[Trap]]:
     """Return the rate and the grid of the times: those of the header if no column contradicts it, or of the column.
 
-    A formula is the start and the step of the times, s, and the number of samples, as a header states them. Without
-    any times the user must give the rate.
+    Without any times the user must give the rate.
     """
     traps: list[Trap] = []
     timing = None
     if formula is not None:
-        start_s, step_s, samples = formula
-        count = int(np.count_nonzero(~rows.remark))
+        samples, count = formula.samples, int(np.count_nonzero(~rows.remark))
         if samples is not None and samples != count:
             message = f"the header declares {samples} samples, but there are {count} rows; all are kept"
             traps.append(Trap("stale_header", message, abs(samples - count)))
-        timing = _by_formula(path, start_s, step_s, rows, rate_hz)
+        timing = _by_formula(path, formula, rows, rate_hz)
         if timing is None:
-            stated = f"the header states the times {start_s:g} s + i * {step_s:g} s"
+            stated = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
             what = "which are impossible" if rows.printed is None else "but the column of times differs and is used"
             size = 1 if rows.printed is None else rows.printed.size
             traps.append(Trap("stale_header", f"{stated}, {what}", size))
@@ -169,13 +169,14 @@ def find_timing(
     return timing, traps
 
 
-def _by_formula(path: str, start_s: float, step_s: float, rows: Rows, rate_hz: float | None) -> Timing | None:
+def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) -> Timing | None:
     """Return the times of a header; None if they are impossible or the column of times differs beyond its rounding."""
+    start_s, step_s = formula.start_s, formula.step_s
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
         return None
-    if rows.printed is not None and rows.tolerance is not None:
+    if rows.printed is not None:
         expected = start_s + step_s * rows.numbers
-        slack = rows.tolerance * 1.0001 + 1e-9 * np.maximum(np.abs(expected), step_s)
+        slack = 0.5001 * rows.time_resolution + 1e-9 * np.maximum(np.abs(expected), step_s)
         if ((np.abs(rows.printed - expected) > slack) & ~rows.unread).any():  # the comparison is false for a NaN
             return None
     rate = 1.0 / step_s

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePath
 
 import numpy as np
 
-from acquisition.block import B1, F8, I8, U8, Flag
+from acquisition.block import B1, F8, I8, U8, Block, Flag
 from acquisition.errors import FormatError
-from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps
-from acquisition.recordings.sampling.timing import Rows, Timing, clock_traps, find_timing
-from acquisition.recordings.tables.cells import EMPTY, EXPONENT, I1, UNREAD, scaled, usual_decimals
-from acquisition.recordings.tables.table import Column, Lines, Table
-from acquisition.recordings.units import TIMES, time_factor, time_power
+from acquisition.recordings.recording import Original, Recording, Trap
+from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps, value_traps
+from acquisition.recordings.sampling.timing import Rows, Timing, check_rate, clock_traps, find_timing
+from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
+from acquisition.recordings.tables.choose import Answers, choose_channel, measure
+from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
+from acquisition.recordings.tables.text import says_simulated
+from acquisition.recordings.units import TIMES, Measure, time_unit
+from acquisition.source import ClockKind, Kind, SourceInfo
 
 _LONGEST_S = 1e10
 """Times beyond three hundred years are no times."""
@@ -22,12 +26,17 @@ _LONGEST_S = 1e10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """The samples of one channel: seconds, values, flags, and what was noticed about them.
+    """The samples of a chosen channel in SI units, and the remarks on them and on the file.
 
     ``resolution`` is the size of the last printed digit of a value. ``line`` returns the line number of a sample; None
-    for a binary file. ``sound`` marks the rows of the table that could be read.
+    for a binary file. ``sound`` marks the rows of the table that could be read. ``quantum`` is the step of which all
+    values are multiples, and ``error_m`` the usual error that the file states.
     """
 
+    path: str
+    table: Table
+    column: Column
+    measured: Measure
     t: F8
     value: F8
     flags: U8
@@ -35,21 +44,60 @@ class Samples:
     resolution: float
     traps: tuple[Trap, ...]
     line: Callable[[int], int | None]
-    malformed_rows: int
     sound: B1
+    quantum: float | None = None
+    error_m: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The file's name without its folder."""
+        return PurePath(self.path).name
+
+    def recording(self, family: str, data: bytes, block: Block, more: Iterable[Trap] = ()) -> Recording:
+        """Return the recording of a block, which is made of these samples."""
+        table, column, name = self.table, self.column, self.name
+        kind: Kind = "simulated" if says_simulated(f"{table.title} {table.run} {column.name} {name}") else "replay"
+        clock: ClockKind = "device" if self.timing.grid is None else "nominal"
+        return Recording(
+            format=family,
+            path=self.path,
+            info=SourceInfo(kind, name, self.timing.rate_hz, None, self.quantum, clock, self.error_m),
+            channel=column.name,
+            samples=block,
+            traps=(*self.traps, *more),
+            malformed_rows=int(np.count_nonzero(~self.sound)),
+            originals=(Original(name, data),),
+            title=table.title,
+            run=table.run,
+            start_time=table.start_time,
+        )
 
 
-def read_samples(
-    path: str, table: Table, column: Column, power: int, rate_hz: float | None, *, difference: bool = False
-) -> Samples:
-    """Read a channel, its values multiplied by ten to a power.
+def read_channel(path: str, tables: Sequence[Table], answers: Answers, *, difference: bool = False) -> Samples:
+    """Choose a channel and read its samples.
 
     ``difference`` says that each value is the difference from the row before, so that the first may be absent.
     """
-    rows = rows_of(path, table, column, power)
-    stated = table.formula
-    formula = None if stated is None else (stated.start_s, stated.step_s, stated.samples)
-    timing, found = find_timing(path, rows, formula, rate_hz)
+    check_rate(path, answers.rate_hz)
+    table, column = choose_channel(path, names_apart(tables), answers)
+    measured, traps = measure(path, column, answers.unit)
+    rows = rows_of(path, table, column, measured)
+    samples = read_samples(path, rows, table, column, measured, answers.rate_hz, difference=difference)
+    return replace(samples, traps=(*table.traps, *traps, *samples.traps))
+
+
+def read_samples(
+    path: str,
+    rows: Rows,
+    table: Table,
+    column: Column,
+    measured: Measure,
+    rate_hz: float | None,
+    *,
+    difference: bool = False,
+) -> Samples:
+    """Return the samples in the rows of a channel."""
+    timing, found = find_timing(path, rows, table.formula, rate_hz)
     if table.formula is None and table.times is not None and not table.times.unit:
         found.append(Trap("unit_assumed", "the times have no unit: read as seconds"))
     found.extend(clock_traps(timing))
@@ -68,35 +116,41 @@ def read_samples(
     if difference and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
     zeros = table.lines.zeros if table.lines else 0
-    traps = (*found, *row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line))
-    malformed = int(np.count_nonzero(unread))
-    return Samples(t, value, flags, timing, rows.resolution, traps, line, malformed, ~unread)
+    found += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line)]
+    return Samples(path, table, column, measured, t, value, flags, timing, rows.resolution, tuple(found), line, ~unread)
 
 
-def rows_of(path: str, table: Table, column: Column, power: int) -> Rows:
+def check_values(samples: Samples, *, length: bool) -> Samples:
+    """Return samples with their quantum and with what is peculiar in their values; see :func:`value_traps`."""
+    quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.line, length=length)
+    return replace(samples, quantum=quantum or None, traps=(*samples.traps, *found))
+
+
+def rows_of(path: str, table: Table, column: Column, measured: Measure) -> Rows:
     """Return the rows of a channel, including those that could not be read; raise an error if there are no numbers."""
     unit = table.times.unit if table.times else ""
-    to_seconds = time_power(unit) if unit else 0
-    if to_seconds is None:
+    seconds = time_unit(unit or "s")
+    if seconds is None:
         problem = f'expected times in one of {", ".join(TIMES)}, got "{unit}"'
         raise FormatError(path, problem, "export the times in seconds")
     if table.lines is None:
-        return _binary_rows(table.times, column, power, to_seconds)
-    return _text_rows(path, table, table.lines, column, power, to_seconds)
+        return _binary_rows(table.times, column, measured, seconds)
+    return _text_rows(path, table, table.lines, column, measured, seconds)
 
 
-def _binary_rows(times: Column | None, column: Column, power: int, to_seconds: int) -> Rows:
+def _binary_rows(times: Column | None, column: Column, measured: Measure, seconds: Measure) -> Rows:
     size = max(column.values.size, times.values.size if times else 0)
-    value, t, unread = scaled(column.of_size(size).values, None, power), None, np.zeros(size, bool)
+    value, t, unread = scaled(column.of_size(size).values, None, measured.power), None, np.zeros(size, bool)
+    value *= measured.factor
     if times is not None:
-        t = scaled(times.of_size(size).values * time_factor(times.unit), None, to_seconds)
+        t = scaled(times.of_size(size).values * seconds.factor, None, seconds.power)
         unread = ~np.isfinite(t)
     value[unread] = np.nan
     largest = 0.0 if t is None else float(np.fmax.reduce(np.abs(t), initial=0.0))
     return Rows(t, value, unread, np.zeros(size, bool), lambda _: 0, max(float(np.spacing(largest)), 1e-12), 0.0)
 
 
-def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int, to_seconds: int) -> Rows:
+def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: Measure, seconds: Measure) -> Rows:
     own, time = column.of_size(lines.rows), table.times and table.times.of_size(lines.rows)
     form = own.forms
     # A row of words without a value is a remark between rows; a row of a longer channel is none of this channel's.
@@ -115,18 +169,18 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int
         raise _no_numbers(path, column, 0, lines.first)
     chosen = _rows_in(keep)
     remark, unknown = remark[chosen], (unread | remark)[chosen]
-    printed, tolerance, time_digit, decimals = None, None, 0.0, 0
+    printed, time_digit = None, 0.0
     if time is not None:
-        printed = scaled(time.values, time.forms, to_seconds)[chosen]
-        time_digit, decimals = last_digit(printed, time.forms, to_seconds), usual_decimals(time.forms)[0]
-        if table.formula is not None:
-            tolerance = _tolerance(printed, time.forms[chosen], to_seconds)
-        printed, time_digit = printed * time_factor(time.unit), time_digit * time_factor(time.unit)
+        printed = scaled(time.values, time.forms, seconds.power)[chosen]
+        time_digit = last_digit(printed, time.forms, seconds.power)
+        printed, time_digit = printed * seconds.factor, time_digit * seconds.factor
         beyond = ~(np.abs(printed) < _LONGEST_S)  # true for a NaN
         printed[beyond] = np.nan
         unknown |= beyond
-    value = scaled(own.values, form, power)[chosen]
+    value = scaled(own.values, form, measured.power)[chosen]
     value[unknown] = np.nan
+    resolution = last_digit(value, form, measured.power) * measured.factor
+    value *= measured.factor
 
     def line(row: int) -> int:
         return lines.line(row if isinstance(chosen, slice) else int(chosen[row]))
@@ -140,11 +194,8 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, power: int
         remark=remark,
         line=line,
         time_resolution=time_digit,
-        resolution=last_digit(value, form, power),
-        tolerance=tolerance,
+        resolution=resolution,
         cut=lines.cut and bool(unknown[-1]) and bool(keep[-1]),
-        last_cell=lines.last_cell,
-        decimals=decimals,
     )
 
 
@@ -169,12 +220,3 @@ def last_digit(values: F8, decimals: I1, power: int) -> float:
         largest = float(np.fmax.reduce(np.abs(values), initial=0.0))
         power = int(np.floor(np.log10(largest))) if largest > 0 else power
     return float(f"1e{power - usual}")
-
-
-def _tolerance(printed: F8, decimals: I1, power: int) -> F8:
-    """Return half the last printed digit of each time, s; with an exponent, an estimate from the size of the time.
-
-    The estimate is not too small if the mantissa is at least 1.
-    """
-    places = np.where(decimals < 0, 0.0, decimals % EXPONENT)
-    return 0.5 * 10.0**-places * np.where(decimals >= EXPONENT, np.abs(printed), 10.0**power)

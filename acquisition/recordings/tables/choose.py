@@ -16,7 +16,7 @@ from acquisition.recordings.sampling.nominal import median
 from acquisition.recordings.sampling.timing import rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
-from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_power, unit_words
+from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
 
 _SLOW_S = 0.999
 """Time steps of a second or more without a unit may be milliseconds, so their unit must be stated."""
@@ -57,7 +57,8 @@ def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Chan
     run = _run_of_name(path, runs, answers.run)
     channels = [(table, column) for table in tables if table.run == run for column in table.columns]
     if answers.channel is not None:
-        table, column = channels[_index_of_name(path, [each for _, each in channels], answers.channel)]
+        names = [(each.name, each.label) for _, each in channels]
+        table, column = channels[_index_of_name(path, Missing.CHANNEL, names, answers.channel)]
     else:
         fit = _candidates([each for each in channels if each[1].name != answers.time] or channels)
         table, column = next((each for each in fit if each[1].measure), fit[0])
@@ -115,27 +116,25 @@ def _run_of_name(path: str, runs: Sequence[str], run: str | None) -> str:
         return runs[0]
     if runs == ("",):
         raise FormatError(path, f'the file has one run without a name, got run "{run}"', "leave run out")
-    alike = [name for name in runs if name == run] or [name for name in runs if _plain(name) == _plain(run)]
-    # "2" is enough for "Run #2".
-    alike = alike or [name for name in runs if re.fullmatch(rf"\D*#?\s*0*{re.escape(run.strip())}", name)]
+    return runs[_index_of_name(path, Missing.RUN, [(each,) for each in runs], run)]
+
+
+def _index_of_name(path: str, what: Missing, names: Sequence[tuple[str, ...]], wanted: str) -> int:
+    """Return the index of the item with a name in one of its forms, or ask which one is meant."""
+    number = re.compile(rf"\D*#?\s*0*{re.escape(wanted.strip())}")  # "2" is enough for "Run #2"
+    for fits in (
+        lambda forms: wanted == forms[0],
+        lambda forms: wanted in forms,
+        lambda forms: _plain(wanted) in map(_plain, forms),
+        lambda forms: what is Missing.RUN and number.fullmatch(forms[0]),
+    ):
+        if alike := [at for at, forms in enumerate(names) if fits(forms)]:
+            break
     if len(alike) == 1:
         return alike[0]
-    reason = f'run "{run}" ' + (f"is the name of {len(alike)} runs" if alike else "is not in the file")
-    raise NeedsAnswer(Question(path, (MissingItem(Missing.RUN, tuple(runs), runs[0]),), reason=reason))
-
-
-def _index_of_name(path: str, columns: Sequence[Column], name: str, what: Missing = Missing.CHANNEL) -> int:
-    """Return the index of the column with a name, which may include the unit, or ask which one is meant."""
-    forms = (lambda each: each.name == name, lambda each: each.label == name)
-    wanted = _plain(name)
-    for fits in (*forms, lambda each: wanted in (_plain(each.label), _plain(each.name))):
-        alike = [at for at, each in enumerate(columns) if fits(each)]
-        if len(alike) == 1:
-            return alike[0]
-        if alike:
-            break
-    choices = tuple(each.name for each in columns)
-    reason = f'{what} "{name}" ' + (f"is the name of {len(alike)} columns" if alike else "is not in the file")
+    kind = "runs" if what is Missing.RUN else "columns"
+    reason = f'{what} "{wanted}" ' + (f"is the name of {len(alike)} {kind}" if alike else "is not in the file")
+    choices = tuple(forms[0] for forms in names)
     raise NeedsAnswer(Question(path, (MissingItem(what, choices, choices[0]),), reason=reason))
 
 
@@ -149,33 +148,28 @@ def _plain(name: str) -> str:
 def _timed_by(path: str, table: Table, column: Column, time: str) -> Table:
     """Return the table with another column as its times, named with or without its unit, or by its number."""
     beside = table.beside or table.columns
-    plain = " ".join(name_and_unit(time)[0].lower().split())
-    number = re.fullmatch(r"column (\d{1,4})", plain)
-    at = next((at for at, each in enumerate(beside) if plain == " ".join(each.name.lower().split())), None)
-    if at is None and number and 0 < int(number[1]) <= len(beside):
-        at = int(number[1]) - 1
-    if at is None:
-        others = [each for each in table.columns if each.values is not column.values] or [column]
-        times = others[_index_of_name(path, others, time, Missing.TIME)]
-    else:
-        times = beside[at]
+    number = re.fullmatch(r"column (\d{1,4})", name_and_unit(time)[0].strip().lower())
+    at = int(number[1]) - 1 if number else -1
+    others = [each for each in beside if each.values is not column.values] or [column]
+    names = [(each.name, each.label) for each in others]
+    times = beside[at] if 0 <= at < len(beside) else others[_index_of_name(path, Missing.TIME, names, time)]
     if table.times is not None and times.values is table.times.values:
         return table
     if times.values is column.values:
         raise FormatError(path, f'"{time}" cannot be both channel and time', "name another column for one of them")
     if table.lines is None and times.values.size != column.values.size:
         raise FormatError(path, f'"{time}" and "{column.name}" differ in length', "name another column of times")
-    unit = times.unit if time_power(times.unit) is not None else ""
+    unit = times.unit if time_unit(times.unit) is not None else ""
     return replace(table, times=replace(times, unit=unit), formula=None)
 
 
 def _with_time_unit(path: str, table: Table, unit: str) -> Table:
-    if time_power(unit) is None:
+    if time_unit(unit) is None:
         raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
     if table.times is None:
         raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
     stated = unit_words(table.times.unit)
-    if time_power(stated) is not None and stated != unit_words(unit):
+    if time_unit(stated) is not None and stated != unit_words(unit):
         raise FormatError(path, f'time unit must be {stated} as stated by the file, got "{unit}"', "leave it out")
     return replace(table, times=replace(table.times, unit=unit))
 
@@ -186,7 +180,7 @@ def _missing_times(columns: Sequence[Column], table: Table, column: Column, answ
             return []
         others = tuple(each.name for each in columns if each.name != column.name)
         return [rate_needed(MissingItem(Missing.TIME, others, others[0]) if others else None)]
-    if table.times is None or table.formula is not None or time_power(table.times.unit) is not None:
+    if table.times is None or table.formula is not None or time_unit(table.times.unit) is not None:
         return []
     first = _first_numbers(table.times)
     if table.times.unit or (first.size > 1 and float(median(np.diff(first))) >= _SLOW_S):

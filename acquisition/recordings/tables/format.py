@@ -2,76 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from pathlib import PurePath
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import islice
+from typing import Any
 
-from acquisition.block import F8, Block
+from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.base import Survey
-from acquisition.recordings.recording import Original, Recording, Trap
-from acquisition.recordings.sampling.samples import value_traps
-from acquisition.recordings.sampling.timing import check_rate
-from acquisition.recordings.tables.channel import Samples, read_samples, rows_of
-from acquisition.recordings.tables.choose import Answers, choose_channel, measure
-from acquisition.recordings.tables.table import Column, Table, names_apart
-from acquisition.recordings.tables.text import says_simulated
-from acquisition.recordings.units import Measure
-from acquisition.source import ClockKind, Kind, SourceInfo
+from acquisition.recordings.recording import Recording, Trap
+from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
+from acquisition.recordings.tables.choose import Answers
+from acquisition.recordings.tables.rows import Sheet, read_rows
+from acquisition.recordings.tables.table import Column, Header, Stated, Table, names_apart, side_by_side
+from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
+from acquisition.recordings.units import NUMBER
 
-if TYPE_CHECKING:
-    from acquisition.recordings.tables.dialect import Header
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Reading:
-    """A chosen channel with its samples, and the remarks on the file and the unit; ``value`` is in SI."""
-
-    table: Table
-    column: Column
-    measured: Measure
-    samples: Samples
-    value: F8
-    traps: tuple[Trap, ...]
-
-    def recording(
-        self,
-        family: str,
-        path: str,
-        data: bytes,
-        block: Block,
-        quantum_m: float | None,
-        found: Iterable[Trap],
-        error_m: float | None = None,
-    ) -> Recording:
-        """Return the recording of a block, with what was found in its values."""
-        table, column, samples, name = self.table, self.column, self.samples, PurePath(path).name
-        kind: Kind = "simulated" if says_simulated(f"{table.title} {table.run} {column.name} {name}") else "replay"
-        clock: ClockKind = "device" if samples.timing.grid is None else "nominal"
-        return Recording(
-            format=family,
-            path=path,
-            info=SourceInfo(kind, name, samples.timing.rate_hz, None, quantum_m, clock, error_m),
-            channel=column.name,
-            samples=block,
-            traps=(*self.traps, *samples.traps, *found),
-            malformed_rows=samples.malformed_rows,
-            originals=(Original(name, data),),
-            title=table.title,
-            run=table.run,
-            start_time=table.start_time,
-        )
-
-
-def read_channel(path: str, tables: Sequence[Table], answers: Answers, *, difference: bool = False) -> Reading:
-    """Choose a channel and read its samples; ``difference`` says that each value is the step from the row before."""
-    check_rate(path, answers.rate_hz)
-    table, column = choose_channel(path, names_apart(tables), answers)
-    measured, traps = measure(path, column, answers.unit)
-    samples = read_samples(path, table, column, measured.power, answers.rate_hz, difference=difference)
-    value = samples.value if measured.factor == 1.0 else samples.value * measured.factor
-    return Reading(table, column, measured, samples, value, (*table.traps, *traps))
+_HEAD_LINES = 300
+_MOST_RUNS = 5000
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,49 +49,117 @@ class ColumnFormat:
         """Return whether there is evidence for this family."""
         return bool(self.evidence(head))
 
-    def read(
-        self,
-        path: str,
-        data: bytes,
-        *,
-        channel: str | None = None,
-        rate_hz: float | None = None,
-        unit: str | None = None,
-        run: str | None = None,
-        time: str | None = None,
-        time_unit: str | None = None,
-    ) -> Recording:
+    def read(self, path: str, data: bytes, **answers: Any) -> Recording:
         """Read one channel of one run; see :class:`springmass.extend.Format`."""
-        answers = Answers(channel, rate_hz, unit, run, time, time_unit)
-        reading = read_channel(path, self.tables(path, data), answers)
-        measured, samples, column = reading.measured, reading.samples, reading.column
-        distance = measured.quantity == "length" and (column.is_length or not column.unit)
-        quantum, found = value_traps(
-            reading.value, samples.flags, samples.resolution * measured.factor, samples.line, length=distance
-        )
-        block = Block(0, samples.t, reading.value, samples.flags, quantity=measured.quantity, unit=measured.si)
-        return reading.recording(self.name, path, data, block, quantum or None, found)
+        samples = read_channel(path, self.tables(path, data), Answers(**answers))
+        length = samples.measured.quantity == "length" and (samples.column.is_length or not samples.column.unit)
+        samples, measured = check_values(samples, length=length), samples.measured
+        block = Block(0, samples.t, samples.value, samples.flags, quantity=measured.quantity, unit=measured.si)
+        return samples.recording(self.name, data, block)
 
     def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
         """Return the description of every channel, as far as the file states it."""
         channels = [(table, each) for table in names_apart(self.tables(path, data)) for each in table.columns]
         surveys = tuple(_survey(path, *each) for each in channels)
         if not any(each.samples for each in surveys):
-            rows_of(path, *channels[0], 0)  # raises the error
+            rows_of(path, *channels[0], NUMBER)  # raises the error
         return surveys
 
 
 def _survey(path: str, table: Table, column: Column) -> Survey:
-    rows = 0
+    measured = column.measure or NUMBER
     try:
-        power = column.measure.power if column.measure else 0
-        rows = rows_of(path, table, column, power).value.size
-        samples = read_samples(path, table, column, power, None)
+        rows = rows_of(path, table, column, measured)
+        samples = read_samples(path, rows, table, column, measured, None)
     except NeedsAnswer:
-        return Survey(table.run, column.name, column.unit, rows, None, ())
+        return Survey(table.run, column.name, column.unit, rows.value.size, None, ())
     except FormatError as error:
         # A channel without numbers must not prevent the listing of other channels.
         none = Trap("empty_channel", str(error).removeprefix(path).lstrip(", :"))
         return Survey(table.run, column.name, column.unit, 0, None, (none,))
     span_s = float(samples.t.max() - samples.t.min())
     return Survey(table.run, column.name, column.unit, samples.t.size, samples.timing.rate_hz, samples.traps, span_s)
+
+
+def text_format(
+    name: str,
+    title: str,
+    header: Callable[[Sequence[str]], Header | None],
+    *,
+    expected: str = "other lines above the rows",
+    prepare: Callable[[Text], Text] | None = None,
+    blocks: Callable[[Text, Header], Iterator[tuple[Line, Header]]] | None = None,
+) -> ColumnFormat:
+    """Return a format of text whose rows follow below some lines that identify it.
+
+    Parameters
+    ----------
+    name, title : str
+        Name in the registry and on the command line, and one line for the user.
+    header : callable
+        Takes the first lines of a text; returns what they say, or None for lines of another family. It never raises.
+    expected : str, optional
+        What the lines above the rows should be, for an error message.
+    prepare : callable, optional
+        Takes the text and returns it without what precedes its rows.
+    blocks : callable, optional
+        Takes the text and its first header; yields the first line and the header of each further run below.
+
+    Returns
+    -------
+    ColumnFormat
+    """
+
+    def evidence(head: bytes) -> str:
+        lines = head_lines(head)
+        if prepare is not None and lines != [""]:
+            lines = [line.text for line in prepare(Text.of(head)).head(_HEAD_LINES)]
+        found = header(lines[:_HEAD_LINES])
+        return found.why if found else ""
+
+    def tables(path: str, data: bytes) -> list[Table]:
+        text = text_of(path, data)
+        return tables_of_text(path, prepare(text) if prepare else text, header, expected, blocks)
+
+    return ColumnFormat(name, title, evidence, tables, header)
+
+
+def tables_of_text(
+    path: str,
+    text: Text | Sheet,
+    header: Callable[[Sequence[str]], Header | None],
+    expected: str,
+    blocks: Callable[[Text, Header], Iterator[tuple[Line, Header]]] | None = None,
+) -> list[Table]:
+    """Read a text or a sheet: its header, the rows below it, and further runs with their headers."""
+    head = text.head(_HEAD_LINES)
+    found = header([line.text for line in head] or [""])
+    if found is None or not head:
+        raise FormatError(path, f"expected {expected}", "export the run again", line=1)
+    begins = [(head[0], found)]
+    if blocks is not None and isinstance(text, Text):
+        begins += islice(blocks(text, found), _MOST_RUNS)
+    if len(begins) > _MOST_RUNS:
+        raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
+    title, several = " / ".join([each.title for _, each in begins if each.title][:4]), len(begins) > 1
+    ends = [*(begin.start for begin, _ in begins[1:]), None]
+    tables: list[Table] = []
+    for (begin, own), end in zip(begins, ends, strict=True):
+        tables += _tables(path, text, begin, replace(own, title=title, run=own.run if several else ""), end)
+    return tables
+
+
+def _tables(path: str, text: Text | Sheet, begin: Line, header: Header, stop: int | None) -> list[Table]:
+    """Read the rows below a header that begins at a line."""
+    if isinstance(text, Sheet):
+        first = Line(begin.number + header.lines, 0, 0, "")
+    else:
+        end = Line(begin.number + header.lines, text.stop, text.stop, "")
+        first = next(islice(text.lines(begin.start, begin.number), header.lines, None), end)
+    read = read_rows(path, text, first, header.delimiter, stop=stop, clock=header.clock, brackets=header.brackets)
+    stated = {each.name: getattr(header, each.name) for each in fields(Stated)}
+    common = replace(read, **{**stated, "traps": (*header.traps, *read.traps)})
+    tables = side_by_side(common, header.headings, header.run)
+    if not tables:
+        raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")
+    return tables

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from acquisition.recordings.units import measure_of, time_power
+from acquisition.recordings.units import measure_of, time_unit
 
 
 def words(text: str) -> frozenset[str]:
@@ -79,6 +79,11 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     return match["name"].strip(), match["unit"].strip()
 
 
+def headings_of(cells: Sequence[str]) -> list[Heading]:
+    """Return the headings in cells, each with its unit in brackets."""
+    return [Heading(*name_and_unit(cell)) for cell in cells]
+
+
 def heading_of(cell: str) -> tuple[str, str]:
     """Split a heading into name and unit: the unit is in brackets, after a slash, or after a last underscore."""
     name, unit = name_and_unit(cell)
@@ -95,7 +100,7 @@ def _ends(name: str, unit: str) -> bool:
     """Return whether the end of a name is its unit; h is a unit only for a time."""
     if unit in _NO_TAIL or (unit == "h" and not is_time(name)):
         return False
-    return measure_of(unit) is not None or time_power(unit) is not None
+    return measure_of(unit) is not None or time_unit(unit) is not None
 
 
 def is_time(name: str) -> bool:
@@ -121,31 +126,6 @@ def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
     while cells and not cells[-1]:
         cells.pop()
     return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells], mark
-
-
-def guess_delimiter(line: str) -> str:
-    """Return the separator of the cells of a row; an empty string means runs of white space.
-
-    A comma is the separator only if there is no other separator, because it may be a decimal mark.
-    """
-    for mark in "\t;":
-        if mark in line:
-            return mark
-    if "," not in line:
-        return ""
-    # "0,43 16,5" is separated by blanks; "0.43, 16.5" by commas.
-    by_blanks = any(cell and cell[-1] != "," for cell in line.strip(" ").split(" ")[:-1])
-    return "" if by_blanks and ", " not in line else ","
-
-
-def split_cells(line: str, delimiter: str) -> list[str]:
-    """Split a row into cells without blanks; separators at the end of the row are ignored."""
-    if not delimiter:
-        return [cell for cell in line.replace("\t", " ").split(" ") if cell]
-    cells = [cell.strip(" ") for cell in line.split(delimiter)]
-    while cells and not cells[-1]:
-        cells.pop()
-    return cells
 
 
 def numbered_apart(names: Sequence[str]) -> list[str]:

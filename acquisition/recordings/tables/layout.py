@@ -16,10 +16,9 @@ from acquisition.recordings.tables.headings import (
     heading_of,
     is_time,
     is_uncertainty,
-    split_cells,
     split_heading,
 )
-from acquisition.recordings.units import measure_of, time_power
+from acquisition.recordings.units import measure_of, time_unit
 
 _MARKS = ("\t", ";", ",", "")
 _PROBE, _FEWEST, _SOUND = 20, 3, 0.8
@@ -75,16 +74,45 @@ def find_table(lines: tuple[str, ...]) -> Layout | None:
     Rows are lines in which each column contains either only numbers or only words, apart from empty cells. The chosen
     separator gives the earliest rows; among several such separators, it is one that also fits a line of names.
     """
-    best: tuple[tuple[int, bool, int], _Split, _Rows, Layout] | None = None
+    found = []
     for order, mark in enumerate(_MARKS):
-        if order and mark and not any(mark in each for each in lines):
-            continue  # each line would be a single cell, a case that the first separator has covered
-        split = _Split(lines, mark)
-        if (rows := split.first_rows()) is not None:
-            table = _with_names(lines, rows.start, mark, split.brackets, rows.width)
-            trial = (rows.start, not table.named, order), split, rows, table
-            best = trial if best is None else min(best, trial, key=lambda each: each[0])
-    return None if best is None else best[3]._replace(rows=best[1].all_rows(best[2]))
+        # Without its mark each line is a single cell, a case that the first separator has covered.
+        if (not order or not mark or any(mark in each for each in lines)) and (table := _split_by(lines, mark)):
+            found.append(((table.at, not table.named, order), table))
+    return min(found)[1] if found else None
+
+
+def _split_by(lines: Sequence[str], mark: str) -> Layout | None:
+    """Find the first rows of numbers in lines with a separator; None if there are none."""
+    ends = 0 if mark else sum(each.rstrip().endswith(";") for each in lines)
+    brackets = ends > len(lines) / 2  # as in a MATLAB matrix
+    blanks = mark + " " if mark else "\t [];" if brackets else "\t "
+    filled = [at for at, each in enumerate(lines) if each.strip(blanks)]
+    cells = [_cells(lines[at], mark, brackets) for at in filled]
+    kinds = [[_kind(cell) for cell in row] for row in cells]
+    for at, first in enumerate(kinds):
+        if not _is_row(first) or cells[at][0] == "-" or any("=" in cell for cell in cells[at]):
+            continue  # "- 0.5" is a list of YAML
+        probe = kinds[at : at + _PROBE]
+        width = max((len(row) for row in probe if _is_row(row)), default=0) if mark else len(first)
+        like = [_alike(row, first, width, mark) for row in probe]
+        if sum(like[:_FEWEST]) == _FEWEST and sum(like) >= _SOUND * len(like):
+            rows = [own for own, row in zip(cells[at:], kinds[at:], strict=True) if _alike(row, first, width, mark)]
+            padded = tuple(tuple(row + [""] * (width - len(row))) for row in rows)
+            return _with_names(lines, filled[at], mark, brackets, width)._replace(rows=padded)
+    return None
+
+
+def _cells(line: str, mark: str, brackets: bool) -> list[str]:
+    """Split a row into cells; separators at its end are ignored."""
+    if mark and '"' in line:
+        return split_heading(line, mark)[0]
+    line = _BRACKETS.sub(" ", line) if brackets else line
+    if mark:
+        cells = [cell.strip(" ") for cell in line.rstrip(mark + " ").split(mark)]
+    else:
+        cells = [cell for cell in line.replace("\t", " ").split(" ") if cell]
+    return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells]
 
 
 def _kind(cell: str) -> str:
@@ -97,59 +125,6 @@ def _kind(cell: str) -> str:
     if _DATE.fullmatch(cell):
         return "text"
     return "mixed" if _NUMBERS.fullmatch(cell) else "text"
-
-
-class _Rows(NamedTuple):
-    """The first rows: index of the first, kinds of its cells, maximum number of cells, and later non-empty lines."""
-
-    start: int
-    first: list[str]
-    width: int
-    filled: list[int]
-
-
-class _Split:
-    """Lines that are split into cells by one separator; a line is split when it is first needed."""
-
-    def __init__(self, lines: Sequence[str], mark: str) -> None:
-        self.lines, self.mark = lines, mark
-        ends = 0 if mark else sum(each.rstrip().endswith(";") for each in lines)
-        self.brackets = ends > len(lines) / 2  # as in a MATLAB matrix
-        self._split: dict[int, tuple[list[str], list[str]]] = {}
-
-    def at(self, line: int) -> tuple[list[str], list[str]]:
-        """Return the cells of a line and their kinds."""
-        if line not in self._split:
-            cells = self._cells(self.lines[line])
-            self._split[line] = cells, [_kind(cell) for cell in cells]
-        return self._split[line]
-
-    def _cells(self, line: str) -> list[str]:
-        if '"' in line and self.mark and not self.brackets:
-            return split_heading(line, self.mark)[0]
-        cells = split_cells(_BRACKETS.sub(" ", line) if self.brackets else line, self.mark)
-        return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells]
-
-    def first_rows(self) -> _Rows | None:
-        """Return the first rows; None if there are none."""
-        blanks = self.mark + " " if self.mark else "\t [];" if self.brackets else "\t "
-        filled = [at for at, each in enumerate(self.lines) if each.strip(blanks)]
-        for position, start in enumerate(filled):
-            cells, first = self.at(start)
-            if not _is_row(first) or cells[0] == "-" or any("=" in cell for cell in cells):  # "- 0.5" is a list of YAML
-                continue
-            probe = [self.at(at)[1] for at in filled[position : position + _PROBE]]
-            width = max((len(kinds) for kinds in probe if _is_row(kinds)), default=0) if self.mark else len(first)
-            like = [_alike(kinds, first, width, self.mark) for kinds in probe]
-            if sum(like[:_FEWEST]) == _FEWEST and sum(like) >= _SOUND * len(like):
-                return _Rows(start, first, width, filled[position:])
-        return None
-
-    def all_rows(self, rows: _Rows) -> tuple[tuple[str, ...], ...]:
-        """Return the cells of every line that is like the first row."""
-        split = (self.at(at) for at in rows.filled)
-        like = [cells for cells, kinds in split if _alike(kinds, rows.first, rows.width, self.mark)]
-        return tuple(tuple(cells + [""] * (rows.width - len(cells))) for cells in like)
 
 
 def _is_row(kinds: Sequence[str]) -> bool:
@@ -231,7 +206,7 @@ def _are_units(cells: Sequence[str]) -> bool:
     """Return whether a line contains units: at least half of its words are units or bracketed, and none means time."""
     filled = [cell for cell in cells if cell]
     known = [
-        measure_of(plain) is not None or time_power(plain) is not None or bool(_BRACKETED.fullmatch(cell))
+        measure_of(plain) is not None or time_unit(plain) is not None or bool(_BRACKETED.fullmatch(cell))
         for cell in filled
         if parse_number(cell) is None
         for plain in (cell.strip(" ()[]"),)
@@ -278,8 +253,8 @@ def times_by_name(headings: Sequence[Heading], columns: Sequence[F8]) -> list[in
     named = [
         column
         for column, each in enumerate(headings)
-        if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_power(each.unit) is None))
-        or (column == 0 and time_power(each.unit) is not None and not _SPAN.search(each.name) and _is_even(columns[0]))
+        if (is_time(each.name) and not _CAPITAL.search(each.name) and not (each.unit and time_unit(each.unit) is None))
+        or (column == 0 and time_unit(each.unit) is not None and not _SPAN.search(each.name) and _is_even(columns[0]))
     ]
     return [column for column in named if runs_forward(columns[column])]
 
@@ -294,7 +269,7 @@ def times_by_steps(headings: Sequence[Heading], columns: Sequence[F8]) -> int | 
     fit = [
         column
         for column, each in enumerate(headings)
-        if _NEUTRAL.fullmatch(each.name) and (not each.unit or time_power(each.unit) is not None)
+        if _NEUTRAL.fullmatch(each.name) and (not each.unit or time_unit(each.unit) is not None)
         if runs_forward(columns[column]) and not are_row_numbers(columns[column])
     ]
     even = [column for column in fit if _is_even(columns[column])]

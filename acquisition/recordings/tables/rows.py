@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,27 +23,14 @@ from acquisition.recordings.tables.cells import (
     read_cells,
     split_page,
 )
-from acquisition.recordings.tables.table import Column, Lines
+from acquisition.recordings.tables.table import Column, Lines, Table
 from acquisition.recordings.tables.text import Line, Text
 
 _MOST_EMPTY = 4_000_000
 """Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
 _DIGITS, _MOST_DECIMALS = 15, 12  # the significant digits that spreadsheet programs show; more decimals: an exponent
 _REMEDY = "export the numbers without thousands separators"
-_GROUP = rb"[-+]?[1-9]\d{0,2}"
-_THOUSANDS = re.compile(
-    _GROUP
-    + rb"(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:,\d{3}){2,}|(?:\.\d{3}){2,}"
-    + rb"|(?:(?: |'|\xc2\xa0|\xa0|\xe2\x80\xaf|\xe2\x80\x99)\d{3})+(?:[.,]\d*)?)(?:[eE][-+]?\d+)?"
-)
-
-
-class Rows(NamedTuple):
-    """Columns without names, each as long as its last cell, where the rows stand, and remarks on all of them."""
-
-    columns: list[Column]
-    lines: Lines
-    traps: tuple[Trap, ...] = ()
+_THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}((?:[,. ']|\xc2?\xa0|\xe2\x80[\xaf\x99])\d{3})+([.,]\d*)?")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,19 +58,18 @@ def read_rows(
     stop: int | None = None,
     clock: int | None = None,
     brackets: bool = False,
-) -> Rows:
-    """Read the rows from line ``first`` on; blank lines are no rows.
+) -> Table:
+    """Read the rows from line ``first`` on, as columns without names; blank lines are no rows.
 
     The cells of column ``clock`` are times of day. With brackets, ``[``, ``]`` and ``;`` are blanks.
     """
     if isinstance(text, Sheet):
         return _rows_of_sheet(text, first.number, clock)
     stop = text.stop if stop is None else stop
-    pieces: list[list[tuple[F8, I1]]] = []
+    pieces: list[list[tuple[F8, I1, B1]]] = []  # for each column
     sizes: list[int] = []
     skipped: list[int] = []
-    marks, most, count = _Marks(path, bool(mark)), stop - first.start + _MOST_EMPTY, 0
-    last: list[bytes] = []
+    most, count, last = stop - first.start + _MOST_EMPTY, 0, []
     for page in text.pages(first.start, stop):
         rows = []
         for line in split_page(page, mark, brackets=brackets):
@@ -102,18 +87,23 @@ def read_rows(
                 pieces.append([])
                 sizes.append(0)
             if missing := count - sizes[at]:
-                pieces[at].append((np.full(missing, np.nan), np.full(missing, EMPTY, np.int8)))
-            values, decimals, commas = read_cells(cells) if at != clock else clock_times(cells)
-            marks.look(at, cells, values, decimals, commas)
-            pieces[at].append((values, decimals))
+                empty = np.full(missing, np.nan), np.full(missing, EMPTY, np.int8), np.zeros(missing, bool)
+                pieces[at].append(empty)
+            pieces[at].append(read_cells(cells) if at != clock else clock_times(cells))
             sizes[at] = count + len(rows)
+            for row in np.flatnonzero(pieces[at][-1][1] == UNREAD).tolist() if mark else ():
+                if _THOUSANDS.fullmatch(cells[row]):
+                    shown = cells[row].decode("utf-8", "replace")
+                    problem = f'expected plain numbers, got a thousands separator in "{shown}"'
+                    raise FormatError(path, problem, _REMEDY)
         count, last = count + len(rows), rows[-1]
-    columns = []
+    columns, commas = [], []
     for own in pieces:
-        values, decimals = (np.concatenate(each) for each in zip(*own, strict=True))
+        values, decimals, comma = (np.concatenate(each) for each in zip(*own, strict=True))
         own.clear()
         columns.append(Column("", "", values, decimals))
-    traps = marks.judged(columns)
+        commas.append(comma)
+    traps = _decimal_marks(path, columns, commas)
     ended = first.start >= stop or text.data[stop - 1 : stop] in (b"\n", b"\r")
     cut = False
     if count and not ended:
@@ -124,9 +114,8 @@ def read_rows(
     if clock is not None and clock < len(columns):
         _count_from_first(columns[clock])
     words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
-    last_cell = last[0].decode("latin-1").replace(",", ".") if last else ""
-    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, last_cell, text.zeros)
-    return Rows(columns, lines, traps)
+    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, text.zeros)
+    return Table(tuple(columns), lines=lines, traps=traps)
 
 
 def _count_from_first(column: Column) -> None:
@@ -135,11 +124,10 @@ def _count_from_first(column: Column) -> None:
     if known.size:
         at = column.values[known]
         days = np.concatenate(([0.0], np.cumsum(np.diff(at) < -43200.0)))
-        since, places = (at - at[0] + 86400.0 * days).tolist(), column.forms[known].tolist()
-        column.values[known] = [round(each, decimals) for each, decimals in zip(since, places, strict=True)]
+        column.values[known] = np.round(at - at[0] + 86400.0 * days, column.forms[known].max())
 
 
-def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Rows:
+def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Table:
     columns = []
     for at, cells in enumerate(sheet.columns):
         below = cells[first - 1 :]
@@ -159,53 +147,32 @@ def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Rows:
         _count_from_first(columns[clock])
     skipped = np.cumsum(filled)[~filled].astype(np.int64)
     lines = Lines(first, int(filled.sum()), skipped, columns[0].forms == UNREAD)
-    return Rows(columns, lines)
+    return Table(tuple(columns), lines=lines)
 
 
-class _Marks:
-    """Finds thousands separators (``1,234.5``): reading one as a decimal mark gives an error of a factor 1000.
+def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -> tuple[Trap, ...]:
+    """Refuse ``1,234`` if its comma may separate thousands: as a decimal mark it gives an error of a factor 1000.
 
     A comma or point is a decimal mark if anywhere it is not followed by exactly three digits, or follows a zero or four
-    digits.
+    digits. Return a remark if a comma was read as a decimal mark, which nothing confirms.
     """
-
-    def __init__(self, path: str, by_mark: bool) -> None:
-        self.path, self.by_mark = path, by_mark
-        self.decimal: set[bytes] = set()
-        self.doubtful: dict[tuple[int, bytes], bytes] = {}
-
-    def look(self, at: int, cells: Sequence[bytes], values: F8, decimals: I1, commas: B1) -> None:
-        """Look at the cells of column ``at`` in one page."""
-        for row in np.flatnonzero(decimals == UNREAD).tolist() if self.by_mark else ():
-            if _THOUSANDS.fullmatch(cells[row]):
-                raise self._refusal(f"expected plain numbers, got a thousands separator in {_shown(cells[row])}")
-        with np.errstate(invalid="ignore"):
-            group = (decimals == 3) & (np.abs(values) >= 1.0) & (np.abs(values) < 1000.0)
-        numbers, places = decimals >= 0, decimals % EXPONENT > 0
-        for mark, marked in ((b",", numbers & commas), (b".", numbers & ~commas & places)):
-            if mark not in self.decimal and marked.any():
-                if (marked & ~group).any():
-                    self.decimal.add(mark)
-                else:
-                    self.doubtful.setdefault((at, mark), cells[int(marked.argmax())])
-
-    def judged(self, columns: Sequence[Column]) -> tuple[Trap, ...]:
-        """Refuse doubtful numbers; return a remark if a comma was read as a decimal mark, which nothing confirms."""
-        doubtful = {key: number for key, number in self.doubtful.items() if key[1] not in self.decimal}
-        for (at, _), number in doubtful.items():
-            whole = np.abs(columns[at].values[columns[at].forms == 0])
-            if self.decimal or (whole.size and whole.max() < 1000.0):
-                raise self._refusal(f"{_shown(number)} may have a thousands separator or a decimal mark")
-        if not doubtful or any(mark == b"." for _, mark in doubtful):
-            return ()
-        shown = _shown(next(iter(doubtful.values())))
-        return (
-            Trap("decimal_comma", f"the comma in {shown} was read as a decimal comma, not as a thousands separator"),
-        )
-
-    def _refusal(self, problem: str) -> FormatError:
-        return FormatError(self.path, problem, _REMEDY)
-
-
-def _shown(number: bytes) -> str:
-    return f'"{number.decode("utf-8", "replace")}"'
+    certain, doubtful = set(), []
+    for column, comma in zip(columns, commas, strict=True):
+        size, forms = np.abs(column.values), column.forms
+        group = (forms == 3) & (size >= 1.0) & (size < 1000.0)
+        numbers, places = forms >= 0, forms % EXPONENT > 0
+        for mark, marked in ((",", numbers & comma), (".", numbers & ~comma & places)):
+            if (marked & ~group).any():
+                certain.add(mark)
+            elif marked.any():
+                whole = size[forms == 0]
+                shown = f"{column.values[int(marked.argmax())]:.3f}".replace(".", mark)
+                doubtful.append((mark, shown, bool(whole.size and whole.max() < 1000.0)))
+    doubtful = [each for each in doubtful if each[0] not in certain]
+    for _, shown, small in doubtful:
+        if certain or small:
+            raise FormatError(path, f'"{shown}" may have a thousands separator or a decimal mark', _REMEDY)
+    if not doubtful or any(mark == "." for mark, _, _ in doubtful):
+        return ()
+    message = f'the comma in "{doubtful[0][1]}" was read as a decimal comma, not as a thousands separator'
+    return (Trap("decimal_comma", message),)

@@ -11,6 +11,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import Trap
+from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import EMPTY, I1
 from acquisition.recordings.tables.headings import Heading, numbered_apart, role_of
 from acquisition.recordings.units import Measure, measure_of
@@ -79,22 +80,12 @@ class Column:
         return replace(self, values=np.concatenate((self.values, np.full(more, np.nan))), decimals=decimals)
 
 
-@dataclass(frozen=True, slots=True)
-class Formula:
-    """Times ``start_s + i * step_s`` as stated in a header, and the number of samples, if the header states it."""
-
-    start_s: float
-    step_s: float
-    samples: int | None = None
-
-
 class Lines(NamedTuple):
     """Where rows stand in a text.
 
     ``first`` is the number of the first row's line, and ``skipped`` holds, for each line that is no row, the number of
     rows before it. ``words`` marks rows that begin with text. ``ended`` says that the last row has a line end, ``cut``
-    that it is incomplete; ``last_cell`` is its first cell. ``zeros`` is the number of zero bytes that were left out at
-    the end of the file.
+    that it is incomplete. ``zeros`` is the number of zero bytes that were left out at the end of the file.
     """
 
     first: int
@@ -103,7 +94,6 @@ class Lines(NamedTuple):
     words: B1
     ended: bool = True
     cut: bool = False
-    last_cell: str = ""
     zeros: int = 0
 
     def line(self, row: int) -> int:
@@ -111,9 +101,61 @@ class Lines(NamedTuple):
         return self.first + int(row) + int(np.searchsorted(self.skipped, row, side="right"))
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Stated:
+    """What the lines above the rows may say of all channels, and a :class:`Header` and a :class:`Table` share.
+
+    Parameters
+    ----------
+    formula : Formula or None
+        The times. If there is a column of times too, the column decides where the two differ.
+    run, title, start_time : str
+        Name of the run, title of the file, start time in ISO 8601; empty if the file does not state them.
+    ragged : bool
+        Whether a channel may end before its times, because longer channels share them.
+    traps : tuple of Trap
+        Remarks on the file as a whole.
+    """
+
+    formula: Formula | None = None
+    run: str = ""
+    title: str = ""
+    start_time: str = ""
+    ragged: bool = False
+    traps: tuple[Trap, ...] = ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
-    """Columns of one run that share their times.
+class Header(Stated):
+    """What the lines above the rows of a text say; further keywords are those of :class:`Stated`.
+
+    Parameters
+    ----------
+    why : str
+        A few words on why the text belongs to its family.
+    lines : int
+        Number of lines above the rows.
+    delimiter : str
+        The separator of cells; empty for runs of white space.
+    headings : sequence of Heading
+        One for each column.
+    clock : int or None
+        A column of times of day.
+    brackets : bool
+        Whether rows are a matrix of MATLAB, in brackets and with semicolons at their ends.
+    """
+
+    why: str
+    lines: int
+    delimiter: str
+    headings: Sequence[Heading]
+    clock: int | None = None
+    brackets: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table(Stated):
+    """Columns of one run that share their times; further keywords are those of :class:`Stated`.
 
     Parameters
     ----------
@@ -121,16 +163,6 @@ class Table:
         The columns that may be read as channels.
     times : Column or None
         The column of their times. Without one, the formula gives the times, or else the user must give the rate.
-    formula : Formula or None
-        Times that the header states. If there is a column too, the column decides where the two differ.
-    run : str
-        Name of the run; empty for a single run without a name.
-    title, start_time : str
-        Title of the file, and start time in ISO 8601; empty if the file does not state them.
-    ragged : bool
-        Whether a channel may end before its times, because longer channels share them.
-    traps : tuple of Trap
-        Remarks on the file as a whole.
     lines : Lines or None
         Where the rows stand; None for a file that is not text.
     beside : tuple of Column
@@ -139,12 +171,6 @@ class Table:
 
     columns: tuple[Column, ...]
     times: Column | None = None
-    formula: Formula | None = None
-    run: str = ""
-    title: str = ""
-    start_time: str = ""
-    ragged: bool = False
-    traps: tuple[Trap, ...] = ()
     lines: Lines | None = None
     beside: tuple[Column, ...] = ()
 
@@ -154,39 +180,35 @@ class Table:
         return self.times is not None or self.formula is not None
 
 
-def side_by_side(
-    columns: Sequence[Column], headings: Sequence[Heading], common: Table = Table(()), run: str = ""
-) -> list[Table]:
-    """Return the tables of columns: each column has the times to its left, or else the first times of its run.
+def side_by_side(table: Table, headings: Sequence[Heading], run: str = "") -> list[Table]:
+    """Return the tables of a table's columns: each column has the times to its left, or else the first of its run.
 
-    If any heading names a run, columns without a heading are ignored. ``common`` states everything else.
+    If any heading names a run, columns without a heading are ignored.
     """
-    roles = [role_of(each) for each in headings]
     none = Column("", "", np.empty(0), np.empty(0, np.int8))  # a heading without cells
-    columns = [*columns, *[none] * (len(headings) - len(columns))]
-    runs = any(each.run for each in headings)
-    columns = [
+    read = [*table.columns, *[none] * (len(headings) - len(table.columns))]
+    roles, runs = [role_of(each) for each in headings], any(each.run for each in headings)
+    columns = tuple(
         replace(column, name=each.name or f"column {number}", unit=each.unit, aside=role == "aside")
-        for number, (column, each, role) in enumerate(zip(columns, headings, roles, strict=False), 1)
+        for number, (column, each, role) in enumerate(zip(read, headings, roles, strict=False), 1)
+    )
+    times = {headings[at].run: at for at in reversed(range(len(headings))) if roles[at] == "time"}
+    channels: dict[tuple[str, int | None], list[Column]] = {}
+    for at, (each, role) in enumerate(zip(headings, roles, strict=True)):
+        if role == "time":
+            times[each.run] = at
+        elif role != "ignored" and (each.name or each.run or not runs):
+            channels.setdefault((each.run, times.get(each.run)), []).append(columns[at])
+    return [
+        replace(
+            table,
+            columns=tuple(own),
+            times=None if time is None else columns[time],
+            run=own_run or run,
+            beside=columns,
+        )
+        for (own_run, time), own in channels.items()
     ]
-    channels = [
-        at
-        for at, each in enumerate(headings)
-        if roles[at] in ("channel", "aside") and (each.name or each.run or not runs)
-    ]
-    tables = []
-    for own_run in dict.fromkeys(headings[at].run for at in channels):
-        times = [at for at in range(len(columns)) if roles[at] == "time" and headings[at].run == own_run]
-        groups: dict[int | None, list[Column]] = {}
-        for at in channels:
-            if headings[at].run == own_run:
-                time = max((each for each in times if each < at), default=times[0] if times else None)
-                groups.setdefault(time, []).append(columns[at])
-        for time, own in groups.items():
-            time_column = None if time is None else columns[time]
-            table = replace(common, columns=tuple(own), times=time_column, run=own_run or run, beside=tuple(columns))
-            tables.append(table)
-    return tables
 
 
 def names_apart(tables: Sequence[Table]) -> list[Table]:

@@ -105,6 +105,7 @@ def test_rest_long_before_the_end_is_left_out() -> None:
     noise = SIGMA * np.random.default_rng(4).standard_normal(t.size)
     found = analyse(Track.from_arrays(t, REST + 0.05 * np.exp(-0.35 * t) * np.cos(OMEGA * t) + noise))
     assert codes(found) == {"at_rest"}
+    assert found.quality["outside"] > 0.4 * t.size
     assert abs(found.estimates["damping_rate"].value - 0.35) < 4.0 * found.estimates["damping_rate"].u
 
 
