@@ -86,6 +86,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     if isinstance(part, NoOscillation):
         return without_period(samples, part, scene, options)
     samples, windows = _uncut(part)
+    track = samples.track
     if (why := check_sinusoid(samples, windows)) is not None:
         return without_period(samples, why, scene, options)
     windows, disturbances = separate(samples, part.cycles, windows, modes=options.modes)
@@ -103,7 +104,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     if incoherent is not None:
         return still(samples, incoherent, scene, options)
 
-    found, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz))
+    found, misfits = judge(samples, fitted, SensorFilter.of(scene, track.rate_hz), part.lost)
     effects = tabulate(track, fitted, scene)
     derived = derive(track, fitted, scene, effects, misfits)
     windows, swing_m = fitted.demodulated, (derived.estimates["offset"].value, fitted.damping.best.joint.values[0])

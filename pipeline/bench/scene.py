@@ -91,6 +91,23 @@ class Scene:
     mu_m_per_s: Estimate | None = None
     damping_law: str | None = None
 
+    def __post_init__(self) -> None:
+        """Check every value, and take a number or a pair (value, u) for the estimate that it states.
+
+        Raises
+        ------
+        SceneError
+            As for :meth:`from_mapping`.
+        """
+        for (table, key), quantity in _QUANTITIES.items():
+            if (given := getattr(self, quantity.attribute)) is not None:
+                found = _quantity(table, key, _stated(given, quantity), "scene")
+                if not isinstance(given, Estimate):
+                    object.__setattr__(self, quantity.attribute, found)
+        for (table, key), (attribute, texts) in _CHOICES.items():
+            if (text := getattr(self, attribute)) is not None:
+                _choice(table, key, text, texts, "scene")
+
     @classmethod
     def from_mapping(cls, tables: Mapping[str, Any], *, where: str = "scene") -> Scene:
         """Check the tables of a scene file and convert them to a scene.
@@ -193,6 +210,20 @@ def _choice(table: str, key: str, value: object, texts: tuple[str, ...], where: 
     if value not in texts:
         raise SceneError(f"{where}: [{table}] {key} must be one of {', '.join(texts)}, got {_short(value)}")
     return str(value)
+
+
+def _stated(given: Any, quantity: _Quantity) -> Any:
+    """Return a value of a keyword as in a scene file: a number, a pair (value, u), or a value with uncertainty."""
+    if isinstance(given, tuple) and len(given) == 2:
+        return {"value": given[0], "u": given[1]}
+    if isinstance(given, Estimate):
+        given, u, unit = given.value, given.u, given.unit
+    else:
+        u, unit = getattr(given, "std_dev", 0.0), getattr(given, "unit", None)
+        given = getattr(given, "nominal_value", given)
+    if unit and unit != quantity.unit:
+        raise SceneError(f"scene: {quantity.attribute} must be in {quantity.unit or 'no unit'}, got {unit}")
+    return {"value": given, "u": u}
 
 
 def _quantity(table: str, key: str, given: object, where: str) -> Estimate:

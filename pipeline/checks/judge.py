@@ -19,6 +19,7 @@ from pipeline.checks.shape import folded_shape
 from pipeline.motion.averaged import Fitted
 from pipeline.registry.found import Found
 from pipeline.samples.condition import Conditioned
+from pipeline.windows.lost_rows import LostRows
 
 
 class Test(NamedTuple):
@@ -40,7 +41,7 @@ TESTS = (
 
 
 def judge(
-    samples: Conditioned, fitted: Fitted, filter_: SensorFilter | None
+    samples: Conditioned, fitted: Fitted, filter_: SensorFilter | None, lost: LostRows | None = None
 ) -> tuple[tuple[Found, ...], tuple[Misfit, ...]]:
     """Return what the limits and the tests found, and what it adds to the uncertainties.
 
@@ -48,6 +49,9 @@ def judge(
     would look like a shape, and the fit of the equation is accepted only if it describes the samples.
     """
     outcomes = list(beyond_limits(samples, fitted))
+    if lost is not None:
+        missing = {"places": lost.places, "share": lost.share}
+        outcomes.append(Outcome("lost_rows", missing, Misfit(name="lost_rows", clock=lost.share)))
     if fitted.method != "equation":
         residual = residual_of(samples, fitted, filter_)
         for test in TESTS:

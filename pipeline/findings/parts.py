@@ -28,6 +28,18 @@ def part_findings(segments: Segments | None, first_s: float, last_s: float) -> I
             "others": _listed(others) if others else None,
         }
         yield Found(kind.value, {**numbers, **analysed})
+    gaps = [span for span in segments.left_out if span.kind is SpanKind.GAP]
+    if gaps:
+        other = max(others, key=lambda span: span.last_s - span.first_s)
+        numbers = {
+            "gap_first_s": gaps[0].first_s,
+            "gap_last_s": gaps[0].last_s,
+            "gaps": len(gaps) if len(gaps) > 1 else None,
+            "others": _listed(others) if len(others) > 1 else None,
+            "other_from": other.first_s,
+            "other_to": other.last_s,
+        }
+        yield Found("long_gap", {**numbers, **analysed})
     if handled and not segments.breaks:
         yield Found("handled", {"seconds": _seconds(handled), "left_out": _listed(handled), **analysed})
     for span in segments.left_out:

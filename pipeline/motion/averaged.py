@@ -61,6 +61,7 @@ class Phase:
     middle: float  # weighted mean time, s
     area: Table | None = None  # integral of A^2 from the middle; with a backbone
     lag: Table | None = None  # delay of a period's sinusoid, rad; None if it is constant
+    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone
     squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
 
     def total(self, t: F8) -> F8:
@@ -238,11 +239,11 @@ def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
     first = np.array([t0])
     at_start = float((_turns(first, middle, area) @ model.values - _delay(first, lag))[0])
     start, free = _turns(first, middle, None)[0], max(u.size - model.values.size, 1)
-    backbone = None
+    backbone = small = None
     if area is not None:
-        variance = model.covariance[2, 2] * spread.correlation * max(1.0, model.chi2 / free)
-        unit = BACKBONE.of(damping.best.joint.units[0])
-        backbone = Estimate(float(model.values[2]), math.sqrt(variance), unit)
+        u_bent = np.sqrt(np.diag(model.covariance) * spread.correlation * max(1.0, model.chi2 / free))
+        small = Estimate(float(model.values[1]), float(u_bent[1]), "rad/s")
+        backbone = Estimate(float(model.values[2]), float(u_bent[2]), BACKBONE.of(damping.best.joint.units[0]))
     return Phase(
         t0,
         Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
@@ -255,6 +256,7 @@ def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
         middle,
         area,
         lag,
+        small,
     )
 
 

@@ -214,17 +214,18 @@ def _phase(phase: Phase, windows: Demodulated, best: _OfLaw, unit_m: float) -> P
     area = None if model.area is None else (model.area[0], model.area[1] * unit_m**2)
     found = replace(phase, coefficients=turning, area=area, lag=model.lag)
     gradient = np.array([1.0, phase.t0 - phase.middle])
-    omega, backbone = Estimate(float(turning[1]), math.sqrt(covariance[1, 1]), "rad/s"), None
+    omega = Estimate(float(turning[1]), math.sqrt(covariance[1, 1]), "rad/s")
+    backbone = small = None
     if area is not None and phase.backbone is not None:
         gradient = np.append(gradient, np.interp(phase.t0, *area))
-        backbone = Estimate(float(turning[2]), math.sqrt(covariance[2, 2]), phase.backbone.unit)
+        small, backbone = omega, Estimate(float(turning[2]), math.sqrt(covariance[2, 2]), phase.backbone.unit)
         u = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), 1e-12)
         columns = np.stack([np.ones(windows.t.size), windows.t - phase.middle], axis=1)
         line = solve_weighted(columns, replace(found, lag=None).total(windows.t), u)
         omega = replace(omega, value=float(line.values[1]), u=phase.angular_frequency.u)
     at_start = wrapped(float(found.total(np.array([phase.t0]))[0]))
     start = Estimate(at_start, math.sqrt(float(gradient @ covariance @ gradient)), "rad")
-    return replace(found, angular_frequency=omega, phase=start, backbone=backbone)
+    return replace(found, angular_frequency=omega, phase=start, backbone=backbone, small_swings=small)
 
 
 def _rest(rest: Rest, best: _OfLaw, level: float) -> Rest:

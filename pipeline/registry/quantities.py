@@ -43,6 +43,7 @@ class Input:
 
 _QUANTITIES = (
     Quantity("period", "period", "T", "T", "T", "s"),
+    Quantity("period_small_swings", "period of very small swings", "T_s", "T s", r"T_\mathrm{s}", "s"),
     Quantity("first_mode_period", "period of the first mode", "T_1", "T 1", "T_1", "s"),
     Quantity("second_mode_period", "period of the second mode", "T_2", "T 2", "T_2", "s"),
     Quantity("first_mode_amplitude", "amplitude of the first mode", "A_1", "A 1", "A_1", Unit(1)),
@@ -79,6 +80,7 @@ QUANTITIES: Mapping[str, Quantity] = {quantity.name: quantity for quantity in _Q
 INPUTS: Mapping[str, Input] = {
     # Inputs estimated from the recording.
     "angular_frequency": Input("scatter of the phases", "omega", "rad/s"),
+    "small_swings": Input("scatter of the phases", "omega_s", "rad/s"),
     "phase": Input("scatter of the phases", "phi0", "rad"),
     "rest_position": Input("scatter of the rest position", "y0", Unit(1)),
     "noise": Input("scatter of the samples", "sigma", Unit(1)),
@@ -102,6 +104,8 @@ INPUTS: Mapping[str, Input] = {
     "sensor_mean_samples": Input("running mean of the sensor"),
     "sensor_lag": Input("lag of the sensor", "tau", "s"),
     # Contradictions between the recording and its model.
+    "lost_rows": Input("samples that are missing between others"),
+    "crest": Input("crests of a swing whose stiffness changes with the amplitude"),
     "model_misfit": Input("what differs from a sinusoid in every period"),
     "held_samples": Input("distances held by the sensor"),
     "sensor_smoothing": Input("smoothing by the sensor"),

@@ -242,6 +242,7 @@ _RECORDED = ("m", "m/s", "m/s^2", "rad", "rad/s", "N", "V", "1")
 _KILOGRAMS = dict.fromkeys(_RECORDED, "kg")
 _FORMULAS = (
     _Formula("period", lambda omega: 2 * math.pi / omega),
+    _Formula("period_small_swings", lambda omega_small: 2 * math.pi / omega_small),
     _Formula("frequency", lambda omega: omega / (2 * math.pi)),
     _Formula("angular_frequency", lambda omega: omega),
     _Formula("amplitude", lambda start: start),
@@ -322,7 +323,8 @@ def _terms(
     filtered = _Filtered(SensorFilter.of(scene, track.rate_hz), omega, inputs)
     lengths = scale * amiss.over("amplitude", laws.values[0]) / filtered.gain
     rates = rate * amiss.over("damping_rate", laws.values[1])
-    start = laws.start * lengths
+    start = laws.start * lengths * _crest(phase, laws, unit, inputs)
+    small = _small_swings(phase, laws, demodulated)
     lam = laws.rate_at_start * rates
     squared_rate = laws.squared_rate if phase.squared_rate is None else phase.squared_rate
     natural = omega**2 + squared_rate * rate**2
@@ -347,6 +349,7 @@ def _terms(
     quadratic = damping.settled and damping.best.drag_term("beta") is not None
     terms = {
         "omega": omega,
+        "omega_small": None if small is None else inputs.add("small_swings", small, "A", free) * rate,
         "natural": natural,
         "rate": rate,
         "scale": scale,
@@ -377,6 +380,34 @@ def _terms(
         "beta": coefficients["beta"][0] if quadratic and drag_per_beta is not None else None,
     }
     return {name: x for name, x in terms.items() if x is not None}, coefficients
+
+
+def _small_swings(phase: Phase, laws: _Laws, demodulated: Demodulated) -> Estimate | None:
+    """Return the angular frequency of very small swings; the next term of the series is part of its uncertainty.
+
+    If the frequency of a swing is a share s off, the next term is about :math:`s^2/4`, as for a pendulum. What it adds
+    to the value extrapolated to s = 0 is about :math:`s_1 s_2/4`, with the shares of the first and the median swing.
+    """
+    small = phase.small_swings
+    if small is None or phase.backbone is None:
+        return None
+    squares = float(laws.values[0]) ** 2 * float(np.median(demodulated.amplitude**2))
+    next_term = 0.25 * (phase.backbone.value / small.value) ** 2 * squares * small.value
+    return Estimate(small.value, math.hypot(small.u, next_term), small.unit)
+
+
+def _crest(phase: Phase, laws: _Laws, unit: str, inputs: Inputs) -> Any:
+    """Return the largest angle of the first swing over the amplitude of its sinusoid.
+
+    A stiffness that changes as the square of the amplitude by :math:`\\Delta\\omega/\\omega_0 = \\kappa A^2/\\omega_0`
+    gives a third harmonic of :math:`\\kappa A^2/12\\omega_0` of the amplitude: for a pendulum, whose period grows by
+    :math:`A^2/16`, a crest :math:`A^2/192` below that of the sinusoid. This is half of a per cent at 60 degrees. Half
+    of it is taken as its uncertainty, because the frequency may change for another reason.
+    """
+    if phase.backbone is None or phase.small_swings is None or unit != "rad":
+        return 1.0
+    third = phase.backbone.value * float(laws.values[0]) ** 2 / (12.0 * phase.small_swings.value)
+    return 1.0 + inputs.add("crest", Estimate(third, 0.5 * abs(third), ""), "B")
 
 
 class _Amiss:

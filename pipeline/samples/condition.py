@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -27,6 +28,7 @@ SPIKE_SIGMAS = 8.0
 # Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an unclipped
 # crest the ratio is 1 / (sqrt 2 - 1) = 2.4.
 CONTRAST = 5.0
+GAP = 3.0  # time between two samples, in sample intervals, above which they are no neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +112,7 @@ def condition(track: Track) -> Conditioned:
         )
     y, rows = track.y[clean], np.flatnonzero(clean)
     half_step = 0.5 * (track.quantum_m or 0.0)
-    spikes = _spikes(y, half_step, SPIKE_SIGMAS)
+    spikes = _spikes(y, half_step, SPIKE_SIGMAS, _edges(track.t[clean], track.rate_hz))
     flags[rows[spikes]] |= np.uint8(Quality.FALSE_ECHO)
     y_kept, rows = y[~spikes], rows[~spikes]
     noise_m = fourth_difference_noise(y_kept)
@@ -187,7 +189,12 @@ def _least_noise(second: F8, rounding: float) -> tuple[float, bool]:
     return (twentieth if flooded else quarter), flooded
 
 
-def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
+def _edges(t: F8, rate_hz: float) -> list[int]:
+    """Return the indices between which samples follow each other without a gap: neighbours across one are none."""
+    return [0, *(np.flatnonzero(np.diff(t) > GAP / rate_hz) + 1).tolist(), t.size]
+
+
+def _spikes(y: F8, half_step: float, sigmas: float, edges: list[int]) -> NDArray[np.bool_]:
     """Return which samples deviate from the median of five around them by more than noise and curvature explain."""
     if y.size < 8:
         return np.zeros(y.size, np.bool_)
@@ -201,12 +208,12 @@ def _spikes(y: F8, half_step: float, sigmas: float) -> NDArray[np.bool_]:
     share, gain = (0.15, 2.5) if flooded else (0.4, 1.0)
     rank = int(share * second.size)
     least = sigmas * max(noise_m, half_step)
-    spikes = _beyond(y, least + 5.0 * gain * float(np.partition(np.abs(second), rank)[rank]))
+    spikes = _beyond(y, least + 5.0 * gain * float(np.partition(np.abs(second), rank)[rank]), edges)
     if np.count_nonzero(spikes) > 0.05 * y.size:
         # Where the bob has nearly come to rest, the curvature is less than at the start: take each block by itself.
         blocks = second[: second.size // BLOCK * BLOCK].reshape(-1, BLOCK)
         if blocks.size and np.count_nonzero(
-            local := _beyond(y, least + 5.0 * gain * _curvature(blocks, share, y.size))
+            local := _beyond(y, least + 5.0 * gain * _curvature(blocks, share, y.size), edges)
         ) < 0.5 * np.count_nonzero(spikes):
             return local
         # So many spikes also come in runs, which a median of five follows; but few of them lie within the motion.
@@ -223,12 +230,12 @@ def _curvature(blocks: F8, share: float, size: int) -> F8:
     return np.asarray(each[np.minimum(np.arange(size) // blocks.shape[1], each.size - 1)])
 
 
-def _beyond(y: F8, bound: float | F8) -> NDArray[np.bool_]:
+def _beyond(y: F8, bound: float | F8, edges: list[int]) -> NDArray[np.bool_]:
     """Return which samples deviate from the median of five around them by more than a bound."""
     spikes = np.zeros(y.size, np.bool_)
     smooth = y
     for _ in range(4):
-        away = _off_median(smooth)
+        away = np.concatenate([_off_median(smooth[a:b]) for a, b in itertools.pairwise(edges)])
         found = np.flatnonzero(away > bound)
         if not found.size:
             break
@@ -245,6 +252,8 @@ def _beyond(y: F8, bound: float | F8) -> NDArray[np.bool_]:
 
 
 def _off_median(y: F8) -> F8:
+    if y.size < 5:
+        return np.zeros(y.size)
     # Both ends are extended by point reflection, which continues a slope.
     first, last = _end(y[:5]), _end(y[:-6:-1])
     padded = np.concatenate([2.0 * first - y[2:0:-1], y, 2.0 * last - y[-2:-4:-1]])

@@ -88,15 +88,6 @@ def find_changes(t: F8, y: F8, u: F8) -> tuple[Change, ...]:
 def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
     """Return (n,) bool: True for single outliers, caused by clusters of echoes or by a jump within a window.
 
-    Parameters
-    ----------
-    y, u : (m, n) float64
-        Components and their standard uncertainties.
-    false_alarm : float
-        Maximum probability that noise makes any point an outlier.
-
-    Notes
-    -----
     Such a point lies far from interpolations between its neighbours and from extrapolations of the two points before or
     after it. The first and last two points are never outliers. The maximum of n normal deviations in two components
     exceeds :math:`\\sqrt{2 \\ln(n/\\alpha)}` with probability :math:`\\alpha`. A mean of two neighbours adds half the
@@ -109,7 +100,10 @@ def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
     off = np.min([np.abs(here - each) for each in expected], axis=0)
     usual = np.maximum(math.sqrt(1.5) * u[:, 2:-2], [[mad_sigma(each)] for each in off])
     far = math.sqrt(2.0 * math.log(y.shape[1] / false_alarm))
-    return np.concatenate([[False, False], np.any(off > far * usual, axis=0), [False, False]])
+    found = np.concatenate([[False, False], np.any(off > far * usual, axis=0), [False, False]])
+    # Several in succession are no outliers, but a curve.
+    beside = np.convolve(found, [1.0, 0.0, 1.0], "same") > 0.0
+    return found & ~beside
 
 
 def _starts(size: int, length: int) -> I8:

@@ -27,6 +27,8 @@ ROUNDING = 2e-6  # relative error of a window's sinusoid after two passes, for c
 FINEST = 1e-4  # scatter relative to the amplitude; only computed records have less
 HALF, THIRD = (0.5, 1.0 / MAD_TO_SIGMA), (0.3, 0.3853204664075677)  # shares, with quantiles of |x| for normal x
 CLIP_SIGMAS = 4.0  # residuals beyond this many standard deviations are false echoes and are excluded from the fit
+ABREAST = 5  # number of windows over which the rate of the phase is taken
+CHANGED = 0.01  # change of this rate within the record, as a share, from which windows follow the phase
 ROUNDS = 3  # number of reweighted fits of windows with false echoes, before the final fits
 
 
@@ -94,6 +96,27 @@ def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
     spread = _spread(windows.usable, solution.residual)
     _clip(windows, basis, solution, spread, tuning)
     return _finish(conditioned, windows, solution, tuning)
+
+
+def follow(cycles: Cycles, windows: Demodulated, recorded: F8) -> Cycles:
+    """Cut the windows anew along the phase if the period changes: windows of equal length are then no whole periods."""
+    t, phase, u_phase = windows.t, windows.phase, np.sqrt(windows.covariance[:, 1, 1])
+    if t.size < 2 * ABREAST:
+        return cycles
+    rate = (phase[ABREAST:] - phase[:-ABREAST]) / (t[ABREAST:] - t[:-ABREAST])
+    u_rate = np.hypot(u_phase[ABREAST:], u_phase[:-ABREAST]) / (t[ABREAST:] - t[:-ABREAST])
+    mean = float(phase[-1] - phase[0]) / float(t[-1] - t[0])
+    if not np.any(np.abs(rate - mean) > np.maximum(CHANGED * mean, 5.0 * u_rate)) or rate.min() <= 0.5 * mean:
+        return cycles
+    first, last = recorded[cycles.bounds[0]], recorded[cycles.bounds[-1] - 1]
+    begin = float(phase[0]) + float(rate[0]) * float(first - t[0])
+    end = float(phase[-1]) + float(rate[-1]) * float(last - t[-1])
+    count = int((end - begin) / (2.0 * math.pi * cycles.periods) + 1e-6)
+    edges = np.interp(np.linspace(begin, end, count + 1), [begin, *phase, end], [first, *t, last])
+    latest = np.maximum.accumulate(np.where(np.isfinite(recorded), recorded, -np.inf))
+    bounds = np.searchsorted(latest, edges).astype(np.int64)
+    bounds[-1] = cycles.bounds[-1]
+    return replace(cycles, bounds=bounds[np.concatenate([[True], bounds[1:] > bounds[:-1]])])
 
 
 def _let_go(windows: Windows, basis: F8, noise_m: float) -> tuple[Solution, F8]:

@@ -11,7 +11,9 @@ from pipeline.samples.condition import Conditioned, condition
 from pipeline.samples.stopping import moving_part
 from pipeline.track import Quality
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
-from pipeline.windows.demodulate import Demodulated, demodulate
+from pipeline.windows.demodulate import Demodulated, demodulate, follow
+from pipeline.windows.gaps import longest_part
+from pipeline.windows.lost_rows import LostRows, find_lost_rows
 from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part, long_after_stop
 from pipeline.windows.sinusoid import check_sinusoid
 
@@ -25,7 +27,8 @@ class FreePart:
     """The part of a recording that oscillates freely.
 
     ``samples`` contains the whole recording, in which samples outside the part are flagged. ``segments`` describes the
-    part (None for the whole recording), and ``stopped`` says whether friction stopped the bob in it.
+    part (None for the whole recording), and ``stopped`` says whether friction stopped the bob in it. The times of the
+    samples count rows that were ``lost``.
     """
 
     samples: Conditioned
@@ -33,6 +36,7 @@ class FreePart:
     cycles: Cycles
     windows: Demodulated
     stopped: bool
+    lost: LostRows | None = None
 
 
 def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoOscillation:
@@ -45,6 +49,8 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
     for outside in (before_trigger(samples), long_after_stop(samples, early)):
         if outside is not None:
             samples, segments = condition(outside.flagged(samples.track)), outside.within(segments)
+    if (part := longest_part(samples)) is not None:
+        samples, segments = condition(part.flagged(samples.track)), part.within(segments)
     cycles, stopped = _cycles(samples, early, late)
     if isinstance(cycles, NoOscillation):
         # A long time in the hand hides the motion after it, which the later half may show.
@@ -63,17 +69,31 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
         samples, segments = trial, later.within(segments)
         cycles = trimmed
     windows = demodulate(samples, cycles)
+    if (lost := find_lost_rows(samples, windows)) is not None:
+        samples = lost.samples
+        cycles, stopped = _cycles(samples, early, late)
+        if isinstance(cycles, NoOscillation):
+            return cycles
+        windows = demodulate(samples, cycles)
     for _ in range(MOST_PARTS):
         outside = find_free_part(samples, windows)
         if outside is None:
             break
+        # Windows of equal length are no whole periods of a wide pendulum, which would look like handling.
+        if (followed := follow(cycles, windows, samples.track.t)) is not cycles:
+            along = demodulate(samples, followed)
+            if find_free_part(samples, along) is None:
+                cycles, windows = followed, along
+                break
         shorter = condition(outside.flagged(samples.track))
         trimmed, stops = _cycles(shorter, early, late)
         if isinstance(trimmed, NoOscillation):
             break
         samples, segments, cycles, stopped = shorter, outside.within(segments), trimmed, stops
         windows = demodulate(samples, cycles)
-    return FreePart(samples, segments, cycles, windows, stopped)
+    if (followed := follow(cycles, windows, samples.track.t)) is not cycles:
+        cycles, windows = followed, demodulate(samples, followed)
+    return FreePart(samples, segments, cycles, windows, stopped, lost)
 
 
 def _cycles(samples: Conditioned, early: float, late: float) -> tuple[Cycles | NoOscillation, bool]:

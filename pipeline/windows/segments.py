@@ -50,6 +50,7 @@ class SpanKind(StrEnum):
     WAITING = "waiting"  # only noise, up to the recording's own trigger
     HANDLED = "handled"  # neither still nor free
     FREE = "free"  # another free oscillation
+    GAP = "gap"  # unknown, because nothing was recorded
 
 
 class BreakKind(StrEnum):

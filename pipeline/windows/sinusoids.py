@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,10 @@ from pipeline.track import F8
 LEAST_DETERMINANT = 0.003
 LEAST_SAMPLES = 6
 KNOWN = 3.3  # least amplitude with a meaningful phase, in its standard uncertainties
+# Further degrees of the smooth curves, for a frequency that falls with the amplitude as that of a wide pendulum does.
+# One is taken if the mean squared residual falls below this factor of the lower degree's, which noise leaves at 1, and
+# if the curve follows the phases to within this angle, rad.
+FURTHER, LESS, STEADY = (5, 8, 12), 0.5, 0.3
 GREATEST = 0.05  # maximum detuning or decay, as a fraction of the frequency; beyond it the fit has failed
 
 
@@ -185,11 +190,18 @@ def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 
     phase = unwrap(np.angle(z[good]), t, omega) - omega * (t - t[0])
     span = float(np.ptp(t))
     place = 2.0 * (windows.centre - t[0]) / span - 1.0
-    degree = min(degree, max(1, t.size // 6))
     inside = np.clip(place, -1.0, 1.0)
-    powers = np.polynomial.chebyshev.chebvander(inside, degree)
     seen = np.stack([np.log(weight), phase], axis=1) * weight[:, None]
-    curves = np.linalg.lstsq(powers[good] * weight[:, None], seen, rcond=None)[0]
+    best, clear = math.inf, STEADY**2 * float(weight @ weight) / t.size
+    for trial in (degree, *(FURTHER if degree > 1 else ())):
+        order = min(trial, max(1, t.size // 6))
+        columns = np.polynomial.chebyshev.chebvander(inside, order)
+        found = np.linalg.lstsq(columns[good] * weight[:, None], seen, rcond=None)[0]
+        missed = columns[good] @ found[:, 1] * weight - seen[:, 1]
+        left = float(missed @ missed) / max(t.size - order - 1, 1)
+        if trial == degree or left < min(LESS * best, clear):
+            best, powers, curves = left, columns, found
+    degree = powers.shape[1] - 1
     level, smooth = (powers @ curves).T
     growth, turning = (powers[:, :degree] @ np.polynomial.chebyshev.chebder(curves)).T * (2.0 / span)
     # Outside the windows with a significant phase, both curves are continued as straight lines.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, KeysView, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from pipeline.numerics.estimate import Estimate
 from springmass.api.frames import estimates_frame, run_dataset
 from springmass.api.plotting import Plot
 from springmass.api.showing import html_summary, text_summary
+from springmass.api.values import Value
 from springmass.report.tables import table_rows
 
 if TYPE_CHECKING:
@@ -32,9 +33,10 @@ class Analysis(Found):
 
     Notes
     -----
-    ``a["period"]`` is an :class:`~pipeline.numerics.estimate.Estimate`. Valid names are those of
-    ``docs/reference/estimates.md``, their symbols (``a["k"]``, ``a["T"]``) and the coefficients of the selected law
-    (``a["gamma"]``). ``LAW.PARAMETER`` is a parameter of any law (``a["quadratic.beta"]``). Estimates of one analysis
+    ``a["period"]`` is a number of the ``uncertainties`` package that knows its ``unit``; ``value`` and ``u`` are plain
+    numbers. Valid names are those of ``docs/reference/estimates.md``, their symbols (``a["k"]``, ``a["T"]``) and the
+    coefficients of the selected law (``a["gamma"]``). ``LAW.PARAMETER`` is a parameter of any law
+    (``a["quadratic.beta"]``). It can be used as a mapping of names to values. Estimates of one analysis
     are correlated, and arithmetic takes this into account. Estimates of two analyses are treated as independent;
     :func:`springmass.compare` accounts for what two runs share.
 
@@ -45,63 +47,70 @@ class Analysis(Found):
     >>> a["period"]
     0.758516(22) s
     >>> print(2 * a["T"])
-    1.51703+/-0.00004
+    1.517032 +- 0.000044 s
     """
 
     name: str = ""
 
-    @property
-    def everything(self) -> Mapping[str, Estimate]:
-        """All estimates and the coefficients of the selected law, by name."""
-        law = self.motion.derived.coefficients if isinstance(self.motion, Oscillation) else {}
-        return {**self.estimates, **law}
-
-    def __getitem__(self, name: str) -> Estimate:
-        everything = self.everything
+    def __getitem__(self, name: str) -> Value:
+        everything = self._found()
         if name in everything:
-            return everything[name]
+            return Value.of(everything[name])
         for row in table_rows([self]):
             (estimate,) = row.estimates
             if estimate is not None and name in (row.symbol, row.page_symbol.replace(" ", "_")):
-                return estimate
+                return Value.of(estimate)
         law, _, parameter = name.partition(".")
         if isinstance(self.motion, Oscillation) and law in self.motion.damping.fits:
-            derived = self.motion.derived
-            parameters = derived.parameters_of(self.motion.damping.fits[law])
+            parameters = self.motion.derived.parameters_of(self.motion.damping.fits[law])
             if parameter in parameters:
-                return parameters[parameter]
+                return Value.of(parameters[parameter])
+        errors = [finding.message for finding in self.findings if finding.severity == "error"]
+        why = f": {errors[0]}" if errors else ""
         raise _NoEstimate(
-            f"no estimate {name!r} of this run; there are {', '.join(everything)}: see docs/reference/estimates.md for "
-            "what others need of record and scene"
+            f"no estimate {name!r} of this run{why}; there are {', '.join(everything) or 'none'}: see "
+            "docs/reference/estimates.md for what others need of record and scene"
         )
 
+    def _found(self) -> Mapping[str, Estimate]:
+        """Return all estimates and the coefficients of the selected law, by name."""
+        law = self.motion.derived.coefficients if isinstance(self.motion, Oscillation) else {}
+        return {**self.estimates, **law}
+
     def __contains__(self, name: object) -> bool:
-        return name in self.everything
+        try:
+            self[str(name)]
+        except KeyError:
+            return False
+        return True
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.everything)
+        return iter(self._found())
 
-    def keys(self) -> list[str]:
+    def __len__(self) -> int:
+        return len(self._found())
+
+    def keys(self) -> KeysView[str]:
         """Return the names of the estimates."""
-        return list(self.everything)
+        return self._found().keys()
+
+    def values(self) -> list[Value]:
+        """Return the estimates, in the order of their names."""
+        return [self[name] for name in self]
+
+    def items(self) -> list[tuple[str, Value]]:
+        """Return the names of the estimates with their values."""
+        return [(name, self[name]) for name in self]
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return an estimate by name or symbol, or ``default`` if the run has none of that name."""
+        try:
+            return self[name]
+        except KeyError:
+            return default
 
     def _ipython_key_completions_(self) -> list[str]:
-        return self.keys()
-
-    def ufloat(self, name: str) -> Any:
-        """Return an estimate as an ``uncertainties.UFloat``, or as a plain number if it is exact.
-
-        Parameters
-        ----------
-        name : str
-            As for ``a[name]``.
-
-        Raises
-        ------
-        KeyError
-            If no estimate has that name.
-        """
-        return self[name].ufloat
+        return list(self)
 
     @property
     def plot(self) -> Plot:

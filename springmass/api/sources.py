@@ -9,16 +9,14 @@ from pathlib import Path
 from types import EllipsisType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from acquisition.errors import NeedsAnswer
 from pipeline.analyse import Analysis as Found
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError, TrackError
 from pipeline.options import Options, options_for
-from pipeline.track import F8, Track
 from springmass.api.analysis import Analysis
+from springmass.api.arrays import track_of
 from springmass.api.frames import comparison_frame
 from springmass.runs.analysing import Analysed, analyse_loaded, analyse_track, distinct_names, with_law
 from springmass.runs.comparing import Compared, compare_analysed, demand_one_spring
@@ -56,7 +54,8 @@ def analyse(
         The path of a recording, run file or wire log, or a result of :func:`springmass.open_run` or
         :func:`springmass.load`; these include clock, calibration and scene. A dataset, a frame or a mapping has
         ``"time"`` (s), ``"distance"`` (m) and optionally ``"quality"``. The values of a data array or a series are
-        distances, and its ``time`` or its index gives the times. A pair is ``(t, y)``. NaN marks missing values.
+        distances, and its ``time`` or its index gives the times. A pair is ``(t, y)``. NaN marks missing values. Units
+        that a coordinate, a heading such as "Distance (cm)" or a quantity of pint states are converted.
     scene : Scene, path or mapping, optional
         Known values of the bench. Default for ``NAME.h5``: the ``[scene]`` of ``NAME.about.toml`` beside it, else the
         scene inside the run file, else nothing.
@@ -74,7 +73,8 @@ def analyse(
     from_s, to_s : float, optional
         Limits of the time range to use, s; default: the whole run.
     **completions
-        Options for reading a recording, as :func:`springmass.load` takes them: velocity, channel, rate_hz, unit, run,
+        ``unit`` and ``time_unit`` of arrays, or options for reading a recording, as :func:`springmass.load` takes
+        them: velocity, channel, rate_hz, unit, run,
         time, time_unit, clock_ppm, unverified.
 
     Returns
@@ -112,14 +112,14 @@ def analyse(
         source = source.path
     if isinstance(source, str | os.PathLike):
         source = load_file(source, "springmass.analyse", {**completions, "from_s": from_s, "to_s": to_s})
-    elif completions:
-        raise TrackError(f"{', '.join(completions)} complete recordings named by a path, got a {type(source).__name__}")
+    elif others := completions.keys() - {"unit", "time_unit"} or (completions if isinstance(source, Loaded) else ()):
+        raise TrackError(f"{', '.join(others)} complete recordings named by a path, got a {type(source).__name__}")
     elif isinstance(source, Loaded):
         source = replace(source, track=cut(source.track, from_s, to_s, where=source.path))
     if isinstance(source, Loaded):
         found, name = analyse_loaded(source, _scene(scene), options=chosen).analysis, source.path.name
     else:
-        track = cut(track_of(source), from_s, to_s, where="the record")
+        track = cut(track_of(source, **completions), from_s, to_s, where="the record")
         found, name = analyse_track(track, _scene(scene) or Scene(), chosen), ""
     return Analysis(**{each.name: getattr(found, each.name) for each in fields(Found)}, name=name)
 
@@ -225,61 +225,6 @@ def compare(
     demand_one_spring([(name, run.scene) for name, run in runs.items()])
     found = compare_analysed([Analysed(name, run, {}) for name, run in runs.items()], mass_correlation=mass_correlation)
     return Comparison(found.comparison, found.joint, found.findings, runs)
-
-
-def track_of(source: Any) -> Track:
-    """Return a track from arrays in any supported container; see :func:`analyse`.
-
-    Parameters
-    ----------
-    source : Track, Dataset, DataArray, DataFrame, Series, mapping or pair
-
-    Raises
-    ------
-    TrackError
-        If the source contains no times and distances.
-    """
-    if isinstance(source, Track):
-        return source
-    about: Mapping[str, Any] = getattr(source, "attrs", {})
-    flags = None
-    if hasattr(source, "keys") and "distance" in source:
-        y = source["distance"]
-        t = source["time"] if "time" in source else getattr(source, "index", None)
-        flags = source["quality"] if "quality" in source else None  # noqa: SIM401 - a frame's and a dataset's "in" are of columns
-    elif getattr(source, "ndim", None) == 1 and hasattr(source, "coords") and "time" in source.coords:
-        t, y = source.coords["time"], source
-    elif getattr(source, "ndim", None) == 1 and hasattr(source, "index"):
-        t, y = source.index, source
-    elif isinstance(source, list | tuple) and len(source) == 2:
-        t, y = source
-    else:
-        t = y = None
-    if t is None or y is None:
-        raise TrackError(
-            "a path, a run, a track, a pair (t, y), or a dataset, frame or mapping with time and distance was "
-            f"expected, got a {type(source).__name__}"
-        )
-    of_y: Mapping[str, Any] = getattr(y, "attrs", {})
-    track = Track.from_arrays(
-        _seconds(t),
-        y,
-        flags=flags,
-        **{name: about[name] for name in ("rate_hz", "sigma_m", "quantum_m", "kind") if name in about},
-        quantity=of_y.get("quantity", "length"),
-        unit=of_y.get("units", "m"),
-    )
-    return replace(track, clock=getattr(t, "attrs", {}).get("clock", track.clock))
-
-
-def _seconds(t: Any) -> F8:
-    """Return times in s; dates become the time since the first date."""
-    times = np.asarray(t)
-    if times.dtype.kind == "M":
-        times = times - times[0]
-    if times.dtype.kind == "m":
-        return np.asarray(times / np.timedelta64(1, "s"), np.float64)
-    return np.asarray(times, np.float64)
 
 
 def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:

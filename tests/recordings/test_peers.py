@@ -64,12 +64,12 @@ def test_kafe2s_pendulum_starts_at_its_angle(pendulum: Track) -> None:
 
 
 def test_phypraks_torsion_pendulum(recordings: Path) -> None:
-    """PhyPraKit prints f = 0.5583 Hz, without u, and decay times of 102(10) s and 101(3) s.
+    """PhyPraKit prints f = 0.5583 Hz and decay times of 102(10) s and 101(3) s: the times agree within their u.
 
-    The frequency follows the amplitude here, and both programs state a mean: 2 u is what two weightings may differ by.
+    The frequency grows from 0.5571 to 0.560 Hz as the amplitude falls, so that two means differ by more than their u.
     """
     analysis = sm.analyse(peer(recordings, "Drehpendel.labx"), channel="Winkel phi", unit="rad")
-    assert np.isclose(analysis["frequency"].value, 0.5583, rtol=0.0, atol=2.0 * analysis["frequency"].u)
+    assert np.isclose(analysis["frequency"].value, 0.5583, rtol=0.0, atol=1e-3)
     rate = analysis["damping_rate"]
     decay_s, u_s = 1.0 / rate.value, rate.u / rate.value**2
     for printed, u_printed in ((102.0, 10.0), (101.0, 3.0)):

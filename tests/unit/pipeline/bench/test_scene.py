@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from uncertainties import ufloat
 
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError, SceneError
@@ -180,3 +181,20 @@ def test_any_tables_make_a_scene_or_a_scene_error(tables: dict[str, Any]) -> Non
         refusal = str(error)
     assert not refusal or refusal.startswith("any.toml:")
     assert "\n" not in refusal
+
+
+def test_a_scene_is_checked_when_it_is_built() -> None:
+    """Numbers, pairs of value and u, and values with uncertainty; what a file may not hold is refused."""
+    assert Scene(bob_mass_kg=0.2) == Scene(bob_mass_kg=Estimate(0.2, 0.0, "kg"))  # type: ignore[arg-type]
+    assert Scene(bob_mass_kg=(0.2, 1e-4)) == Scene(bob_mass_kg=Estimate(0.2, 1e-4, "kg"))  # type: ignore[arg-type]
+    assert Scene(bob_mass_kg=ufloat(0.2, 1e-4)).bob_mass_kg == Estimate(0.2, 1e-4, "kg")
+    for wrong in (
+        {"bob_mass_kg": -0.2},
+        {"bob_mass_kg": "0.2"},
+        {"disc_diameter_m": math.nan},
+        {"damping_law": "none?"},
+    ):
+        with pytest.raises(SceneError):
+            Scene(**wrong)  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match="must be in kg, got g"):
+        Scene(bob_mass_kg=Estimate(200.0, 0.0, "g"))

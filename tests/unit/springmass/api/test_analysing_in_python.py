@@ -63,13 +63,6 @@ def test_what_holds_no_run_is_refused(source: Any) -> None:
         sm.analyse(source)
 
 
-def test_units_that_are_not_si_are_refused() -> None:
-    """A data array in centimetres is not taken for metres."""
-    t, y = record()
-    with pytest.raises(TrackError, match="cm"):
-        sm.analyse(xr.DataArray(100.0 * y, {"time": t}, ["time"], attrs={"units": "cm"}))
-
-
 def test_a_path_brings_what_its_reader_saw() -> None:
     """Findings of reading stand among the analysis's, also where the file was loaded before."""
     data = sm.sample_data()

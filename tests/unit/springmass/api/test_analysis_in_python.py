@@ -41,17 +41,21 @@ def pyplot(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 def test_estimates_go_by_name_and_by_symbol(damped: sm.Analysis) -> None:
     """Estimates, the selected law's coefficients, and the parameters of any law."""
-    assert damped["k"] is damped["spring_constant"]
-    assert damped["T"] is damped["period"]
-    assert damped["C_d"] is damped["drag_coefficient"]
+    assert damped["k"] == damped["spring_constant"]
+    assert damped["T"] == damped["period"]
+    assert damped["C_d"] == damped["drag_coefficient"]
     assert damped["gamma"].value == pytest.approx(0.0065, rel=0.01)
     fitted = damped.motion.damping.fits["quadratic"].joint["beta"]
     # The fit's own uncertainty, and the scale of the distances.
     assert damped["quadratic.beta"].value == pytest.approx(fitted.value, rel=1e-12)
     assert fitted.u < damped["quadratic.beta"].u < 1.01 * fitted.u
-    assert float(damped["k"]) == damped.estimates["spring_constant"].value
-    assert list(damped) == damped.keys() == list(damped.everything)
+    assert damped["k"].value == damped.estimates["spring_constant"].value
+    assert list(damped) == list(damped.keys()) == list(dict(damped.items()))
+    assert len(damped) == len(damped.values())
+    assert damped.get("T") == damped["T"]
+    assert damped.get("mu") is None
     assert "gamma" in damped
+    assert "T" in damped
     assert "mu" not in damped
     with pytest.raises(KeyError, match="mu"):
         damped["mu"]
@@ -61,7 +65,7 @@ def test_estimates_calculate_with_their_correlations(damped: sm.Analysis) -> Non
     """A product of estimates of one run is as certain as what they share allows."""
     assert (damped["period"] * damped["frequency"]).std_dev < 1e-12
     assert (damped["period"] * 2).std_dev == pytest.approx(2 * damped["period"].u)
-    assert damped.ufloat("k").nominal_value == damped["k"].value
+    assert damped["k"].nominal_value == damped["k"].value
     assert ((2 * np.pi / damped["T"]) - damped["omega"]).std_dev < 1e-9
 
 
@@ -147,7 +151,7 @@ def test_figures_go_into_axes_of_ones_own(damped: sm.Analysis, pyplot: Any) -> N
 def test_the_frame_of_estimates(damped: sm.Analysis, still: sm.Analysis) -> None:
     """A row an estimate and coefficient with what the budget says, and correlations where they are asked for."""
     frame = damped.to_dataframe()
-    assert list(frame.index) == damped.keys()
+    assert list(frame.index) == list(damped)
     assert frame.loc["gamma", "u"] == damped["gamma"].u
     assert frame.loc["period", "symbol"] == "T"
     np.testing.assert_allclose(frame.expanded, frame.coverage_factor * frame.u)

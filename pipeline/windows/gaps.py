@@ -1,0 +1,111 @@
+"""Gaps: where nothing was recorded for so long that the turns of the oscillation cannot be counted across."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import AnalysisError
+from pipeline.numerics.regression import correlation_length, solve_weighted
+from pipeline.samples.condition import Conditioned
+from pipeline.track import F8, Quality
+from pipeline.windows.cycles import HOLE, NoOscillation, find_cycles
+from pipeline.windows.demodulate import ROUNDING, demodulate
+from pipeline.windows.segments import Segments, Span, SpanKind
+
+SHORT = 0.05  # length of a gap over that of the part beside it up to which it needs no check
+MOST_PHASE = 0.3  # maximum of three standard uncertainties of the phase predicted across a gap, and of its error, rad
+FEWEST_WINDOWS = 3  # minimum number of windows whose phases show how well they follow a straight line
+
+
+def longest_part(samples: Conditioned) -> Segments | None:
+    """Return the longest part without a gap across which turns cannot be counted; None if it is the whole record.
+
+    A gap is bridged if it is not longer than the longer of the parts beside it, and if the phase that a straight line
+    through the phases of one part predicts for the middle of the gap is known to within 0.3 rad, at three standard
+    uncertainties, and agrees with that of the other part. A part of too few periods has no phase; there the other part
+    decides alone.
+    """
+    t = samples.track.t[samples.used]
+    stretches = _stretches(samples, t)
+    if len(stretches) == 1:
+        return None
+    # A bob that has come to rest during the gap leaves a longer part with nothing but noise.
+    order = sorted(stretches, key=lambda each: int(np.searchsorted(t, each[0]) - np.searchsorted(t, each[1])))
+    part = next((each for each in order if _oscillates(samples, *each)), order[0])
+    chosen = stretches.index(part)
+    spans = [Span(SpanKind.FREE, *each) for k, each in enumerate(stretches) if k != chosen]
+    spans += [Span(SpanKind.GAP, a[1], b[0]) for a, b in itertools.pairwise(stretches)]
+    return Segments(*stretches[chosen], tuple(sorted(spans, key=lambda span: span.first_s)))
+
+
+def _oscillates(samples: Conditioned, first_s: float, last_s: float) -> bool:
+    part = _within(samples, (samples.track.t >= first_s) & (samples.track.t <= last_s))
+    return bool(np.count_nonzero(part.used) >= 8) and not isinstance(find_cycles(part), NoOscillation)
+
+
+def _within(samples: Conditioned, rows: NDArray[np.bool_]) -> Conditioned:
+    """Return the record with all but some samples flagged."""
+    return replace(samples, flags=samples.flags | np.where(rows, np.uint8(0), np.uint8(Quality.OUTSIDE)))
+
+
+def _stretches(samples: Conditioned, t: F8) -> list[tuple[float, float]]:
+    """Split the times of the samples used at every gap that is not bridged, the longest first."""
+    whole = [(float(t[0]), float(t[-1]))]
+    steps = np.diff(t)
+    if not steps.size:
+        return whole
+    k = int(np.argmax(steps))
+    gap_s, longer_s = float(steps[k]), max(float(t[k] - t[0]), float(t[-1] - t[k + 1]))
+    if gap_s <= max(HOLE / samples.track.rate_hz, SHORT * longer_s):
+        return whole
+    if gap_s <= longer_s and _continues(samples, float(t[k]), float(t[k + 1])):
+        return whole
+    return [*_stretches(samples, t[: k + 1]), *_stretches(samples, t[k + 1 :])]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Side:
+    """The straight line through the phases on one side of a gap; ``covariance`` is that of level and slope."""
+
+    middle_s: float
+    values: F8
+    covariance: F8
+
+    @classmethod
+    def of(cls, samples: Conditioned, rows: NDArray[np.bool_]) -> _Side | None:
+        """Fit the phases of some samples; None if they do not show enough periods."""
+        part = _within(samples, rows)
+        if np.count_nonzero(part.used) < 8 or isinstance(cycles := find_cycles(part), NoOscillation):
+            return None
+        try:
+            windows = demodulate(part, cycles)
+        except AnalysisError:
+            return None
+        if windows.t.size < FEWEST_WINDOWS:
+            return None
+        u = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
+        middle_s = float(np.mean(windows.t))
+        line = solve_weighted(np.stack([np.ones(u.size), windows.t - middle_s], axis=1), windows.phase, u)
+        widening = max(1.0, line.chi2 / (u.size - 2)) * correlation_length(line.residual / u)
+        return cls(middle_s, line.values, line.covariance * widening)
+
+    def phase(self, t: float) -> tuple[float, float]:
+        """Return the phase at a time and its standard uncertainty, rad."""
+        at = np.array([1.0, t - self.middle_s])
+        return float(at @ self.values), math.sqrt(float(at @ self.covariance @ at))
+
+
+def _continues(samples: Conditioned, last_s: float, next_s: float) -> bool:
+    """Return whether the oscillation goes on across a gap with a known number of turns."""
+    t = samples.track.t
+    sides = [side for side in (_Side.of(samples, t <= last_s), _Side.of(samples, t >= next_s)) if side is not None]
+    if not sides or (next_s - last_s) * max(side.values[1] for side in sides) < 2.0 * math.pi:
+        return True
+    phases, u = zip(*(side.phase(0.5 * (last_s + next_s)) for side in sides), strict=True)
+    apart = math.remainder(phases[-1] - phases[0], 2.0 * math.pi)
+    return bool(max(*u, abs(apart) / 3.0) <= MOST_PHASE / 3.0)

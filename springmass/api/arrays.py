@@ -1,0 +1,138 @@
+"""Tracks from arrays in memory: their units are read or refused, never ignored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from acquisition.recordings import units
+from acquisition.recordings.tables.headings import heading_of, is_time
+from pipeline.errors import TrackError
+from pipeline.track import F8, Track
+
+EXPECTED = "a path, a run, a track, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
+
+
+def track_of(source: Any, *, unit: str | None = None, time_unit: str | None = None) -> Track:
+    """Return a track from arrays in any supported container; see :func:`springmass.analyse`.
+
+    Parameters
+    ----------
+    source : Track, Dataset, DataArray, DataFrame, Series, mapping or pair
+    unit, time_unit : str, optional
+        Units of the values and of the times; by default those that the source states, else m and s.
+
+    Raises
+    ------
+    TrackError
+        If the source contains no times and values, or states units that are not known.
+    """
+    if isinstance(source, Track):
+        if unit is not None or time_unit is not None:
+            raise TrackError("a track has its units: leave unit and time_unit out")
+        return source
+    t, y, flags = _columns(source)
+    about: Mapping[str, Any] = getattr(source, "attrs", {})
+    of_y: Mapping[str, Any] = getattr(y.values, "attrs", {})
+    measure = _measure(unit or y.unit or _unit_of(y.values) or "m")
+    track = Track.from_arrays(
+        _seconds(t.values, time_unit or t.unit or _unit_of(t.values)),
+        _numbers(y.values, "values") * 10.0**measure.power * measure.factor,
+        flags=flags,
+        **{name: about[name] for name in ("rate_hz", "sigma_m", "quantum_m", "kind") if name in about},
+        quantity=of_y.get("quantity", measure.quantity),
+        unit=measure.si,
+    )
+    return replace(track, clock=getattr(t.values, "attrs", {}).get("clock", track.clock))
+
+
+class _Column:
+    """Values, and the unit that their heading states."""
+
+    def __init__(self, values: Any, unit: str = "") -> None:
+        self.values, self.unit = values, unit
+
+
+def _columns(source: Any) -> tuple[_Column, _Column, Any]:
+    """Return the times, the values and the flags of a container."""
+    if hasattr(source, "keys") and "distance" in source:
+        t = source["time"] if "time" in source else getattr(source, "index", None)
+        # The "in" of a frame and of a dataset is that of their columns.
+        flags = source["quality"] if "quality" in source else None  # noqa: SIM401
+        if t is not None:
+            return _Column(_counted(t)), _Column(source["distance"]), flags
+    elif hasattr(source, "columns"):
+        return *_by_headings(source), None
+    elif getattr(source, "ndim", None) == 1 and "time" in getattr(source, "coords", ()):
+        return _Column(source.coords["time"]), _Column(source), None
+    elif getattr(source, "ndim", None) == 1 and hasattr(source, "index"):
+        return _Column(_counted(source.index)), _Column(source), None
+    elif isinstance(source, list | tuple) and len(source) == 2:
+        return _Column(source[0]), _Column(source[1]), None
+    raise TrackError(f"{EXPECTED}, got a {type(source).__name__}")
+
+
+def _by_headings(frame: Any) -> tuple[_Column, _Column]:
+    """Return the time and the only other column of a frame, whose headings are as in a CSV file."""
+    headings = [(name, *heading_of(str(name))) for name in frame.columns]
+    times = [(name, unit) for name, words, unit in headings if is_time(words)]
+    others = [(name, unit) for name, words, unit in headings if not is_time(words)]
+    if len(times) != 1 or len(others) != 1:
+        named = ", ".join(repr(name) for name, *_ in headings)
+        raise TrackError(f"one column of times and one of values were expected, got {named}: choose two of them")
+    return _Column(frame[times[0][0]], times[0][1]), _Column(frame[others[0][0]], others[0][1])
+
+
+def _counted(index: Any) -> Any:
+    """Return an index of times; refuse one that only counts rows."""
+    if type(index).__name__ == "RangeIndex":
+        raise TrackError('its index counts rows and is no time: give times as its index, or as a column "time"')
+    return index
+
+
+def _unit_of(values: Any) -> str:
+    """Return the unit that an array states: a quantity of pint, or the attribute of a data array."""
+    if hasattr(values, "magnitude") and hasattr(values, "units"):
+        return str(values.units)
+    stated = str(getattr(values, "attrs", {}).get("units", ""))
+    return stated.partition(" since ")[0]  # as in "milliseconds since 2026-11-26"
+
+
+def _measure(unit: str) -> units.Measure:
+    measure = units.measure_of(unit.replace("**", "^").replace(" ", ""))
+    if measure is None:
+        raise TrackError(f"unknown unit {unit!r} of the values: give unit=, one of {', '.join(units.MEASURES)}")
+    return measure
+
+
+def _numbers(values: Any, what: str) -> F8:
+    """Return numbers as an array; masked values are missing, and complex ones are refused."""
+    plain = np.ma.asarray(getattr(values, "magnitude", values))
+    if plain.dtype.kind == "c":
+        raise TrackError(f"{what} are complex numbers: give their real part, or their absolute value")
+    try:
+        return np.asarray(np.ma.filled(plain.astype(np.float64), np.nan))
+    except (TypeError, ValueError):
+        raise TrackError(f"{what} are no numbers, but {plain.dtype}: convert them first") from None
+
+
+def _seconds(t: Any, unit: str) -> F8:
+    """Return times in s; dates become the time since the first date."""
+    zoned = getattr(t, "dt", t)  # a column of dates has its time zone there
+    if getattr(zoned, "tz", None) is not None:
+        t = zoned.tz_convert(None)
+    times = np.asarray(getattr(t, "magnitude", t))
+    if times.dtype.kind == "O" and times.size and hasattr(times.flat[0], "timestamp"):
+        stamps = np.array([each.timestamp() for each in times.flat], np.float64)
+        return np.asarray(stamps - stamps[0])
+    if times.dtype.kind == "M":
+        times = times - times[0]
+    if times.dtype.kind == "m":
+        return np.asarray(times / np.timedelta64(1, "s"), np.float64)
+    measure = units.time_unit(unit or "s")
+    if measure is None:
+        raise TrackError(f"unknown unit {unit!r} of the times: give time_unit=, one of {', '.join(units.TIMES)}")
+    return np.asarray(_numbers(t, "times") * (10.0**measure.power * measure.factor))

@@ -1,0 +1,136 @@
+"""Records on which a single fit of the whole is wrong: gaps, lost rows and wide swings; truth from closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.analyse import analyse
+from pipeline.analysis import Analysis, Oscillation
+from pipeline.track import Quality, Track
+from tests.sampling import sampled
+
+NOISES, RATES, GAPS = (1e-4, 3e-4, 2e-3), (50, 100), (0.05, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0)
+
+
+def codes(analysis: Analysis, *severities: str) -> set[str]:
+    """Return the codes of the findings, of these severities if any are given."""
+    return {each.code for each in analysis.findings if not severities or each.severity in severities}
+
+
+def pulled(analysis: Analysis, period_s: float) -> float:
+    """Return the error of the angular frequency in standard uncertainties of the recording, without the clock's."""
+    assert isinstance(analysis.motion, Oscillation)
+    omega = analysis.motion.phase.angular_frequency
+    return (omega.value - 2.0 * math.pi / period_s) / omega.u
+
+
+def with_gap(seed: int) -> tuple[Track, float]:
+    """Return a record of one swing, or of two releases, with one gap, and its period."""
+    rng = np.random.default_rng(1000 + seed)
+    period_s, rate, size = rng.uniform(0.4, 1.8), rng.choice(RATES), rng.uniform(0.01, 0.08)
+    decay, noise = rng.choice([0.0, 0.005, 0.015, 0.04]), rng.choice(NOISES)
+    long_s = rng.uniform(8.0, 60.0)
+    parts = [int(long_s * rate), int(long_s * rng.choice([0.15, 0.5, 1.0]) * rate)]
+    rng.shuffle(parts)
+    begin_s = parts[0] / rate + long_s * rng.choice(GAPS)
+    times = [np.arange(parts[0]) / rate, begin_s + np.arange(parts[1]) / rate]
+    phases, again = rng.uniform(0.0, 2.0 * math.pi, 2), rng.random() < 0.4
+    swings = [
+        size * np.exp(-decay * (t - t[0] * again)) * np.cos(2.0 * math.pi / period_s * (t - t[0] * again) + phase)
+        for t, phase in zip(times, phases if again else phases[[0, 0]], strict=True)
+    ]
+    y = 0.4 + np.concatenate(swings)
+    return Track.from_arrays(np.concatenate(times), y + noise * rng.standard_normal(y.size)), period_s
+
+
+@pytest.mark.parametrize("seed", sampled(range(320), 12))
+def test_no_gap_makes_the_period_wrong(seed: int) -> None:
+    """One swing or two releases, with gaps from a twentieth of the part beside them to thirty times."""
+    track, period_s = with_gap(seed)
+    assert abs(pulled(analyse(track), period_s)) < 4.0
+
+
+def damped(t: np.ndarray, seed: int = 1) -> np.ndarray:
+    """Return a damped sine of 52 mm about 219 mm with a noise of 80 um."""
+    swing = 0.052 * np.exp(-0.015 * t) * np.cos(2.0 * math.pi / 0.790066 * t)
+    return np.asarray(0.219 + swing + 8e-5 * np.random.default_rng(seed).standard_normal(t.size))
+
+
+@pytest.mark.parametrize("pause_s", [80.0, 600.0, 800.0, 1200.0])
+def test_a_long_pause_is_named_with_the_part_beyond_it(pause_s: float) -> None:
+    """Two releases of one bob in one file: one is analysed, and --from of the other is offered."""
+    t = np.arange(3000) / 100
+    analysis = analyse(Track.from_arrays(np.append(t, 30.0 + pause_s + t), np.append(damped(t), damped(t, 2))))
+    assert codes(analysis, "warning", "error") == {"long_gap"}
+    (finding,) = (each for each in analysis.findings if each.code == "long_gap")
+    assert f"--from {30.0 + pause_s:.2f}" in finding.advice
+    assert analysis.estimates["amplitude"].value == pytest.approx(0.052, abs=3e-5)
+    assert analysis.estimates["damping_rate"].value == pytest.approx(0.015, abs=1e-4)
+
+
+def test_a_gap_shorter_than_the_record_beside_it_is_bridged() -> None:
+    """Twelve seconds out of sixty are missing in one swing."""
+    t = np.arange(6000) / 100
+    t = t[(t < 20.0) | (t > 32.0)]
+    analysis = analyse(Track.from_arrays(t, damped(t)))
+    assert "long_gap" not in codes(analysis)
+    assert abs(pulled(analysis, 0.790066)) < 4.0
+
+
+@pytest.mark.parametrize("gap_s", [1.5, 5.0])
+@pytest.mark.parametrize("seed", sampled(range(20), 3))
+def test_the_samples_after_a_gap_are_no_echoes(gap_s: float, seed: int) -> None:
+    """A port was lost for seconds; a neighbour across the gap is no neighbour."""
+    t = np.arange(1800) / 100
+    first_s = np.random.default_rng(seed).uniform(4.0, 12.0)
+    t = t[(t < first_s) | (t > first_s + gap_s)]
+    flags = analyse(Track.from_arrays(t, damped(t, seed))).flags
+    assert not np.any(flags[np.abs(t - first_s - 0.5 * gap_s) < 0.5 * gap_s + 0.1] & np.uint8(Quality.FALSE_ECHO))
+
+
+@pytest.mark.parametrize("seed", sampled(range(12), 3))
+def test_lost_rows_are_named_and_covered(seed: int) -> None:
+    """Two per cent of the rows are lost, and the times are row numbers."""
+    rng = np.random.default_rng(seed)
+    y = damped(np.arange(1500) / 50, seed)[rng.random(1500) > 0.02]
+    analysis = analyse(Track.from_arrays(np.arange(y.size) / 50, y))
+    assert "lost_rows" in codes(analysis, "warning")
+    assert not codes(analysis) & {"clipped", "smoothed_sensor", "amplitude_dependent_frequency"}
+    period = analysis.estimates["period"]
+    assert abs(period.value - 0.790066) < 2.0 * period.u
+    assert 0.008 < period.u / period.value < 0.04
+
+
+@pytest.mark.parametrize("seed", sampled(range(40), 4))
+def test_no_rows_are_said_to_be_lost_where_none_are(seed: int) -> None:
+    """Even times alone do not make lost rows, whatever the noise."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(3000) / 100
+    y = damped(t, seed) + rng.choice([0.0, 3e-4, 3e-3]) * rng.standard_normal(t.size)
+    assert "lost_rows" not in codes(analyse(Track.from_arrays(t, y)))
+
+
+@pytest.mark.parametrize("degrees", [20, 30, 45, 60, 75, 90])
+@pytest.mark.parametrize("quadratic", sampled((0.02, 0.0, 0.1), 1))
+def test_a_wide_pendulum(degrees: int, quadratic: float) -> None:
+    """The equation of motion is solved by scipy; nobody touches the bob, and the pivot is fixed."""
+    from scipy.integrate import solve_ivp
+
+    t, square, start = np.arange(6000) / 50, (2.0 * math.pi / 1.2) ** 2, math.radians(degrees)
+
+    def moves(_: float, z: np.ndarray) -> list[float]:
+        return [z[1], -square * math.sin(z[0]) - quadratic * z[1] * abs(z[1]) - 0.002 * z[1]]
+
+    angle = solve_ivp(moves, (0.0, 120.0), [start, 0.0], t_eval=t, rtol=1e-10, atol=1e-12).y[0]
+    angle += math.radians(0.1) * np.random.default_rng(degrees).standard_normal(t.size)
+    step = math.radians(0.25)
+    analysis = analyse(Track.from_arrays(t, step * np.round(angle / step), unit="rad", quantity="angle"))
+    assert not codes(analysis) & {"touched", "phase_jump", "restarted", "handled"}
+    assert degrees > 75 or "rest_drift" not in codes(analysis)
+    amplitude, small = analysis.estimates["amplitude"], analysis.estimates["period_small_swings"]
+    assert amplitude.value == pytest.approx(start, rel=0.01)
+    assert abs(amplitude.value - start) < 4.0 * amplitude.u
+    assert abs(small.value - 1.2) < 4.0 * small.u
