@@ -78,6 +78,25 @@ def _converted(convert: Callable[[str], Any]) -> Callable[[Any, Sequence[Token]]
     return lambda _, tokens: tuple(convert(token.value) for token in tokens)
 
 
+def _formats(_: Any, tokens: Sequence[Token]) -> tuple[str, ...]:
+    kinds = tuple(kind.strip().lower() for kind in tokens[0].value.split(","))
+    if not set(kinds) <= {"svg", "pdf", "png"}:
+        raise ValueError("must be svg, pdf or png, or several of them with commas")
+    return kinds
+
+
+Figures = Annotated[
+    tuple[Literal["svg", "pdf", "png"], ...],
+    Parameter(
+        name="--figures",
+        metavar="FORMATS",
+        help="also write each chart into figures/, as svg, pdf or png (or several: svg,pdf)",
+        converter=_formats,
+        n_tokens=1,
+    ),
+]
+
+
 def _mark(text: str) -> tuple[float, str]:
     seconds, equals, words = text.partition("=")
     try:
@@ -195,7 +214,7 @@ class AnalyseOptions:
     budget: Annotated[bool, _flag("print the sources of uncertainty")] = False
     ask: Annotated[bool, _flag("ask for the masses and the disc, and save them next to the recording")] = False
     template: Annotated[Literal["latex"] | None, _option("KIND", "also write a lab report template: latex")] = None
-    pdf: Annotated[bool, _flag("also write the figures of reports as PDF")] = False
+    figures: Figures = ()
     si: Annotated[bool, _flag("print SI units without prefixes")] = False
     json: Annotated[bool, _flag("print one JSON object per input on standard output")] = False
     strict: Annotated[bool, _flag("exit with code 5 if a finding is an error")] = False
@@ -221,7 +240,7 @@ class CompareOptions:
         Share, _option("R", "correlation between the errors of two bobs' masses (default: 0)")
     ] = 0.0
     output: Annotated[File | None, _output("DIR", "folder for a report (default: write no report)")] = None
-    pdf: Annotated[bool, _flag("also write its figures as PDF")] = False
+    figures: Figures = ()
     json: Annotated[bool, _flag("print one JSON object on standard output")] = False
     strict: Annotated[bool, _flag("exit with code 5 if a finding is an error")] = False
 
@@ -387,6 +406,7 @@ class SimulateOptions:
     folder: Annotated[
         File | None, _option("DIR", "folder for NAME.simulated (default: here; with --json or -o: none)")
     ] = None
+    figures: Figures = ()
     json: Annotated[bool, _flag("print one JSON object on standard output")] = False
 
 

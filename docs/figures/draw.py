@@ -11,15 +11,8 @@ import numpy as np
 from pipeline.dynamics import Equation, Integrator, Problem, get_integrator
 from pipeline.errors import DynamicsError
 from springmass import analyse, load, read_scene, sample_data
-from springmass.report.figures import amplitude_figure, render
-from springmass.report.figures.canvas import (
-    BLUE,
-    GREEN,
-    VERMILLION,
-    legend_above,
-    panels,
-    style,
-)
+from springmass.charts.draw import legend, render, style, written
+from springmass.charts.run import amplitude
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,9 +27,12 @@ def main(folder: Path = HERE) -> list[Path]:
     loaded = load(data / "damped_simulated_position.txt", velocity=data / "damped_simulated_velocity.txt")
     analysis = analyse(loaded.track, read_scene(data / "damped.scene.toml"))
     target = folder / "amplitude.svg"
-    target.write_bytes(render(amplitude_figure(analysis), "svg"))
+    chart = amplitude(analysis)
+    assert chart is not None
+    target.write_bytes(render(chart, ("svg",))["svg"])
     stability = folder / "stability.svg"
-    stability.write_bytes(render(stability_figure(), "svg"))
+    with style():
+        stability.write_bytes(written(stability_figure(), "svg"))
     return [target, stability]
 
 
@@ -70,12 +66,15 @@ def stability_figure() -> Figure:
     ratios = np.geomspace(0.01, 100.0, 161)
     checked = np.geomspace(0.02, 60.0, 8)
     looks = (
-        ("forward-euler", VERMILLION),
-        ("symplectic-euler", BLUE),
-        ("verlet", GREEN),
+        ("forward-euler", "#b84a00"),
+        ("symplectic-euler", "#0063a0"),
+        ("verlet", "#00704f"),
     )
+    from matplotlib.figure import Figure
+
     with style():
-        figure, (panel,) = panels([3.8])
+        figure = Figure(figsize=(7.2, 3.8))
+        panel = figure.subplots()
         panel.set_xscale("log")
         panel.set_yscale("log")
         for name, colour in looks:
@@ -92,7 +91,7 @@ def stability_figure() -> Figure:
         panel.set_xlabel("damping ratio gamma / omega")
         panel.set_ylabel("largest stable step / radians")
         panel.set_xlim(ratios[0], ratios[-1])
-        legend_above(panel, 3)
+        legend(panel)
         return figure
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from springmass.report.figures import render
+from springmass.charts.draw import style, written
 from springmass.trade.drawing import trade_figure
 from springmass.trade.measure import Trade, measure
 from springmass.trade.methods import UNITS, references, tiers
@@ -25,7 +25,8 @@ def main(folder: Path = HERE, seeds: int = 100) -> str:
     methods = [*tiers(linear=True), *references()]
     trades = {name: measure(truth, methods, seeds, timer=time.perf_counter) for name, truth in CASES.items()}
     first = next(iter(trades.values()))
-    (folder / "trade.svg").write_bytes(render(trade_figure(first), "svg"))
+    with style():
+        (folder / "trade.svg").write_bytes(written(trade_figure(first), "svg"))
     fit_s = next(row.seconds for row in first.rows if row.method.name == "scipy")
     lines = [f"| method | time / fit | {' | '.join(trades)} |", "| --- " * (2 + len(trades)) + "|"]
     for i, row in enumerate(first.rows):

@@ -35,6 +35,8 @@ class Kind:
     advice: tuple[str, ...] = ("",)
     figure: str = ""
     harm: str = "uncertainty"
+    about: tuple[str, ...] = ()
+    consequence: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def kinds() -> Mapping[str, Kind]:
 
 
 def _field(name: str, value: Any) -> Any:
-    if name in ("severity", "says", "details", "advice"):
+    if name in ("severity", "says", "details", "advice", "about"):
         return (value,) if isinstance(value, str) else tuple(value)
     return value
 

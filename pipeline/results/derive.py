@@ -497,7 +497,8 @@ def _of_law(fit: LawFit, elapsed: F8) -> tuple[F8, F8]:
     """Return start amplitude, damping rate at the start and rms displacement, (3,), and their derivatives (3, p)."""
     amplitude, jacobian = fit.law.curve(elapsed, fit.joint.values)
     size = math.sqrt(float(amplitude @ amplitude) / (2.0 * elapsed.size))
-    by_size = amplitude @ jacobian / max(2.0 * elapsed.size * size, 1e-300)
+    with np.errstate(invalid="ignore"):  # a law that is infinite within the record is left out of the average
+        by_size = amplitude @ jacobian / max(2.0 * elapsed.size * size, 1e-300)
     by_start = np.eye(1, fit.joint.values.size)[0]
     values = np.array([fit.joint.values[0], fit.rate_at_start(), size])
     return values, np.stack([by_start, fit.slopes_of_rate(), by_size])

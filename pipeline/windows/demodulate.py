@@ -99,7 +99,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
 
 
 def follow(cycles: Cycles, windows: Demodulated, recorded: F8) -> Cycles:
-    """Cut the windows anew along the phase if the period changes: windows of equal length are then no whole periods."""
+    """Cut the windows anew, along the phase, if the period changes: those of equal length are then no whole periods."""
     t, phase, u_phase = windows.t, windows.phase, np.sqrt(windows.covariance[:, 1, 1])
     if t.size < 2 * ABREAST:
         return cycles

@@ -25,8 +25,8 @@ TURN_S = 0.05
 
 
 def script() -> str:
-    """Return the widget's JavaScript module: uPlot, the page's store of samples, and the chart."""
-    names = ("uPlot.iife.min.js", "samples.js", "notebook.js")
+    """Return the widget's JavaScript module: uPlot, the charts, the page's store of samples, and the widget."""
+    names = ("uPlot.iife.min.js", "charts.js", "samples.js", "notebook.js")
     return "\n".join((STATIC / name).read_text(encoding="utf-8") for name in names)
 
 

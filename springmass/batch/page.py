@@ -6,13 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
+from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from springmass.batch.reports import REPORTS, need_of, report_name
 from springmass.batch.rows import FAILED
 from springmass.batch.store import PAGE, Store
+from springmass.charts.chart import Chart
+from springmass.charts.several import course
 from storage.atomic import writing
-
-__all__ = ["line_of", "write_page"]
 
 SHOWN = (
     ("period", "T", "s"),
@@ -25,31 +26,40 @@ SHOWN = (
 
 
 def write_page(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[str], reports: set[str]) -> None:
-    """Write ``index.html``.
-
-    Parameters
-    ----------
-    store : Store
-    lines : sequence of mapping
-        One line per run, from :func:`line_of`.
-    tags : sequence of str
-        The course's own columns.
-    reports : set of str
-        Names of report folders that can be linked.
-    """
-    from springmass.report.html import template
+    """Write ``index.html``."""
+    from springmass.report.html import Figures, drawn_by_script, template
+    from springmass.report.script import SHARED
 
     there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in lines)]  # only with numbers
     shown = [
         {**line, "cells": [line["cells"][i] for i in there], "link": _link(line["name"], reports)} for line in lines
     ]
     shown.sort(key=lambda line: (*(-x for x in line["need"]), line["name"]))
+    figures = Figures()
+    chart = _chart(lines)
+    figure = None if chart is None else figures.add(chart)
     counts = {kind: sum(line["look"] == kind for line in shown) for kind in ("failed", "error", "warning", "fine")}
     page = template("course.html.j2").render(
-        title=store.folder.resolve().name, lines=shown, tags=tags, quantities=[SHOWN[i] for i in there], counts=counts
+        title=store.folder.resolve().name,
+        lines=shown,
+        tags=tags,
+        quantities=[SHOWN[i] for i in there],
+        counts=counts,
+        figure_of_runs=figure,
+        **drawn_by_script(figures.charts, SHARED),
     )
     with store.output(PAGE) as temporary, writing(store.folder / PAGE):
         temporary.write_bytes(page.encode("utf-8", "backslashreplace"))
+
+
+def _chart(lines: Sequence[Mapping[str, Any]]) -> Chart | None:
+    """Return the chart of all spring constants, or else of all periods, if at least two runs have one."""
+    for name, label in (("spring_constant", "spring constant / (N/m)"), ("period", "period / s")):
+        rows = [(line["name"], *line["estimates"].get(name, (None, None))) for line in lines]
+        known = [(visible(run), value, u or 0.0) for run, value, u in rows if value is not None]
+        if len(known) > 1:
+            return course(label, known)
+    return None
 
 
 def _link(name: str, reports: set[str]) -> str:
@@ -70,6 +80,7 @@ def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
         "tags": [row["job"]["tags"].get(tag, "") for tag in tags],
         "cells": [_cell(row, quantity, unit) for quantity, _, unit in SHOWN],
         "law": row.get("law") or "",
+        "estimates": row["estimates"],
         "thumbnail": row["thumbnail"],
     }
 

@@ -16,7 +16,8 @@ from acquisition.errors import visible
 from springmass.batch.executors import Lost, local_workers, outcomes
 from springmass.batch.plan import Job
 from springmass.errors import NO_MEMORY, UNREADABLE, USAGE, ProgramError, internal_error
-from storage.atomic import writing
+from springmass.report.script import SHARED
+from storage.atomic import write_whole, writing
 from storage.errors import WriteFailed, one_line
 
 __all__ = ["REPORTS", "find_run", "linked", "need_of", "report_name", "worst", "write_one", "write_reports"]
@@ -83,6 +84,10 @@ def write_reports(
     """
     tasks = [(run, job, folder / REPORTS / report_name(run)) for run, job in chosen]
     failed: dict[str, str] = {}
+    try:
+        write_script(folder)
+    except WriteFailed as error:
+        failed[SHARED] = str(error)
     for name in sorted(linked(folder) - {place.name for _, _, place in tasks}):
         try:
             with writing(folder / REPORTS / name):
@@ -145,7 +150,14 @@ def write_one(run: str, job: Job, folder: Path) -> Path:
     except (AcquisitionError, StorageError, PipelineError) as error:
         raise ProgramError(str(error), UNREADABLE) from error
     result = {**analysed.result, "input": {**analysed.result["input"], "path": job.path}}
-    return write_report(folder, [replace(analysed, result=result)])
+    return write_report(folder, [replace(analysed, result=result)], script=f"../../{SHARED}")
+
+
+def write_script(folder: Path) -> None:
+    """Write the script that the course's page and all its reports share."""
+    from springmass.report.script import report_script
+
+    write_whole(folder / SHARED, report_script())
 
 
 def find_run(folder: Path, jobs: Mapping[str, Job], run: str) -> tuple[str, Job]:

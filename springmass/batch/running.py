@@ -22,6 +22,7 @@ from springmass.batch.rows import FAILED, dumped, flat
 from springmass.batch.store import CSV, PAGE, PARQUET, Store
 from springmass.batch.worker import analyse_many, blank_row, unchanged
 from springmass.errors import USAGE, ProgramError
+from springmass.report.script import SHARED
 from springmass.runs.analysing import make_folder
 from storage.atomic import writing
 from storage.errors import WriteFailed
@@ -208,7 +209,7 @@ def _make(
         ).encode("utf-8", "backslashreplace")
     ).hexdigest()
     outputs = (CSV, PAGE, *((PARQUET,) if find_spec("pyarrow") is not None else ()))
-    if store.is_complete(made_of) and all(map(store.is_intact, outputs)):
+    if store.is_complete(made_of) and all(map(store.is_intact, outputs)) and (store.folder / SHARED).exists():
         return False
     store.begin()
 
@@ -239,8 +240,9 @@ def _make(
 
 def _report_code_sha256() -> str:
     """Return the digest of the code for page and reports, which is separate from the code for rows."""
-    folder = Path(__file__).resolve().parent.parent / "report"
-    files = sorted(file for file in folder.rglob("*") if file.suffix in (".py", ".j2", ".css"))
+    home = Path(__file__).resolve().parent.parent
+    every = [file for name in ("report", "charts", "page/static") for file in (home / name).rglob("*")]
+    files = sorted(file for file in every if file.suffix in (".py", ".j2", ".css", ".js"))
     return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest()
 
 

@@ -1,7 +1,7 @@
 """``springmass analyse``: from recordings to Table 1, findings and a report.
 
 Several inputs are analysed one after the other: twenty records of two minutes take 1.4 s, and a second process would
-take longer to begin (``benchmarks/many.py``). Reports take a second or more each; one process per core makes them.
+take longer to begin (``benchmarks/many.py``).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import filecmp
 import json
 import shlex
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,7 +51,6 @@ from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import Loaded, load, sample_data
 from springmass.runs.options import ReadOptions
-from springmass.runs.processes import cores, pool
 from springmass.runs.questions import for_command, option_of
 from springmass.runs.scenes import Amendments, amended, read_scenes
 from springmass.terminal.asking import ask_for_bench
@@ -87,7 +86,7 @@ class _Task:
 
 @dataclass(frozen=True, slots=True)
 class _Done:
-    """The outcome of one of several inputs, small enough to be sent from another process."""
+    """The outcome of one of several inputs: of a course of thousands, only what is printed at the end."""
 
     name: str
     code: int
@@ -171,7 +170,7 @@ def _several(tasks: Sequence[_Task], inputs: Sequence[str], options: AnalyseOpti
     from springmass.terminal.progress import counted
 
     everything: list[_Done] = []
-    for done in counted(_worked(tasks), len(tasks), "reports" if options.report else "runs", quiet=manner()[0]):
+    for done in counted(map(_work, tasks), len(tasks), "reports" if options.report else "runs", quiet=manner()[0]):
         everything.append(done)
         if options.json and done.result:
             print(json.dumps(done.result, allow_nan=False), flush=True)
@@ -193,25 +192,6 @@ def _several(tasks: Sequence[_Task], inputs: Sequence[str], options: AnalyseOpti
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(codes)
-
-
-def _worked(tasks: Sequence[_Task]) -> Iterator[_Done]:
-    """Yield the outcome of each task, in order; if there are reports, use one process per core."""
-    workers = min(cores(), len(tasks))
-    if tasks[0].report is None or workers == 1:
-        yield from map(_work, tasks)
-        return
-    from concurrent.futures.process import BrokenProcessPool
-
-    with pool(workers) as processes:
-        try:
-            yield from processes.map(_work, tasks)
-        except BrokenProcessPool as error:
-            what = "a process that makes reports was ended from outside, perhaps for lack of memory"
-            raise ProgramError(f"{what}; give fewer inputs", SOME_FAILED) from error
-        except BaseException:
-            processes.shutdown(wait=False, cancel_futures=True)
-            raise
 
 
 def _work(task: _Task) -> _Done:
@@ -366,7 +346,7 @@ def _write(analysed: Analysed, task: _Task) -> Path:
     from springmass.report.write import write_report
 
     assert task.report is not None
-    return write_report(task.report, [analysed], pdf=task.options.pdf, template=task.options.template)
+    return write_report(task.report, [analysed], figures=task.options.figures, template=task.options.template)
 
 
 def _write_together(analysed: Sequence[_Done], folder: Path) -> Path:

@@ -63,7 +63,7 @@ def run(recordings: Sequence[str | Path], options: CompareOptions, read: ReadOpt
     if out is not None:
         from springmass.report.write import write_report
 
-        page = write_report(out, runs, compared=compared, summary=result, pdf=options.pdf)
+        page = write_report(out, runs, compared=compared, summary=result, figures=options.figures)
         tell(f"report: {page}")
         suggest(f"open {page} in a browser")
     else:

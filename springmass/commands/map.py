@@ -23,8 +23,8 @@ COLUMNS = ("run", "disc", "reynolds_number", "keulegan_carpenter_number", "drag_
 
 def run(folders: Sequence[str | Path], options: MapOptions) -> int:
     """Draw the map of every run for which an expression holds; write it as SVG and PDF, its numbers as CSV."""
-    from springmass.report.figures.canvas import save
-    from springmass.report.figures.drag_map import DragRun, drag_map_figure
+    from springmass.charts.drag_map import DragRun, drag_map
+    from springmass.charts.draw import save
     from springmass.report.tables import cell
     from storage.atomic import write_whole
 
@@ -47,7 +47,7 @@ def run(folders: Sequence[str | Path], options: MapOptions) -> int:
             f"{demand}, got none among {len(found)}: it needs bob, disc and air in the scene, see --where", UNREADABLE
         )
     folder = make_folder(options.output)
-    save(drag_map_figure(runs), folder, "drag-map")
+    save([drag_map(runs)], folder, ("svg", "pdf"))
     write_whole(folder / "drag-map.csv", out.getvalue())
     tell(f"{len(runs)} of {len(found)} runs give a drag coefficient; written: {folder / 'drag-map.svg'}")
     suggest(f"springmass compare {shlex.join(courses)}")

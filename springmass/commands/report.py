@@ -7,7 +7,7 @@ from pathlib import Path
 
 from springmass.batch.page import line_of, write_page
 from springmass.batch.plan import Job
-from springmass.batch.reports import REPORTS, find_run, linked, report_name, write_one
+from springmass.batch.reports import REPORTS, find_run, linked, report_name, write_one, write_script
 from springmass.batch.store import open_course
 from springmass.errors import OK, suggest, tell
 from springmass.runs.analysing import make_folder
@@ -27,6 +27,7 @@ def run(course: str | Path, run_name: str) -> int:
     name, job = find_run(folder, jobs, run_name)
     make_folder(folder / REPORTS)
     with store.held():
+        write_script(folder)
         page = write_one(name, job, folder / REPORTS / report_name(name))
         write_page(store, lines, store.tags, linked(folder))
     tell(f"report: {page}")

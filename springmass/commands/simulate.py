@@ -94,7 +94,9 @@ def run(options: SimulateOptions, read: ReadOptions) -> int:
     if options.folder is not None or not (options.json or options.output is not None):
         from springmass.runs.simulating.written import write_folder
 
-        folder = write_folder(simulation, against, band, ready.solved, where, options.folder or ".", results)
+        folder = write_folder(
+            simulation, against, band, ready.solved, where, options.folder or ".", results, options.figures
+        )
         print(f"written          {visible(str(folder))}", file=say)
         suggest(f"springmass analyse {shlex.quote(str(folder / 'run.h5'))} --scene {shlex.quote(str(options.scene))}")
     if options.json:

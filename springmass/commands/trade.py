@@ -183,13 +183,15 @@ def trade_of_scene(
 
 
 def _write(out: Path, name: str, figure: Figure, content: Mapping[str, Any]) -> None:
-    from springmass.report.figures import KINDS, save
+    from springmass.charts.draw import style, written
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 
     last = f"{name}.json"
-    with whole_folder(out, {last, *(f"{name}.{kind}" for kind in KINDS)}, last) as folder:
-        save(figure, folder, name)
+    with whole_folder(out, {last, *(f"{name}.{kind}" for kind in ("svg", "pdf"))}, last) as folder:
+        with style():
+            for kind in ("svg", "pdf"):
+                write_whole(folder / f"{name}.{kind}", written(figure, kind))
         write_whole(folder / last, json.dumps(content, indent=2) + "\n")
 
 

@@ -12,28 +12,13 @@ from pipeline.registry.quantities import INPUTS, QUANTITIES
 from pipeline.results.budget import Budget, Contribution
 from springmass.report.tables import cell, table_estimates
 
-__all__ = ["BudgetRow", "budget_csv", "budget_text", "budgets_of", "correlations_of"]
-
 SAME = ("frequency", "angular_frequency")  # determined by the period alone
-CORRELATED = frozenset({"period", "spring_constant", "amplitude", "damping_rate", "gamma", "beta", "mu", "c", "n"})
-"""Results whose correlations the page shows; their number fits the width of a phone."""
 LEAST_SHARE = 1e-3  # of the variance; smaller shares do not change a printed digit of u
 
 
 @dataclass(frozen=True, slots=True)
 class BudgetRow:
-    """One quantity of the budget table.
-
-    Parameters
-    ----------
-    name, quantity : str
-        Name as in ``Derived.budgets``, and the quantity in words.
-    budget : Budget
-    contributions : tuple of Contribution
-        Contributions of at least a thousandth of the variance.
-    rest : float
-        Total share of all other contributions.
-    """
+    """One quantity of the budget table."""
 
     name: str
     quantity: str
@@ -46,10 +31,6 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
     """Return the budget table of a run in the order of Table 1; empty if nothing oscillates.
 
     Frequencies are omitted, because they share the period's budget.
-
-    Parameters
-    ----------
-    analysis : Analysis
     """
     if not isinstance(analysis.motion, Oscillation):
         return ()
@@ -67,38 +48,10 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
     return tuple(rows)
 
 
-def correlations_of(analysis: Analysis) -> tuple[tuple[str, ...], list[list[float]]]:
-    """Return the correlations between the basic results, from which others are calculated; empty if nothing oscillates.
-
-    ``results.json`` contains the correlations between all results.
-
-    Parameters
-    ----------
-    analysis : Analysis
-
-    Returns
-    -------
-    names : tuple of str
-        Names of the results, in the order of Table 1.
-    matrix : list of list of float
-        Correlation coefficients, between -1 and 1.
-    """
-    if not isinstance(analysis.motion, Oscillation):
-        return (), []
-    joint = analysis.motion.derived.joint
-    names = tuple(name for name in QUANTITIES if name in CORRELATED and name in joint.names)
-    rows = [joint.names.index(name) for name in names]
-    return names, [[float(joint.correlation[i, j]) for j in rows] for i in rows]
-
-
 def budget_text(analysis: Analysis) -> str:
     """Return a brief budget in ASCII: one line per quantity with its two largest contributions.
 
     Quantities with only one input of at least 1 % are omitted, because their line would give no information.
-
-    Parameters
-    ----------
-    analysis : Analysis
     """
     shown = {row: [c for c in row.contributions if c.share >= 0.01] for row in budgets_of(analysis)}
     rows = [row for row, inputs in shown.items() if len(inputs) > 1]
@@ -113,13 +66,7 @@ def budget_text(analysis: Analysis) -> str:
 
 
 def budget_csv(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return every budget as CSV, with one line per input and all digits of the numbers.
-
-    Parameters
-    ----------
-    names : sequence of str
-    analyses : sequence of Analysis
-    """
+    """Return every budget as CSV, with one line per input and all digits of the numbers."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     heads = ["run", "quantity", "input", "type", "value", "u", "unit", "sensitivity", "contribution", "share"]

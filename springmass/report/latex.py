@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
@@ -15,7 +18,8 @@ from springmass.report.budgets import budgets_of
 from springmass.report.tables import table_rows
 from springmass.runs.analysing import Analysed
 
-__all__ = ["budget_tex", "lab_report_tex", "table_tex"]
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 _SIUNITX = {
     "s": r"\second",
@@ -39,8 +43,6 @@ _SIUNITX = {
     "degC": r"\degreeCelsius",
     "Pa": r"\pascal",
 }
-INPUT_WIDTH = 0.42
-"""Fraction of a budget's line width for the input's name, which wraps there; its value fits into the rest on A4."""
 _WRITTEN = re.compile(r"\(?(?P<value>-?[\d.]+) \+- (?P<u>[\d.]+)\)?(?:e(?P<power>[+-]\d+))?")
 _TEX_SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -51,76 +53,62 @@ _TEX_SPECIAL = {
 
 
 def table_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return Table 1 as a LaTeX table of siunitx quantities; it needs booktabs and siunitx version 3.
-
-    Parameters
-    ----------
-    names : sequence of str
-    analyses : sequence of Analysis
-    """
-    body = [
-        " & ".join(
-            [f"{row.quantity[:1].upper()}{row.quantity[1:]} & ${row.tex_symbol}$", *map(_tex_quantity, row.estimates)]
-        )
-        + r" \\"
-        for row in table_rows(analyses)
-    ]
-    caption = "Results of the oscillation experiment; in parentheses the standard uncertainty of the last digits."
-    return _framed(caption, ["Quantity", "Symbol", *map(_tex_text, names)], body, [r"  \label{tab:springmass}"])
+    """Return Table 1 as a LaTeX table of siunitx quantities; it needs booktabs and siunitx version 3."""
+    return _filled("table.tex.j2", names=names, rows=table_rows(analyses))
 
 
 def budget_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
-    """Return one LaTeX table of the uncertainty budget per run; it needs booktabs, longtable and siunitx version 3.
+    """Return one LaTeX table of the uncertainty budget per run; it needs booktabs, longtable and siunitx version 3."""
+    runs = zip(names, analyses, strict=True)
+    return "\n".join(_filled("budget.tex.j2", name=name, rows=budgets_of(analysis)) for name, analysis in runs)
 
-    Parameters
-    ----------
-    names : sequence of str
-    analyses : sequence of Analysis
+
+def lab_report_tex(run: Analysed, captions: Mapping[str, str], sentences: Sequence[str]) -> str:
+    """Return a lab report to complete: it contains Table 1, figures, captions, uncertainty, and questions for the rest.
+
+    Compile it in the folder of the report, which contains its figures: ``pdflatex lab-report.tex``.
     """
-    return "\n".join(_budget_table(name, analysis) for name, analysis in zip(names, analyses, strict=True))
+    return _filled(
+        "lab-report.tex.j2",
+        sentences=sentences,
+        table=table_tex([run.name], [run.analysis]),
+        captions=captions,
+        budgets=[row for row in budgets_of(run.analysis) if row.name in ("period", "spring_constant")],
+        warnings=list(filter(None, map(lab_report_line, by_harm(run.result.get("findings", ()))))),
+    )
 
 
-def _budget_table(name: str, analysis: Analysis) -> str:
-    """Return the table, one block per quantity; a result is above its inputs, because A4 is too narrow for both."""
-    lines = []
-    for row in budgets_of(analysis):
-        result = f"{row.quantity[:1].upper()}{row.quantity[1:]} {_tex_quantity(row.budget.estimate)}"
-        freedom = r"\infty" if math.isinf(row.budget.dof) else f"{row.budget.dof:.0f}"
-        expanded = rf"$U = {row.budget.expanded:.2g}$, $k = {row.budget.coverage_factor:.2f}$, $\nu = {freedom}$"
-        lines.append(rf"\multicolumn{{4}}{{l}}{{{result}; {_tex_power(expanded)}}} \\")
-        for c in row.contributions:
-            given = "--" if c.input is None else _tex_quantity(c.input)
-            cells = [
-                rf"\quad {_tex_text(INPUTS[c.name].label)}",
-                c.kind,
-                given,
-                rf"\qty{{{100 * c.share:.1f}}}{{\percent}}",
-            ]
-            lines.append(" & ".join(cells) + r" \\")
-        lines.append(r"\addlinespace")
-    caption = (
-        f"Uncertainty budget of {_tex_text(name)}: share of each input in the variance, "
-        "from the record's own scatter (A) or from elsewhere (B), and the expanded uncertainty $U = ku$ that covers "
-        r"\qty{95.45}{\percent}, in the result's unit."
+def _filled(template: str, **values: Any) -> str:
+    return _templates().get_template(template).render(**values)
+
+
+@functools.cache
+def _templates() -> Environment:
+    """Return the templates, whose delimiters do not look like LaTeX."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("springmass.report"),
+        undefined=StrictUndefined,
+        variable_start_string="<<",
+        variable_end_string=">>",
+        block_start_string="<%",
+        block_end_string="%>",
+        comment_start_string="<#",
+        comment_end_string="#>",
+        trim_blocks=True,
+        keep_trailing_newline=True,
     )
-    return "\n".join(
-        [
-            r"% needs \usepackage{booktabs}, \usepackage{longtable} and \usepackage{siunitx}, version 3",
-            r"{\footnotesize",
-            rf"\begin{{longtable}}{{p{{{INPUT_WIDTH}\linewidth}}llr}}",
-            rf"  \caption{{{caption}}} \\",
-            r"  \toprule",
-            r"  Input & Type & Value & Share \\",
-            r"  \midrule",
-            r"  \endhead",
-            r"  \bottomrule",
-            r"  \endfoot",
-            *(f"  {line}" for line in lines[:-1]),
-            r"\end{longtable}",
-            "}",
-            "",
-        ]
-    )
+    environment.filters |= {
+        "quantity": _tex_quantity,
+        "power": _tex_power,
+        "words": _tex_words,
+        "text": _tex_text,
+        "input": lambda name: _tex_text(INPUTS[name].label),
+        "freedom": lambda dof: r"\infty" if math.isinf(dof) else f"{dof:.0f}",
+        "sentence": lambda text: f"{text[:1].upper()}{text[1:]}",
+    }
+    return environment
 
 
 def _tex_power(text: str) -> str:
@@ -128,126 +116,14 @@ def _tex_power(text: str) -> str:
     return re.sub(r"e([+-])0*(\d+)", lambda found: rf" \times 10^{{{found[1].replace('+', '')}{found[2]}}}", text)
 
 
-def lab_report_tex(
-    run: Analysed, figures: Mapping[str, str], captions: Mapping[str, str], sentences: Sequence[str]
-) -> str:
-    """Return a lab report to complete: it contains Table 1, figures, captions, uncertainty, and questions for the rest.
-
-    Compile it in the folder of the report, which contains its figures: ``pdflatex lab-report.tex``.
-
-    Parameters
-    ----------
-    run : Analysed
-    figures : mapping of str to str
-        Path of each figure's file without extension, by the figure's name.
-    captions : mapping of str to str
-    sentences : sequence of str
-        Sentences about the measured values and the damping.
-    """
-    warnings = [line for finding in by_harm(run.result.get("findings", ())) if (line := lab_report_line(finding))]
-    budget = {row.name: row for row in budgets_of(run.analysis)}
-    stated = [
-        f"The {row.quantity} is {_tex_quantity(row.budget.estimate)}; its expanded uncertainty is "
-        rf"$U = {_tex_power(f'{row.budget.expanded:.2g}')}$ in the same unit "
-        f"($k = {row.budget.coverage_factor:.2f}$, coverage "
-        rf"\qty{{95.45}}{{\percent}}). Its largest contribution is the {_tex_text(INPUTS[greatest.name].label)} "
-        rf"(type {greatest.kind}, \qty{{{100 * greatest.share:.0f}}}{{\percent}} of the variance)."
-        for name in ("period", "spring_constant")
-        if (row := budget.get(name)) is not None
-        for greatest in row.contributions[:1]
-    ]
-    pictures = [
-        "\n".join(
-            [
-                r"\begin{figure}[htbp]",
-                r"  \centering",
-                rf"  \includegraphics[width=\linewidth,height=0.8\textheight,keepaspectratio]{{{path}}}",
-                rf"  \caption{{{_tex_words(captions[name])}}}",
-                rf"  \label{{fig:{name}}}",
-                r"\end{figure}",
-                "",
-            ]
-        )
-        for name, path in figures.items()
-    ]
-    method = [
-        "What did you measure, and how does the sensor measure it?",
-        "How was the spring hung, and what moved with it?",
-        "How did you measure the masses, and how uncertain are they?",
-        "How did you release the bob?",
-    ]
-    discussion = [
-        "Does the spring constant agree with that from a static measurement, within the uncertainties?",
-        "Which damping law fits, and is that what you expect for this bob and disc?",
-        "Do the residuals show structure? What could cause it?",
-        "Which contribution would you reduce first, and how?",
-    ]
-    return "\n".join(
-        [
-            r"\documentclass[11pt,a4paper]{article}",
-            r"\usepackage[utf8]{inputenc}",
-            r"\usepackage[T1]{fontenc}",
-            r"\usepackage[margin=25mm]{geometry}",
-            r"\usepackage{amsmath,textcomp,booktabs,longtable,graphicx,siunitx}",
-            r"\title{Oscillation of a mass on a spring}",
-            r"\author{Your name}",
-            r"\begin{document}",
-            r"\maketitle",
-            "",
-            r"\section{Method}",
-            *(f"% {question}" for question in method),
-            "",
-            r"\section{Results}",
-            " ".join(_tex_words(sentence) for sentence in sentences),
-            r"Table~\ref{tab:springmass} lists the results.",
-            "",
-            table_tex([run.name], [run.analysis]),
-            *pictures,
-            r"\section{Uncertainty}",
-            r"Uncertainties are standard uncertainties (coverage factor 1) unless stated otherwise.",
-            *stated,
-            *(_tex_words(warning) for warning in warnings),
-            "",
-            r"\section{Discussion}",
-            *(f"% {question}" for question in discussion),
-            "",
-            r"\end{document}",
-            "",
-        ]
-    )
-
-
 _TEX_MATH = {
+    **dict(zip("±−×·≤≥≈∞", (r"\pm", "-", r"\times", r"\cdot", r"\leq", r"\geq", r"\approx", r"\infty"), strict=True)),
     "χ²": r"\chi^2",
-    "α": r"\alpha",
-    "β": r"\beta",
-    "γ": r"\gamma",
-    "δ": r"\delta",
-    "ζ": r"\zeta",
-    "η": r"\eta",
-    "θ": r"\theta",
-    "κ": r"\kappa",
-    "λ": r"\lambda",
-    "μ": r"\mu",
-    "ν": r"\nu",
-    "π": r"\pi",
-    "ρ": r"\rho",
-    "σ": r"\sigma",
-    "τ": r"\tau",
     "φ": r"\varphi",
-    "ψ": r"\psi",
-    "ω": r"\omega",
-    "Δ": r"\Delta",
-    "Ω": r"\Omega",
-    "±": r"\pm",
-    "−": "-",
-    "×": r"\times",
-    "·": r"\cdot",
+    "λ": r"\lambda",  # Unicode spells its name without the b
+    **{letter: "\\" + unicodedata.name(letter).split()[-1].lower() for letter in "αβγδζηθκμνπρστψω"},
+    **{letter: "\\" + unicodedata.name(letter).split()[-1].capitalize() for letter in "ΔΩ"},
     **{lowered: f"_{digit}" for digit, lowered in enumerate("₀₁₂₃₄₅₆₇₈₉")},
-    "≤": r"\leq",
-    "≥": r"\geq",
-    "≈": r"\approx",
-    "∞": r"\infty",
 }
 _SUPERSCRIPTS = {raised: plain for plain, raised in zip("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True)}
 
@@ -261,28 +137,6 @@ def _tex_words(text: str) -> str:
     for symbol, tex in _TEX_MATH.items():
         text = text.replace(symbol, f"${tex}$")
     return text.replace("°C", r"\textcelsius{}").replace("µ", r"\textmu{}").replace("–", "--")
-
-
-def _framed(caption: str, heads: Sequence[str], body: Sequence[str], label: Sequence[str] = ()) -> str:
-    """Frame the lines of a table with its heads, all columns left-aligned."""
-    return "\n".join(
-        [
-            r"% needs \usepackage{booktabs} and \usepackage{siunitx}, version 3",
-            r"\begin{table}",
-            r"  \centering",
-            rf"  \caption{{{caption}}}",
-            *label,
-            rf"  \begin{{tabular}}{{{'l' * len(heads)}}}",
-            r"    \toprule",
-            rf"    {' & '.join(heads)} \\",
-            r"    \midrule",
-            *(f"    {line}" for line in body),
-            r"    \bottomrule",
-            r"  \end{tabular}",
-            r"\end{table}",
-            "",
-        ]
-    )
 
 
 def _tex_quantity(estimate: Estimate | None) -> str:

@@ -13,8 +13,6 @@ from pipeline.numerics.estimate import Estimate
 from springmass.report.tables import law_status, pretty_number
 from springmass.report.words import equation, typeset
 
-__all__ = ["laws_across", "laws_of"]
-
 
 def laws_of(motion: Oscillation) -> dict[str, Any]:
     """Return the rows of all laws fitted to one run, and the reasons why other laws were not fitted."""

@@ -10,8 +10,6 @@ from pipeline.numerics.quantity import Unit, noun
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import UNUSABLE
 
-__all__ = ["COLUMNS", "columns_of", "motion_csv", "row_step", "smoothed_or_why"]
-
 COLUMNS = (
     "time_s",
     "distance_m",
@@ -52,12 +50,7 @@ def _spelt(unit: str) -> str:
 
 
 def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
-    """Return the smoothed motion, or the reason in words why there is none.
-
-    Parameters
-    ----------
-    analysis : Analysis
-    """
+    """Return the smoothed motion, or the reason in words why there is none."""
     if not isinstance(analysis.motion, Oscillation):
         return "nothing oscillates"
     try:
@@ -67,26 +60,13 @@ def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
 
 
 def row_step(analysis: Analysis) -> int:
-    """Return n if every n-th sample has a line in ``motion.csv``; n is 1 for up to a million samples.
-
-    Parameters
-    ----------
-    analysis : Analysis
-    """
+    """Return n if every n-th sample has a line in ``motion.csv``; n is 1 for up to a million samples."""
     return -(-len(analysis.track) // MOST_ROWS)
 
 
 def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
     """Return CSV with one line per sample in the record's order, with the columns from :func:`columns_of`.
 
-    Parameters
-    ----------
-    analysis : Analysis
-    smoothed : Smoothed
-        Smoothed motion of the same analysis.
-
-    Notes
-    -----
     Times keep all their digits; other values keep ten, which exceeds their accuracy. NaN becomes an empty cell: a
     missing distance, or the motion at a sample without a time or outside the analysed part. Records of more than a
     million samples have a line for every second or third sample; see :func:`row_step`.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -12,8 +11,6 @@ from acquisition.errors import visible
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from springmass.report.tables import pretty
-
-__all__ = ["Note", "bench_words", "calibration_of", "date_words", "notes_of", "without_date"]
 
 _ON_THE_BENCH = (
     ("bob", "bob_mass_kg"),
@@ -32,17 +29,7 @@ _CALIBRATED = {
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A mark or an event of a recording.
-
-    Parameters
-    ----------
-    t_s : float
-        Time since the first sample, s.
-    text : str
-        The mark, or the facts of the event, in words.
-    kind : str
-        "mark", or the kind of event: "trigger", "lost", ...
-    """
+    """A mark or an event of a recording."""
 
     t_s: float
     text: str
@@ -50,13 +37,7 @@ class Note:
 
 
 def notes_of(recorded: Mapping[str, Any]) -> tuple[Note, ...]:
-    """Return marks and events of a recording in the order of their times.
-
-    Parameters
-    ----------
-    recorded : mapping
-        Provenance of the recording, as in a run file.
-    """
+    """Return marks and events of a recording in the order of their times."""
     marks = [Note(mark["t_s"], visible(str(mark["text"])), "mark") for mark in recorded.get("marks", ())]
     events = [
         Note(event["t_s"], _facts(event.get("facts", {})), str(event["kind"])) for event in recorded.get("events", ())
@@ -84,55 +65,23 @@ def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     return tuple(rows)
 
 
-def date_words(recorded: Mapping[str, Any], title: str = "") -> str:
-    """Return in words when a run was recorded, from its start time, or else from the date in its title.
-
-    Parameters
-    ----------
-    recorded : mapping
-        Provenance of the recording, as in a run file.
-    title : str
-        The recording's title line.
+def date_words(recorded: Mapping[str, Any]) -> str:
+    """Return in words when a run was recorded; empty if nothing but its title may say so.
 
     Examples
     --------
     >>> date_words({"start_time": "2026-11-22T22:30:35.97+00:00"})
-    'Recorded 2026-11-22 22:30:35 UTC'
-    >>> date_words({}, "Motion Sensor Data File Sep 20, 2018 1:40 PM")
-    'Recorded Sep 20, 2018 1:40 PM'
-    >>> date_words({})
-    'Date of the recording not known'
+    'Recorded 2026-11-22 22:30:35 UTC.'
     """
     start = recorded.get("start_time")
     if not start:
-        found = _DATE.search(title)
-        return f"Recorded {visible(found[0])}" if found else "Date of the recording not known"
+        return ""
     try:
         moment = datetime.fromisoformat(str(start))
     except ValueError:
-        return f"Recorded {visible(str(start))}"
-    if moment.tzinfo is None:
-        return f"Recorded {moment:%Y-%m-%d %H:%M:%S}"
-    return f"Recorded {moment.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
-
-
-_TIME = r"(?:,?\s+\d{1,2}:\d{2}(?::\d{2})?(?:\s*[AP]M)?)?"
-_MONTH = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*\.?"
-_DATE = re.compile(
-    rf"(?:{_MONTH}\s+\d{{1,2}},?\s+\d{{4}}|\d{{1,2}}\.?\s+{_MONTH}\s+\d{{4}}|\d{{4}}-\d{{2}}-\d{{2}}){_TIME}",
-    re.IGNORECASE,
-)
-
-
-def without_date(title: str) -> str:
-    """Return a title without the date in it.
-
-    Examples
-    --------
-    >>> without_date("Motion Sensor Data File Sep 20, 2018 1:40 PM")
-    'Motion Sensor Data File'
-    """
-    return " ".join(_DATE.sub("", title).split())
+        return f"Recorded {visible(str(start))}."
+    zone = "" if moment.tzinfo is None else " UTC"
+    return f"Recorded {moment.astimezone(UTC) if zone else moment:%Y-%m-%d %H:%M:%S}{zone}."
 
 
 def bench_words(scene: Scene) -> str:

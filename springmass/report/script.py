@@ -1,4 +1,4 @@
-"""The script of a report: one inline classic script from sources that the page of a recording also uses."""
+"""The script of reports and courses: inline, or one file for all reports of a course."""
 
 from __future__ import annotations
 
@@ -8,30 +8,25 @@ import hashlib
 
 from springmass.layout import static_file
 
-__all__ = ["SOURCES", "report_script", "report_style", "script_sha256"]
-
-SOURCES = ("uPlot.iife.min.js", "charts.js", "explore.js", "report.js")
+SHARED = "charts.js"
+"""The name of the script's own file."""
+SOURCES = ("uPlot.iife.min.js", "charts.js", "report.js")
 """The sources, in this order; a page that is opened from a disk cannot import modules."""
 
 
 @functools.cache
 def report_script() -> str:
-    """Return the script.
-
-    Raises
-    ------
-    ValueError
-        If a source would end the element that contains it.
-    """
+    """Return the script; ValueError if a source would end the element that contains it."""
     script = "\n".join(static_file(name).read_text("utf-8") for name in SOURCES)
     if "</script" in script.lower() or "<!--" in script:
         raise ValueError("a script of a report must hold neither </script nor <!--")
     return f"\n{script}\n"
 
 
+@functools.cache
 def report_style() -> str:
-    """Return the style of the charts."""
-    return static_file("uPlot.min.css").read_text("utf-8")
+    """Return the style of the charts, which the page of a recording has too."""
+    return "\n".join(static_file(name).read_text("utf-8") for name in ("uPlot.min.css", "charts.css"))
 
 
 @functools.cache

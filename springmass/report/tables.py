@@ -14,24 +14,9 @@ from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.laws import LAWS
 from pipeline.damping.select import Damping
+from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
 from pipeline.registry.quantities import QUANTITIES
-
-__all__ = [
-    "TableKey",
-    "TableRow",
-    "cell",
-    "every_number",
-    "law_status",
-    "page_unit",
-    "prefixed",
-    "pretty",
-    "pretty_number",
-    "raised",
-    "results_csv",
-    "table_estimates",
-    "table_rows",
-]
 
 _PAGE_UNITS = {"1": "", "degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
 _SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
@@ -42,15 +27,8 @@ NOTHING = "-"
 class TableKey(NamedTuple):
     """The identity of a line of Table 1.
 
-    Parameters
-    ----------
-    name : str
-        Name as in ``Analysis.estimates``, or name of a coefficient.
-    law : str or None
-        The law that the value assumes, "" for an average over laws; None if the table names no law.
-    certain : bool
-        Whether all results assume this law, because the user states it or the recording supports no other. Otherwise
-        the line is valid only if the law is.
+    ``law`` is the law that the value assumes, "" for an average over laws, None if the table names none; ``certain``
+    says whether all results assume it, because the user states it or the recording supports no other.
     """
 
     name: str
@@ -71,21 +49,7 @@ class TableKey(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """One line of Table 1.
-
-    Parameters
-    ----------
-    name : str
-        Name as in ``Analysis.estimates``, or name of a coefficient.
-    quantity : str
-        The quantity in words, with the law if the value depends on it.
-    symbol, page_symbol, tex_symbol : str
-        The symbol in ASCII, in Unicode (an index follows a space) and in LaTeX, without the ``$``.
-    estimates : tuple of Estimate or None
-        One estimate per run; None if the run does not give it.
-    note : str
-        Why no run gives the quantity, and what to do; empty for a row with values.
-    """
+    """One line of Table 1: an estimate for each run that gives it, or why none does; an index follows a space."""
 
     name: str
     quantity: str
@@ -104,13 +68,14 @@ class TableRow:
 def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     """Return the contents of Table 1 for a run: estimates and coefficients, each with its law."""
     found = _shown_estimates(analysis)
-    if any(finding.code in _WITHOUT_OFFSET for finding in analysis.findings):
+    if is_about(analysis, "offset"):
         found.pop(TableKey("offset"), None)
     return found
 
 
-_WITHOUT_OFFSET = frozenset({"offset_unknown", "offset_unknown_after_gap"})
-"""Codes of findings that the rest position is not that of the bob."""
+def is_about(analysis: Analysis, subject: str) -> bool:
+    """Return whether a finding is about a subject of ``about`` in findings.toml."""
+    return any(subject in kinds()[finding.code].about for finding in analysis.findings)
 
 
 def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
@@ -139,11 +104,7 @@ def table_rows(
 ) -> tuple[TableRow, ...]:
     """Return Table 1: every quantity that at least one run gives, with one column per run.
 
-    Parameters
-    ----------
-    runs : sequence of Analysis, or of what :func:`table_estimates` kept of one
-    missing : bool
-        Whether to add a row that states what the spring constant requires, if no run gives it.
+    With ``missing``, a row says what the spring constant requires, if no run gives it.
     """
     columns = [table_estimates(run) if isinstance(run, Analysis) else run for run in runs]
     rows = []
@@ -195,11 +156,6 @@ def results_csv(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Est
     """Return every number of every run as CSV with the columns run, name, value, u, unit.
 
     Numbers keep all their digits: the file is for programs.
-
-    Parameters
-    ----------
-    names : sequence of str
-    runs : sequence of Analysis, or of what :func:`every_number` kept of one
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -302,13 +258,7 @@ def page_unit(unit: str) -> str:
 
 
 def law_status(damping: Damping, name: str) -> str:
-    """Return the status of a law in a few words.
-
-    Parameters
-    ----------
-    damping : Damping
-    name : str
-    """
+    """Return the status of a law in a few words."""
     if name == damping.selected:
         if damping.by_statement:
             return "stated, and rejected" if damping.fits[name].rejected else "stated"

@@ -43,7 +43,7 @@ def findings_text(
     full : bool
         Whether to show every warning and note; otherwise all errors and the first three warnings are shown.
     """
-    from springmass.report.advice import STANDING, by_harm
+    from springmass.report.advice import by_harm, is_standing
 
     ordered = by_harm(findings)
     errors = [f for f in ordered if f["severity"] == "error"]
@@ -55,8 +55,8 @@ def findings_text(
         if more > 0:
             lines.append(f"and {more} more {'warning' if more == 1 else 'warnings'}: --full")
         return "\n".join(lines or ["No warnings."])
-    standing = [f["code"] for f in notes if f["code"] in STANDING]
-    lines += [_finding_line(f, written) for f in notes if f["code"] not in STANDING]
+    standing = [f["code"] for f in notes if is_standing(f)]
+    lines += [_finding_line(f, written) for f in notes if not is_standing(f)]
     if standing:
         words = f"{_MARKS['info']} of every file of this format: {', '.join(standing)}"
         lines.append(wrapped(words, " " * 8, NARROW))

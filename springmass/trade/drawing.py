@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from springmass.report.figures.canvas import style
+from springmass.charts.draw import style
 from springmass.trade.integrators import Work
 from springmass.trade.measure import EQUAL, Row, Trade
 

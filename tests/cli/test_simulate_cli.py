@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from acquisition.block import Block
 from acquisition.source import SourceInfo
 from pipeline.dynamics import Equation, Problem, get_integrator
 from springmass import analyse, load
+from springmass.charts.chart import decoded
 from springmass.runs.scenes import read_scene
 from storage.run_file.writing import write_run
 
@@ -225,3 +228,20 @@ def test_a_record_outside_the_band_names_what_would_have_to_move(cli: Callable, 
     same = cli("simulate", "--scene", other, "--against", run, "--json").results[0]["against"]
     assert same["leaves_s"] is None
     assert same["inside_95"] > 0.93
+
+
+def test_the_charts_of_a_simulation_stand_on_a_page(cli: Callable, scene: Path, tmp_path: Path) -> None:
+    """Its charts are in simulation.html, and files only on request; both Euler methods are beside the exact motion."""
+    assert cli("simulate", "--scene", scene, "--seconds", "20", "--folder", tmp_path).code == 0
+    folder = tmp_path / "bench.simulated"
+    page = (folder / "simulation.html").read_text("utf-8")
+    (text,) = re.findall(r'<script type="application/json" id="charts">(.*?)</script>', page, re.DOTALL)
+    charts = {chart["name"]: chart for chart in json.loads(text)}
+    assert set(charts) == {"position", "velocity", "energy", "phase", "error"}
+    forward, symplectic = ([decoded(s["y"]) for s in panel["series"]] for panel in charts["energy"]["panels"])
+    assert forward[0][-1] > 2.0 * forward[1][-1]
+    assert symplectic[0][-1] == pytest.approx(symplectic[1][-1], rel=0.1)
+    assert symplectic[1][0] == pytest.approx(0.5e3 * 20.0 * 0.05**2)
+    assert not (folder / "figures").exists()
+    assert cli("simulate", "--scene", scene, "--seconds", "20", "--folder", tmp_path, "--figures", "pdf").code == 0
+    assert {path.name for path in (folder / "figures").iterdir()} == {f"{name}.pdf" for name in charts}

@@ -155,7 +155,7 @@ def replay(browser: Browser, old_run: tuple[str, Any]) -> Iterator[Page]:
 
 @pytest.fixture(scope="session")
 def page_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return a function that makes a page of each kind once: three reports, and a course."""
+    """Return a function that makes a page of each kind once: three reports, a simulation and a course."""
     out, data = tmp_path_factory.mktemp("pages"), OLD_RUN.parent
     clipped, undamped, slow = (str(data / f"{name}_simulated_position.txt") for name in KINDS)
     scenes = ["--scene", str(data / "undamped.scene.toml")]
@@ -169,6 +169,18 @@ def page_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
         if name == "warned":
             assert main(["analyse", clipped, "--out", str(out)]) == 0
             return out / "clipped_simulated_position.results" / "report.html"
+        if name == "simulate":
+            words = [
+                "simulate",
+                "--scene",
+                str(data / "damped.scene.toml"),
+                "--against",
+                str(OLD_RUN),
+                "--seconds",
+                "20",
+            ]
+            assert main([*words, "--folder", str(out)]) == 0
+            return out / "damped.simulated" / "simulation.html"
         if name == "compare":
             assert main(["compare", undamped, slow, *scenes, "--out", str(out / "compared")]) == 0
             return out / "compared" / "report.html"

@@ -262,11 +262,13 @@ def test_the_first_minute(bench: tuple[Any, Page]) -> None:
     press(page, "z")
     page.wait_for_function("() => bench().phase === 'ready' && bench().rest_m")
     assert page.evaluate("bench().rest_m") == pytest.approx(0.25, abs=1e-3)
-    assert page.evaluate("position.labels[1]") == "displacement / mm"
+    assert page.evaluate("position.panel.label") == "displacement / mm"
     press(page, "r")
     page.wait_for_function(PHASE.format(phase="recording"))
     page.wait_for_function(FITTED)
-    page.wait_for_function("() => phase.plot.data[0].length > 50 && spectrum.plot.data[0].length > 50")
+    page.wait_for_function(
+        "() => [phase, spectrum].every((chart) => chart.panel.series.length && chart.panel.series[0].x.length > 50)"
+    )
     ids = page.evaluate("[...document.querySelectorAll('[id]')].map((e) => e.id)")
     assert len(set(ids)) == len(ids)
     press(page, "s")

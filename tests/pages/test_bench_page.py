@@ -72,7 +72,7 @@ def test_by_night_the_same_charts_are_drawn(replay: Page) -> None:
     """Where the run was shown anew, a change of colours draws its charts again and none of those before them."""
     replay.evaluate("begin_anew()")
     replay.emulate_media(color_scheme="dark")
-    replay.wait_for_function("() => position.plot.axes[0].stroke() === '#ededed'")
+    replay.wait_for_function("() => position.plot.axes[0].stroke() === '#e4e8ec'")
     for chart in ("position", "amplitude", "phase", "spectrum"):
         assert replay.locator(f"div#{chart} .uplot").count() == 1
         assert replay.evaluate(f"{chart}.plot.root === document.querySelector('div#{chart} .uplot')")
@@ -186,4 +186,4 @@ def test_a_stated_law_is_named(start: Callable[..., Any], context: BrowserContex
     page.goto(program.address)
     page.wait_for_function("() => motion && motion.stated_law === 'linear'")
     assert page.locator("#estimates", has_text="damping rate, law linear").count() == 1
-    assert page.evaluate("amplitude.series.map((s) => s.label).includes('linear (stated)')")
+    assert page.evaluate("amplitude.panel.series.map((s) => s.label).includes('linear (stated)')")

@@ -72,7 +72,13 @@ def typed(bench: Path) -> Callable[..., str]:
 def test_from_a_file_to_a_figure(typed: Callable[..., str], clipped: Callable[..., list[str]], bench: Path) -> None:
     """One run with its report, two in one table, the comparison: nothing wraps, nothing is clipped on any medium."""
     shown = typed(
-        "analyse", "damped.txt", "--scene", "bench.toml", shows=("period", "±", "report: damped.results/report.html")
+        "analyse",
+        "damped.txt",
+        "--scene",
+        "bench.toml",
+        "--figures",
+        "svg",
+        shows=("period", "±", "report: damped.results/report.html"),
     )
     assert max(map(len, shown.splitlines())) <= 80
     for width in ("laptop", "phone", "A4"):

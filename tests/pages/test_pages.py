@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import itertools
 import json
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page
+from playwright.sync_api import Browser, Page
 
 from springmass.report.script import script_sha256
 from tests.pages.conftest import WIDTHS
 from tests.sampling import sampled
 
-NAMES = ("analyse", "course", "warned", "compare")
+NAMES = ("analyse", "course", "warned", "compare", "simulate")
 BOTTOM = "(id) => document.querySelector(id).getBoundingClientRect().bottom"
 SHOWN = "(id) => { const box = document.querySelector(id).getBoundingClientRect(); return box.width * box.height > 0; }"
 Show = Callable[[Path, str], None]
@@ -38,15 +39,21 @@ def test_axe_finds_no_violation(page: Page, show: Show, page_of: PageOf, name: s
     assert found == [], json.dumps([(x["id"], x["help"], [n["html"][:160] for n in x["nodes"][:3]]) for x in found])
 
 
-def test_paper_shows_the_figures_and_no_buttons(page: Page, show: Show, page_of: PageOf, tmp_path: Path) -> None:
-    """In print the drawn figure takes the chart's place; on A4 a report has fewer than twenty sheets."""
-    show(page_of("analyse"), "laptop")
-    assert page.evaluate(SHOWN, ".first .charts")
-    assert not page.evaluate(SHOWN, ".first .card")
-    page.emulate_media(media="print")
-    assert not page.evaluate(SHOWN, ".first .charts")
-    assert page.evaluate(SHOWN, ".first .card")
-    assert not page.evaluate(SHOWN, "#copies")
+def test_paper_shows_every_chart_with_four_times_the_pixels(
+    page: Page, show: Show, page_of: PageOf, tmp_path: Path
+) -> None:
+    """In print a canvas of light colours takes the chart's place; on A4 a report has fewer than twenty sheets."""
+    show(page_of("analyse"), "A4")
+    page.emulate_media(media="print", color_scheme="dark")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.wait_for_function("document.querySelectorAll('.paper').length === document.querySelectorAll('figure').length")
+    wide = page.evaluate("[...document.querySelectorAll('.paper')].map((each) => each.width / each.clientWidth)")
+    assert min(wide) > 3.5
+    corner = "(each) => [...each.getContext('2d').getImageData(0, 0, 1, 1).data]"
+    assert page.eval_on_selector(".paper", corner) == [255, 255, 255, 255]
+    assert not page.evaluate(SHOWN, ".first .chart")
+    assert not page.evaluate(SHOWN, ".copy button")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
     margins = dict.fromkeys(("top", "left", "right", "bottom"), "15mm")
     printed = page.pdf(path=tmp_path / "page.pdf", format="A4", margin=margins)
     assert printed.startswith(b"%PDF")
@@ -58,46 +65,87 @@ def test_the_first_screen_has_table_and_main_figure(page: Page, show: Show, page
     """On a laptop Table 1 is whole and the main chart stands beside it."""
     show(page_of(name), "laptop")
     assert page.evaluate(BOTTOM, "table.results") <= WIDTHS["laptop"][1]
-    assert page.evaluate(BOTTOM, ".first .chart") <= WIDTHS["laptop"][1]
+    assert page.evaluate(BOTTOM, ".first .chart .panel") <= WIDTHS["laptop"][1]
 
 
 def test_a_chart_zooms_moves_and_shows_a_value(page: Page, show: Show, page_of: PageOf) -> None:
-    """Buttons change the range; the cursor shows the value and the residual."""
+    """Buttons and the mouse change the range; the cursor shows the values, and why a sample was left out."""
     show(page_of("analyse"), "laptop")
-    page.evaluate("document.querySelector('#position-0').closest('details').open = true")
     figure = page.locator("#figure-position-0")
     over = figure.locator(".u-over").first
     over.wait_for()
-    drawn = "document.querySelector('#figure-position-0 canvas').toDataURL()"
-    for button in ("zoom in", "move right"):
+    drawn = "document.querySelector('#figure-position-0 canvas.paper, #figure-position-0 .u-wrap canvas').toDataURL()"
+    for button in ("zoom in", "move right", "Lines", "samples used"):
         page.evaluate(f"window.before = {drawn}")
         figure.get_by_role("button", name=button).click()
         page.wait_for_function(f"() => {drawn} !== window.before")
+    figure.get_by_role("button", name="samples used").click()
     box = over.bounding_box()
     assert box is not None
     shown = []
-    for share in range(10, 100, 10):
+    for share in range(5, 100, 2):
         over.hover(position={"x": box["width"] * share / 100, "y": box["height"] / 2})
         shown.append(figure.locator("output").inner_text())
-    assert all(text.startswith("t = ") for text in shown)
-    assert any("residual" in text for text in shown)
+    assert all(text.startswith("time ") for text in shown)
+    assert any("samples used 2" in text and " mm; fit 2" in text for text in shown)
+    assert any("left out: false echo" in text for text in shown)
+    page.evaluate(f"window.before = {drawn}")
+    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 90, box["y"] + 20, steps=4)
+    page.mouse.up()
+    page.wait_for_function(f"() => {drawn} !== window.before")
+
+
+def test_the_amplitude_has_a_logarithmic_axis(page: Page, show: Show, page_of: PageOf) -> None:
+    """On which linear drag is a straight line."""
+    show(page_of("analyse"), "laptop")
+    figure = page.locator("#figure-amplitude-0")
+    button = figure.get_by_role("button", name="Log axis")
+    button.click()
+    assert button.get_attribute("aria-pressed") == "true"
+    assert page.evaluate("DRAWN.get(document.querySelector('#figure-amplitude-0')).panels[0].plot.scales.y.distr") == 3
+
+
+def test_a_figure_is_saved_with_four_times_the_pixels(page: Page, show: Show, page_of: PageOf, tmp_path: Path) -> None:
+    """As PNG, with its legend."""
+    show(page_of("analyse"), "laptop")
+    with page.expect_download() as saved:
+        page.locator("#figure-amplitude-0").get_by_role("button", name="Save figure").click()
+    assert saved.value.suggested_filename == "amplitude.png"
+    saved.value.save_as(tmp_path / "amplitude.png")
+    data = (tmp_path / "amplitude.png").read_bytes()
+    width, height = struct.unpack(">II", data[16:24])
+    assert width == 4 * 720
+    assert height > 4 * 300
+
+
+def test_without_scripts_the_page_says_so(browser: Browser, page_of: PageOf) -> None:
+    """It names the option with which a report has pictures."""
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(page_of("analyse").as_uri())
+    assert page.get_by_text("--figures svg").is_visible()
+    context.close()
 
 
 def test_a_link_of_a_warning_opens_its_figure(page: Page, show: Show, page_of: PageOf) -> None:
-    """The folded part that holds the figure is opened."""
+    """Its chart is shown, and a folded part that holds it is opened."""
     show(page_of("warned"), "laptop")
     page.locator(".findings li.warning a").first.click()
-    page.wait_for_function("() => location.hash && document.querySelector(location.hash).closest('details').open")
-    assert page.evaluate(SHOWN, page.evaluate("location.hash"))
+    page.wait_for_function("() => location.hash && document.querySelector(`${location.hash} canvas`)")
+    assert page.evaluate(SHOWN, page.evaluate("`${location.hash} canvas`"))
+    page.evaluate("location.hash = '#figure-phase-0'")
+    page.wait_for_function("() => document.querySelector('#figure-phase-0 canvas')")
+    assert page.evaluate(SHOWN, "#figure-phase-0 canvas")
 
 
 def test_table_1_is_copied(page: Page, show: Show, page_of: PageOf) -> None:
-    """As text, LaTeX and cells."""
+    """As cells for a spreadsheet."""
     show(page_of("analyse"), "laptop")
-    page.evaluate("window.setTimeout = () => 0")  # the answer stays on the buttons
-    for words in ("Copy as text", "Copy as LaTeX", "Copy as cells"):
-        page.get_by_role("button", name=words).click()
-    page.get_by_role("button", name="Copied").nth(2).wait_for()
+    page.evaluate("window.setTimeout = () => 0")  # the answer stays on the button
+    page.get_by_role("button", name="Copy table").click()
+    page.get_by_role("button", name="Copied").wait_for()
 
 
 def test_the_script_runs_under_the_policy_of_a_served_report(page: Page, page_of: PageOf, tmp_path: Path) -> None:
@@ -109,7 +157,7 @@ def test_the_script_runs_under_the_policy_of_a_served_report(page: Page, page_of
     served = tmp_path / "served.html"
     served.write_text(text.replace("<head>", f"<head>{meta}", 1).replace("</body>", other), "utf-8")
     page.goto(served.as_uri())
-    assert page.evaluate(SHOWN, ".first .chart canvas")
+    assert page.evaluate(SHOWN, ".first .panel canvas")
     assert page.title() != "changed"
 
 

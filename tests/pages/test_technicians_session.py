@@ -121,7 +121,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     page.wait_for_function(FITTED)
     assert page.evaluate("rate_hz()") == pytest.approx(100.0, abs=5.0)
     assert "lamp on" in page.inner_text("#marks")
-    assert page.evaluate("position.labels[1]") == "displacement / mm"
+    assert page.evaluate("position.panel.label") == "displacement / mm"
     watch_on_two_phones(browser, page.evaluate("run.share"))
 
     press(page, "s")
@@ -130,7 +130,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     page.wait_for_function(WHOLE)
     assert "Standard accuracy, whole run" in page.inner_text("#tier")
     assert page.inner_text("#stopping") == ""
-    assert page.evaluate("position.labels[1]") == "displacement / mm"
+    assert page.evaluate("position.panel.label") == "displacement / mm"
     look_at(page, "3-saved")
     shown, marks = page.evaluate(NUMBERS), page.evaluate("state.marks")
     press(page, "o")
@@ -157,7 +157,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     page.wait_for_function(WHOLE)
     assert page.evaluate(NUMBERS) == shown
     assert page.evaluate("state.marks") == marks
-    assert page.evaluate("position.labels[1]") == "displacement / mm"
+    assert page.evaluate("position.panel.label") == "displacement / mm"
     page.locator("#time").fill("0.6")
     look_at(page, "4-replay")
     again.end()

@@ -1,87 +1,502 @@
 "use strict";
-// Charts. Lines differ by dashes as well as by colour; every colour has a contrast of at least 4.5 to 1.
-const DASHES = [[8, 4], [2, 3], [10, 3, 2, 3], [4, 2, 4, 6]];
-const COLOURS = {}, OTHERS = ["other-1", "other-2", "other-3", "other-4"];
+// Every chart of reports, courses, simulations, the page of a recording and notebooks. A chart is an object as
+// springmass/charts/chart.py makes it: panels of series, each with a role. uPlot draws the axes, this script the series.
 
-function take_colours() {
-  const style = getComputedStyle(document.documentElement), of = (name) => style.getPropertyValue(`--${name}`).trim();
-  for (const name of ["ink", "line", "data", "fit", "rest", ...OTHERS]) COLOURS[name] = of(name);
+// The look of each role; springmass/charts/draw.py reads this table for files. Every colour has a contrast of at least
+// 4.5 to 1 on its background, and roles differ by dashes or markers as well.
+const LOOKS = {
+  "data": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
+  "law": {"light": ["#1d232a"], "dark": ["#e4e8ec"], "dash": [[]], "marker": "dot"},
+  "other": {"light": ["#00704f", "#a03f78", "#7d5f00", "#2a6f97"], "dark": ["#4fd1a5", "#e8a0c8", "#f0c04a", "#9ad5f5"],
+    "dash": [[8, 4], [2, 3], [10, 3, 2, 3], [4, 2, 4, 6]], "marker": "ring"},
+  "rest": {"light": ["#5f6b76"], "dark": ["#a3adb8"], "dash": [[1, 3]], "marker": "dot"},
+  "flagged": {"light": ["#b84a00"], "dark": ["#ff9d5c"], "dash": [[]], "marker": "cross"},
+  "band": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
+  "mark": {"light": ["#a03f78"], "dark": ["#e8a0c8"], "dash": [[4, 4]], "marker": "ring"}
+};
+const RANK = { data: 0, law: 1, other: 2, rest: 3, flagged: 4, band: 5, mark: 6 }, MANY = 2000, ZOOM = 0.5, PAN = 0.25, FONT = "system-ui, sans-serif";
+
+// Light text means a dark background, whatever the page or the notebook takes its colours from.
+function isDark(box) {
+  const [r, g, b] = getComputedStyle(box).color.match(/[\d.]+/g).map(Number);
+  return 0.3 * r + 0.6 * g + 0.1 * b > 128;
+}
+function lookOf(role, i, dark) {
+  const { dash, marker, ...colours } = LOOKS[role], all = colours[dark ? "dark" : "light"];
+  return { colour: all[i % all.length], dash: dash[i % dash.length], marker };
 }
 
-// A logarithmic axis is labelled only at powers of ten, with numbers that are never rounded to 0.
-const powers = (_, splits) => splits.map((v) => (v !== null && Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-9 ? v : null));
-const plain = (_, splits) => splits.map((v) => (v === null ? "" : v > 9e-4 && v < 1e4 ? String(v) : v.toExponential(0).replace("-", "−")));
-
-// The key of a series in the legend looks like the series: a line with its dashes, a dot or a ring.
-function key_of(plot, i) {
-  const series = plot.series[i], ink = series.stroke(plot, i);
-  if (series.key === "dot") return `radial-gradient(circle, ${ink} 0 3px, transparent 3.5px)`;
-  if (series.key === "ring") return `radial-gradient(circle, transparent 0 2px, ${ink} 2.5px 3.5px, transparent 4px)`;
-  let at = 0;
-  const stops = (series.dash || [1]).map((length, k) => `${k % 2 ? "transparent" : ink} ${at}px ${(at += length)}px`);
-  return `repeating-linear-gradient(90deg, ${stops.join(", ")}) center / 100% 2px no-repeat`;
+function decoded(chart) {
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+  const xs = chart.xs.map((x) => (x.after === undefined ? Float64Array.from({ length: x.count }, (_, i) => x.start + x.step * i) : Float64Array.from(new Float32Array(bytes(x.after)), (v) => x.start + v)));
+  for (const panel of chart.panels) {
+    for (const s of panel.series) {
+      s.x = xs[s.x];
+      for (const name of ["y", "u"]) if (s[name]) s[name] = new Float32Array(bytes(s[name]));
+      if (s.why) s.why = s.why.map((i) => s.words[i]);
+    }
+  }
+  return chart;
 }
-const LEGEND = { live: false, markers: { width: 0, fill: key_of } };
 
-class Chart {
-  constructor(id, series, labels, more, log) {
-    this.box = document.getElementById(id);
-    this.labels = labels;
-    this.more = more || {};
-    this.log = log;
-    this.sizes = new ResizeObserver(() => { if (this.box.clientWidth) this.plot.setSize(this.size()); });
-    this.sizes.observe(this.box);
-    this.build(series);
-    this.scheme = () => this.build(this.series);
+const known = (v) => v !== null && v !== undefined && !Number.isNaN(v);
+// The range of values, a little wider than they are.
+function around(values, log = false) {
+  const found = values.filter((v) => known(v) && (!log || v > 0)), low = Math.min(...found), high = Math.max(...found);
+  if (!found.length) return null;
+  return log ? [0.8 * low, 2 * high] : [low - (0.07 * (high - low) || 1), high + (0.07 * (high - low) || 1)];
+}
+const minus = (text) => text.replaceAll("-", "−");
+function written(v, digits = 5) {
+  if (!known(v)) return "–";
+  const size = Math.abs(v);
+  return minus(size !== 0 && (size < 1e-4 || size >= 1e6) ? Number(v.toPrecision(3)).toExponential().replace("e+", "e") : String(Number(v.toPrecision(digits))));
+}
+// Numbers on an axis; a logarithmic one has them at powers of ten, or also at 2 and 5 if it spans less than two.
+const ticks = (_, splits) => splits.map((v) => (v === null ? "" : written(v, 7)));
+function powers(plot, splits, axis) {
+  const { min, max } = plot.scales[axis === 0 ? "x" : "y"], few = max < 30 * min;
+  return splits.map((v) => (v !== null && (few ? [1, 2, 5] : [1]).some((m) => Math.abs(Math.log10(v / m) - Math.round(Math.log10(v / m))) < 1e-9) ? v : null));
+}
+
+// One pair of axes. ``more`` may have: scale (of all sizes, for paper), dark, size, hooks, cursor, hidden (labels that are
+// switched off), joined (samples as a line), group (panels with one range), range of x.
+class Panel {
+  constructor(box, panel, more = {}) {
+    this.box = box;
+    this.more = { hidden: new Set(), group: { left: 0 }, scale: 1, ...more };
+    this.take(panel);
+    this.build();
+    if (more.size) return;
+    this.sizes = new ResizeObserver(() => { if (box.clientWidth) { this.plot.setSize(this.size()); if (this.panel.equal) this.show(this.panel); } });
+    this.sizes.observe(box);
     this.media = matchMedia("(prefers-color-scheme: dark)");
+    this.scheme = () => this.build();
     this.media.addEventListener("change", this.scheme);
   }
 
-  // Stop a replaced chart from following changes of size and colour scheme.
+  // Stop a replaced panel from following changes of size and colour scheme.
   destroy() {
-    this.sizes.disconnect();
-    this.media.removeEventListener("change", this.scheme);
+    if (this.sizes) { this.sizes.disconnect(); this.media.removeEventListener("change", this.scheme); }
     this.plot.destroy();
   }
 
-  // A legend takes as many rows as it needs; the chart takes the height that remains.
-  size() {
-    const legend = this.plot && this.plot.root.querySelector(".u-legend");
-    return { width: Math.max(this.box.clientWidth, 200), height: Math.max(this.box.clientHeight - (legend ? legend.offsetHeight || 28 : this.plot ? 0 : 28), 120) };
+  take(panel) {
+    this.panel = panel;
+    this.log = this.log === undefined || panel.log === null ? panel.log === true : this.log;
+    const ends = [Infinity, -Infinity];
+    for (const s of panel.series) for (let i = 0; i < s.x.length; i++) if (known(s.x[i]) && !(this.panel.log_x && s.x[i] <= 0)) { ends[0] = Math.min(ends[0], s.x[i]); ends[1] = Math.max(ends[1], s.x[i]); }
+    if (panel.names && panel.names.length) ends.splice(0, 2, 0.5, panel.names.length + 0.5);
+    if (panel.span) ends.splice(0, 2, ...panel.span);
+    const margin = panel.log_x ? 0 : 0.012 * (ends[1] - ends[0]) || 0.5;
+    this.span = ends[0] <= ends[1] ? [ends[0] - margin, ends[1] + margin] : [0, 1];
   }
 
-  build(series) {
-    const data = this.plot ? this.plot.data : null, same = this.series && series.length === this.series.length;
+  get dark() { return this.more.dark !== undefined ? this.more.dark : isDark(this.box); }
+  size() { return this.more.size || { width: Math.max(this.box.clientWidth, 200), height: Math.max(this.box.clientHeight, 80) }; }
+  visible() { return this.panel.series.filter((s) => !this.more.hidden.has(s.label)); }
+
+  reach() {
+    const [low, high] = this.panel.range || [0.1, 1];
+    return this.log && !(low > 0) ? [1e-3 * high, high] : [low, high];
+  }
+
+  // With equal axes, one unit of x is as long as that part of y which the motion reaches at the same time.
+  ranges() {
+    const y = this.reach(), x = this.span;
+    if (!this.panel.equal) return { x, y };
+    const { width, height } = this.plot ? this.plot.bbox : { width: 1, height: 1 }, wide = Math.max(1, width / height || 1), high = Math.max(1, height / width || 1);
+    const grown = ([low, high_end], by) => [(low + high_end) / 2 - by * (high_end - low) / 2, (low + high_end) / 2 + by * (high_end - low) / 2];
+    return { x: grown(x, 1.1 * wide), y: grown(y, high) };
+  }
+
+  data() { const { x, y } = this.ranges(); return [x, y]; }
+
+  build() {
+    const range = this.plot ? { ...this.plot.scales.x } : null;
     if (this.plot) this.plot.destroy();
-    this.series = series;
-    take_colours();
-    const { ink, line } = COLOURS, log = this.log && { filter: powers };
-    const axis = (label, filter) => ({ label, stroke: ink, labelSize: 18, size: 46, font: "12px system-ui", labelFont: "12px system-ui", grid: { stroke: line + "44", width: 1, ...filter }, ticks: { stroke: line, width: 1, ...filter } });
-    const options = {
-      legend: LEGEND,
-      ...this.size(), series: [{ label: this.labels[0] }, ...series], scales: { x: { time: false } },
-      axes: [{ ...axis(this.labels[0]), size: 34 }, { ...axis(this.labels[1], log), size: 56, space: 20, ...(log && { ...log, values: plain }) }], ...this.more,
-    };
-    this.plot = new uPlot(options, data && same ? data : [[], ...series.map(() => [])], this.box);
-    const legend = this.plot.root.querySelector(".u-legend");
-    if (legend) this.sizes.observe(legend);
+    const { panel, more } = this, k = more.scale, dark = this.dark;
+    const ink = lookOf("law", 0, dark).colour, grey = lookOf("rest", 0, dark).colour;
+    const axis = (label, log) => ({
+      label, stroke: ink, font: `${12 * k}px ${FONT}`, labelFont: `${12 * k}px ${FONT}`, labelSize: 18 * k, gap: 4 * k,
+      grid: { stroke: grey + "40", width: k, ...(log && { filter: powers }) }, ticks: { stroke: grey, width: k, size: 5 * k, ...(log && { filter: powers }) },
+      values: ticks, ...(log && { filter: powers }),
+    });
+    // All panels of a chart have the width of the widest numbers, so that their axes stand beneath one another.
+    const left = (_, values) => (more.group.left = Math.max(more.group.left, k * (14 + 7 * Math.max(2, ...(values || []).map((v) => String(v).length)))));
+    const x = { ...axis(panel.x_label, panel.log_x), size: 30 * k, space: 60 * k };
+    if (more.bare) Object.assign(x, { label: null, labelSize: 0, size: 8 * k, values: (_, splits) => splits.map(() => "") });
+    if (panel.names && panel.names.length) {
+      const count = panel.names.length, room = this.size().width / k - 90, short = panel.names.every((name) => name.length * count * 8 < room);
+      const every = Math.ceil((40 * count) / room), shown = panel.names.map((_, i) => i + 1).filter((v) => (v - 1) % every === 0);
+      Object.assign(x, { splits: () => shown, values: (_, at) => at.map((v) => (short ? panel.names[v - 1] : String(v))) });
+    }
+    const log = this.log && { distr: 3 };
+    this.plot = new uPlot({
+      ...this.size(), legend: { show: false }, series: [{}, { paths: () => null, points: { show: false } }],
+      scales: {
+        x: { time: false, range: () => more.range || this.ranges().x, ...(panel.log_x && { distr: 3 }) },
+        y: { range: () => this.ranges().y, ...log },
+      },
+      axes: [x, { ...axis(panel.label, this.log), size: left, space: (...[, , , , long]) => Math.max(17 * k, long / 7) }],
+      padding: [8 * k, 10 * k, 0, 0], cursor: more.cursor || { points: { show: false } },
+      hooks: { ...more.hooks, draw: [(plot) => this.paint(plot), ...((more.hooks && more.hooks.draw) || [])] },
+    }, this.data(), this.box);
+    if (range && range.min != null && more.keep) this.plot.setScale("x", range);
   }
 
-  show(data) { this.plot.setData(data); }
+  show(panel) {
+    this.take(panel);
+    this.plot.setData(this.data());
+  }
+
+  paint(plot) {
+    const { ctx, bbox } = plot, px = devicePixelRatio * this.more.scale, dark = this.dark;
+    const at = (v) => plot.valToPos(v, "x", true), to = (v) => plot.valToPos(v, "y", true);
+    const tools = { plot, ctx, bbox, px, at, to, log: this.log };
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    if (this.panel.zero) { ctx.fillStyle = lookOf("rest", 0, dark).colour; ctx.fillRect(bbox.left, to(0) - px / 2, bbox.width, px); }
+    let others = 0;
+    const numbers = new Map();
+    for (const s of this.panel.series) {
+      if (s.role === "other" && !numbers.has(s.label)) numbers.set(s.label, others++);
+      if (this.more.hidden.has(s.label)) continue;
+      const look = lookOf(s.role, numbers.get(s.label) || 0, dark);
+      ctx.strokeStyle = ctx.fillStyle = look.colour;
+      if (s.role === "mark") paintMarks(tools, s, look);
+      else if (s.line || (this.more.joined && s.role === "data" && !s.u)) {
+        if (s.u) paintBand(tools, s);
+        if (s.role !== "band") paintLine(tools, s, look, this.panel.series.length > 1 || s.role !== "data");
+      } else paintPoints(tools, s, look, this.log);
+    }
+    ctx.restore();
+  }
+
+  // What stands under the cursor, in words; an empty text beside the axes.
+  read() {
+    const { left, top } = this.plot.cursor;
+    if (left === null || left === undefined || left < 0) return "";
+    const x = this.plot.posToVal(left, "x"), [name, unit] = this.panel.x_label.split(" / "), own = this.panel.label.split(" / ")[1] || "";
+    const bare = (text) => (text || "").replace(/^\((.*)\)$/, "$1");
+    if (this.panel.equal) return `${name} ${written(x)} ${bare(unit)}, ${this.panel.label.split(" / ")[0]} ${written(this.plot.posToVal(top, "y"))} ${bare(own)}`;
+    const said = new Set(), texts = [], out = [];
+    for (const s of [...this.visible()].sort((a, b) => RANK[a.role] - RANK[b.role])) {
+      const i = nearest(s.x, x), far = i < 0 || Math.abs(this.plot.valToPos(s.x[i], "x") - left) > 12;
+      if (s.role === "flagged" || s.role === "mark") { if (!far && s.why && s.why[i]) out.push(s.role === "mark" ? s.why[i] : `left out: ${s.why[i]}`); continue; }
+      if (i < 0 || !known(s.y[i]) || said.has(s.label) || s.role === "band" || texts.length > 3 || (far && !s.line)) continue;
+      said.add(s.label);
+      texts.push(`${this.panel.names ? this.panel.names[Math.round(s.x[i]) - 1] : s.label} ${written(s.y[i])}${s.u && s.u[i] ? ` ± ${written(s.u[i], 2)}` : ""} ${bare(own)}`.trim());
+    }
+    const where = this.panel.names ? "" : `${name} ${written(x)} ${bare(unit)}: `;
+    return where + [...texts, ...out].join("; ");
+  }
 }
 
-const colour = (name) => () => COLOURS[name];
-function points(label, size) { return { label, key: "dot", stroke: colour("data"), points: { show: true, size: size || 5, stroke: colour("data"), fill: colour("data") }, paths: () => null }; }
-function line(label, name, dash, width) { return { label, stroke: colour(name), dash, width: width || 2, points: { show: false } }; }
+function nearest(x, value) {
+  let low = 0, high = x.length - 1;
+  if (high < 0) return -1;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (x[middle] < value) low = middle + 1; else high = middle;
+  }
+  return low > 0 && value - x[low - 1] < x[low] - value ? low - 1 : low;
+}
 
-// Samples that are far enough apart are drawn as dots, so that the fit below is visible; denser ones are drawn as a
-// line.
-const joined = uPlot.paths.linear();
-const dense = (plot, first, last) => (last - first) * devicePixelRatio > 1.5 * plot.bbox.width;
-function samples_series() {
-  return {
-    label: "samples", key: "dot", stroke: colour("data"), width: 1,
-    paths: (plot, series, first, last) => (dense(plot, first, last) ? joined(plot, series, first, last) : null),
-    points: { show: (plot, series, first, last) => !dense(plot, first, last), size: 3, stroke: colour("data"), fill: colour("data") },
-  };
+function paintBand({ ctx, at, to, log }, s) {
+  ctx.save();
+  ctx.globalAlpha = 0.25;
+  for (let i = 0; i < s.x.length;) {
+    while (i < s.x.length && !known(s.y[i])) i += 1;
+    const first = i;
+    ctx.beginPath();
+    for (; i < s.x.length && known(s.y[i]); i++) ctx.lineTo(at(s.x[i]), to(s.y[i] + s.u[i]));
+    for (let j = i - 1; j >= first; j--) ctx.lineTo(at(s.x[j]), to(log ? Math.max(s.y[j] - s.u[j], 1e-6 * s.y[j]) : s.y[j] - s.u[j]));
+    ctx.fill();
+  }
+  ctx.restore();
+}
+
+function paintLine({ ctx, at, to, px }, s, look, wide) {
+  ctx.lineWidth = (wide && s.role !== "data" ? 1.4 : 1) * px;
+  ctx.setLineDash(look.dash.map((length) => length * px));
+  ctx.beginPath();
+  let up = true;
+  for (let i = 0; i < s.x.length; i++) {
+    if (!known(s.y[i])) { up = true; continue; }
+    if (up) ctx.moveTo(at(s.x[i]), to(s.y[i])); else ctx.lineTo(at(s.x[i]), to(s.y[i]));
+    up = false;
+  }
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+function paintPoints({ plot, ctx, bbox, at, to, px }, s, look) {
+  const { min, max } = plot.scales.x, many = s.x.length > MANY, r = (many ? 1.1 : s.role === "rest" || s.x.length > 80 ? 1.5 : 2.2) * px, edge = s.role === "flagged";
+  ctx.lineWidth = px;
+  if (s.u) {
+    ctx.beginPath();
+    for (let i = 0; i < s.x.length; i++) {
+      if (!known(s.y[i]) || !known(s.u[i]) || s.x[i] < min || s.x[i] > max) continue;
+      ctx.moveTo(at(s.x[i]), Math.max(-1e5, to(s.y[i] + s.u[i])));
+      ctx.lineTo(at(s.x[i]), Math.min(1e5, to(s.y[i] - s.u[i]) || 1e5));
+    }
+    ctx.stroke();
+  }
+  for (let i = 0; i < s.x.length; i++) {
+    if (!known(s.y[i]) || s.x[i] < min || s.x[i] > max) continue;
+    const x = at(s.x[i]), y = edge ? Math.min(Math.max(to(s.y[i]), bbox.top + 2 * px), bbox.top + bbox.height - 2 * px) : to(s.y[i]);
+    drawMarker(ctx, look.marker, x, y, r, many);
+  }
+}
+
+function drawMarker(ctx, marker, x, y, r, many) {
+  if (many && marker === "dot") { ctx.fillRect(x - r, y - r, 2 * r, 2 * r); return; }
+  ctx.beginPath();
+  if (marker === "cross") for (const s of [-1, 1]) { ctx.moveTo(x - 1.3 * r, y - 1.3 * s * r); ctx.lineTo(x + 1.3 * r, y + 1.3 * s * r); }
+  else ctx.arc(x, y, marker === "ring" ? 1.2 * r : r, 0, 2 * Math.PI);
+  if (marker === "dot") ctx.fill(); else ctx.stroke();
+}
+
+// Vertical lines, or rings at their values, with texts that do not cover one another.
+function paintMarks({ plot, ctx, bbox, at, to, px }, s, look) {
+  const taken = [], high = 13 * px;
+  ctx.lineWidth = px;
+  ctx.font = `${11 * px}px ${FONT}`;
+  ctx.textAlign = "left";
+  for (let i = 0; i < s.x.length; i++) {
+    if (s.x[i] < plot.scales.x.min || s.x[i] > plot.scales.x.max) continue;
+    const x = at(s.x[i]), ring = known(s.y[i]), text = (s.why ? s.why[i] : "").slice(0, 30), wide = ctx.measureText(text).width;
+    if (ring) drawMarker(ctx, "ring", x, to(s.y[i]), 3 * px);
+    else {
+      ctx.setLineDash(look.dash.map((length) => length * px));
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      ctx.stroke();
+      ctx.setLineDash([]);
+    }
+    const above = ring && to(s.y[i]) - 6 * px > bbox.top + high, beside = above ? -wide / 2 : (ring ? 7 : 4) * px;
+    const left = Math.max(bbox.left, Math.min(x + beside, bbox.left + bbox.width - wide));
+    const base = above ? to(s.y[i]) - 6 * px : Math.max(ring ? to(s.y[i]) + 4 * px : 0, bbox.top + high);
+    if (taken.some((box) => left < box.left + box.wide && box.left < left + wide && Math.abs(base - box.base) < high)) continue;
+    taken.push({ left, base, wide });
+    ctx.fillText(text, left, base);
+  }
+}
+
+// The range after a button is pressed, limited to that of the data.
+function shifted([low, high], [first, last], action) {
+  const wide = high - low, middle = (low + high) / 2;
+  if (action === "all") return [first, last];
+  if (action === "in") return [middle - wide * ZOOM / 2, middle + wide * ZOOM / 2];
+  if (action === "out") return [Math.max(first, middle - wide / ZOOM / 2), Math.min(last, middle + wide / ZOOM / 2)];
+  const by = Math.max(first - low, Math.min(last - high, (action === "left" ? -PAN : PAN) * wide));
+  return [low + by, high + by];
+}
+
+function makeButton(words, act, name) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = words;
+  if (name) button.title = button.ariaLabel = name;
+  button.addEventListener("click", () => act(button));
+  return button;
+}
+function makeBox(name, parent) {
+  const box = document.createElement("div");
+  box.className = name;
+  parent.append(box);
+  return box;
+}
+
+// Entries of a legend: each label of a panel with several series, once.
+function entriesOf(chart, dark) {
+  const entries = new Map();
+  for (const panel of chart.panels) {
+    let others = 0;
+    if (new Set(panel.series.map((s) => s.label)).size < 2) continue;
+    for (const s of panel.series) {
+      if (entries.has(s.label)) continue;
+      entries.set(s.label, { label: s.label, role: s.role, look: lookOf(s.role, s.role === "other" ? others++ : 0, dark), line: s.line, band: s.role === "band" });
+    }
+  }
+  return [...entries.values()].sort((a, b) => RANK[a.role] - RANK[b.role]);
+}
+function drawKey(ctx, entry, x, y, px) {
+  ctx.strokeStyle = ctx.fillStyle = entry.look.colour;
+  ctx.lineWidth = 1.6 * px;
+  if (entry.band) { ctx.globalAlpha = 0.3; ctx.fillRect(x, y - 4 * px, 24 * px, 8 * px); ctx.globalAlpha = 1; return; }
+  if (!entry.line) { drawMarker(ctx, entry.look.marker, x + 12 * px, y, 2.6 * px); return; }
+  ctx.setLineDash(entry.look.dash.map((length) => length * px));
+  ctx.beginPath();
+  ctx.moveTo(x, y);
+  ctx.lineTo(x + 24 * px, y);
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+// The numbers of x stand below the last of neighbouring panels that share them.
+const isBare = (chart, i) => i + 1 < chart.panels.length && chart.panels[i + 1].x_label === chart.panels[i].x_label && !chart.panels[i].equal;
+const heightOf = (chart, i) => Math.round(90 * chart.panels[i].height) + (isBare(chart, i) ? 12 : 50);
+
+// A whole chart with its buttons, its legend and what stands under the cursor.
+class Chart {
+  constructor(box, chart) {
+    this.box = box;
+    this.chart = chart;
+    this.hidden = new Set();
+    this.bar = makeBox("bar", box);
+    this.bar.setAttribute("role", "toolbar");
+    this.bar.ariaLabel = "zoom and view";
+    this.legend = makeBox("legend", box);
+    this.value = document.createElement("output");
+    this.value.className = "value";
+    this.hint = this.value.textContent = "Drag: zoom. Shift and drag: move. Double-click: all.";
+    const group = { left: 0 }, more = { hidden: this.hidden, group, joined: false, keep: true };
+    this.panels = chart.panels.map((panel, i) => {
+      const bare = isBare(chart, i), place = makeBox("panel", box);
+      place.style.setProperty("--height", `${heightOf(chart, i)}px`);
+      place.setAttribute("role", "img");
+      place.ariaLabel = `${chart.title}: ${panel.label} against ${panel.x_label}`;
+      const hooks = { setSelect: [(plot) => this.select(plot, panel.x_label)], setCursor: [() => { if (this.over === i) this.value.textContent = this.panels[i].read() || this.hint; }] };
+      const cursor = { points: { show: false }, sync: { key: `${box.id || chart.name}-${panel.x_label}`, setSeries: false }, drag: { x: true, y: false, setScale: false } };
+      place.addEventListener("pointerenter", () => { this.over = i; });
+      return new Panel(place, panel, { ...more, hooks, cursor, bare });
+    });
+    box.append(this.value);
+    this.redraw(true);
+    this.spans = new Map();
+    for (const { panel, span } of this.panels) {
+      const [low, high] = this.spans.get(panel.x_label) || span;
+      this.spans.set(panel.x_label, [Math.min(low, span[0]), Math.max(high, span[1])]);
+    }
+    this.act("all");
+    for (const [action, sign, words] of [["in", "+", "zoom in"], ["out", "−", "zoom out"], ["left", "←", "move left"], ["right", "→", "move right"], ["all", "All", "show all"]]) this.bar.append(makeButton(sign, () => this.act(action), words));
+    if (chart.panels.some((panel) => panel.log !== null && panel.log !== undefined)) this.bar.append(this.toggle("Log axis", this.panels.some((panel) => panel.log), (on) => this.switchLog(on)));
+    if (chart.panels[0].series.some((s) => s.role === "data" && !s.line && !s.u && s.x.length > 50)) this.bar.append(this.toggle("Lines", false, (on) => { for (const panel of this.panels) panel.more.joined = on; this.redraw(); }));
+    this.bar.append(makeButton("Save figure", () => this.save()));
+    this.showLegend();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.showLegend());
+    for (const panel of this.panels) this.follow(panel);
+  }
+
+  toggle(words, pressed, act) {
+    const button = makeButton(words, () => { const on = button.getAttribute("aria-pressed") !== "true"; button.setAttribute("aria-pressed", String(on)); act(on); });
+    button.setAttribute("aria-pressed", String(pressed));
+    return button;
+  }
+
+  switchLog(on) {
+    for (const panel of this.panels) if (panel.panel.log !== null && panel.panel.log !== undefined) { panel.log = on; panel.build(); }
+  }
+
+  redraw(axes = false) { for (const panel of this.panels) panel.plot.redraw(false, axes); }
+
+  showLegend() {
+    this.legend.replaceChildren(...entriesOf(this.chart, isDark(this.box)).map((entry) => {
+      const button = this.toggle(entry.label, !this.hidden.has(entry.label), (on) => { if (on) this.hidden.delete(entry.label); else this.hidden.add(entry.label); this.redraw(); });
+      const key = document.createElement("canvas"), px = devicePixelRatio;
+      [key.width, key.height] = [24 * px, 12 * px];
+      drawKey(key.getContext("2d"), entry, 0, 6 * px, px);
+      button.prepend(key);
+      return button;
+    }));
+  }
+
+  // The listeners are on the box, because a panel that is rebuilt for another colour scheme has a new canvas.
+  follow(panel) {
+    const { box } = panel, name = panel.panel.x_label;
+    box.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey && !event.metaKey) return;  // otherwise the page scrolls
+      event.preventDefault();
+      this.act(event.deltaY < 0 ? "in" : "out");
+    }, { passive: false });
+    let from = null;
+    box.addEventListener("pointerdown", (event) => { if (event.shiftKey) { from = [event.clientX, ...this.range(name)]; event.preventDefault(); event.stopPropagation(); } }, true);
+    box.addEventListener("pointermove", (event) => {
+      if (from === null) return;
+      const [x, low, high] = from, by = (x - event.clientX) / Math.max(panel.plot.over.clientWidth, 1) * (high - low);
+      this.show(name, [low + by, high + by]);
+    });
+    for (const end of ["pointerup", "pointerleave"]) box.addEventListener(end, () => { from = null; });
+    box.addEventListener("dblclick", () => this.act("all"));
+    box.addEventListener("pointerleave", () => { this.value.textContent = this.hint; });
+  }
+
+  select(plot, name) {
+    if (plot.select.width < 4) return;
+    const range = [plot.select.left, plot.select.left + plot.select.width].map((at) => plot.posToVal(at, "x"));
+    plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+    this.show(name, range);
+  }
+
+  range(name) {
+    const { min, max } = this.panels.find(({ panel }) => panel.x_label === name).plot.scales.x;
+    return [min, max];
+  }
+
+  act(action) {
+    for (const [name, span] of this.spans) {
+      const all = this.panels.find(({ panel }) => panel.x_label === name);
+      if (all.panel.equal && action === "all") { for (const panel of this.panels) { panel.more.range = null; panel.show(panel.panel); } }
+      else this.show(name, shifted(action === "all" ? span : this.range(name), all.panel.equal ? all.ranges().x : span, action));
+    }
+  }
+
+  show(name, range) {
+    for (const panel of this.panels) if (panel.panel.x_label === name) { panel.more.range = range; panel.plot.setScale("x", { min: range[0], max: range[1] }); }
+  }
+
+  async save() {
+    const link = document.createElement("a"), canvas = await paper(this.chart, 720, 4, this);
+    link.href = canvas.toDataURL("image/png");
+    link.download = `${this.chart.file || this.chart.name}.png`;
+    link.click();
+  }
+}
+
+// Draw a chart as it is seen, in light colours and with ``times`` as many pixels, on a canvas for print or a file.
+async function paper(chart, width, times, seen = null) {
+  const scale = times / devicePixelRatio, holder = makeBox("", document.body), canvas = document.createElement("canvas"), ctx = canvas.getContext("2d");
+  holder.style.cssText = "position: fixed; left: -99999px; top: 0;";
+  const group = { left: 0 }, hidden = seen ? seen.hidden : new Set();
+  const panels = chart.panels.map((panel, i) => {
+    const own = seen && seen.panels[i], { min, max } = own ? own.plot.scales.x : {};
+    const more = { scale, dark: false, bare: isBare(chart, i), group, hidden, joined: own ? own.more.joined : false, size: { width: width * scale, height: heightOf(chart, i) * scale } };
+    const made = new Panel(holder, { ...panel, log: own && panel.log !== null ? own.log : panel.log }, own && !panel.equal ? { ...more, range: [min, max] } : more);
+    return made;
+  });
+  await null;  // uPlot draws in a microtask
+  for (const panel of panels) if (panel.panel.equal) panel.show(panel.panel); else panel.plot.redraw(false, true);
+  await null;
+  const entries = entriesOf(chart, false).filter((entry) => !hidden.has(entry.label)), font = `${12 * times}px ${FONT}`, rows = [[]];
+  ctx.font = font;
+  for (const entry of entries) {
+    entry.wide = ctx.measureText(entry.label).width + 46 * times;
+    if (rows.at(-1).reduce((sum, each) => sum + each.wide, entry.wide) > width * times && rows.at(-1).length) rows.push([]);
+    rows.at(-1).push(entry);
+  }
+  const top = entries.length ? 18 * times * rows.length : 0;
+  canvas.width = width * times;
+  canvas.height = top + panels.reduce((sum, { plot }) => sum + plot.ctx.canvas.height, 0);
+  ctx.fillStyle = "#ffffff";
+  ctx.fillRect(0, 0, canvas.width, canvas.height);
+  ctx.font = font;
+  ctx.textBaseline = "middle";
+  rows.forEach((row, i) => {
+    let x = 8 * times;
+    for (const entry of row) {
+      drawKey(ctx, entry, x, (18 * i + 9) * times, times);
+      ctx.fillStyle = "#1d232a";
+      ctx.fillText(entry.label, x + 30 * times, (18 * i + 9) * times);
+      x += entry.wide;
+    }
+  });
+  let y = top;
+  for (const { plot } of panels) { ctx.drawImage(plot.ctx.canvas, 0, y); y += plot.ctx.canvas.height; plot.destroy(); }
+  holder.remove();
+  return canvas;
 }

@@ -1,4 +1,4 @@
-// The chart in a notebook: springmass/api/live.py builds its module from uPlot, samples.js and this file.
+// The chart in a notebook: springmass/api/live.py builds its module from uPlot, charts.js, samples.js and this file.
 function render({ model, el }) {
   const all = new Samples(), box = document.createElement("div"), said = document.createElement("div");
   let chart = null, scale = 1, dirty = false, over = false;
@@ -10,11 +10,8 @@ function render({ model, el }) {
     const what = hello.quantity === "length" ? "distance" : hello.quantity, unit = hello.unit === "m" ? "mm" : hello.unit;
     const kind = hello.simulated ? "SIMULATED" : hello.source;
     said.textContent = `${kind}: ${hello.title || hello.name}`;
-    chart = new uPlot({
-      width: box.clientWidth || 640, height: 260, legend: { show: false }, scales: { x: { time: false } },
-      series: [{}, { stroke: "#0072b2", width: 1, points: { show: false } }],
-      axes: [{ label: "time / s", stroke: "#808080" }, { label: `${what} / ${unit}`, stroke: "#808080", size: 60 }],
-    }, [[], []], box);
+    box.style.height = "260px";
+    chart = new Panel(box, { label: `${what} / ${unit}`, x_label: "time / s", log: null, series: [] }, { cursor: { show: false } });
   }
   function draw() {
     if (over) return;
@@ -22,8 +19,8 @@ function render({ model, el }) {
     if (!chart || !dirty || !all.count) return;
     dirty = false;
     const end = all.t[all.count - 1], from = seconds ? end - seconds : all.t[0];
-    const [t, y] = all.between(from, end, chart.width);
-    chart.setData([t, y.map((v) => (v === null ? null : v * scale))]);
+    const [t, y] = all.between(from, end, Math.max(200, box.clientWidth)), shown = y.map((v) => (v === null ? null : v * scale));
+    chart.show({ ...chart.panel, range: around(shown), series: [{ label: "samples", role: "data", line: true, x: t, y: shown }] });
   }
   model.on("msg:custom", (message, buffers) => {
     if (message.type === "hello" && !chart) begin(message);

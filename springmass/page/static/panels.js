@@ -6,7 +6,7 @@ const LABELS = { period: "period", amplitude_now: "amplitude now", spring_consta
 const OF_LAW = new Set(["damping_rate", "quality_factor"]);
 const KINDS = { voltage: "voltage", angle: "angle", acceleration: "acceleration", force: "force", length: "position" };
 const FRESH_S = 2;
-let position, amplitude, phase, spectrum, shown_zero, phase_span = null, peaks = [];
+let position, amplitude, phase, spectrum, shown_zero;
 let frozen = false, fixed = false, window_index = 1, playing = false, play_time = null, play_moment = 0;
 
 function begin_anew() {
@@ -16,12 +16,12 @@ function begin_anew() {
   const what = `${shown_zero === undefined ? KINDS[run.quantity] || run.quantity : "displacement"} / ${unit()}`;
   if (position) for (const chart of [position, amplitude, phase, spectrum]) chart.destroy();
   // The page's own cursor stays at its sample; uPlot's cursor stays at its place on the screen, so it is turned off.
-  const select = { cursor: { x: false, y: false, points: { show: false }, drag: { x: true, y: false, setScale: false } }, hooks: { setSelect: [selected], drawAxes: [draw_selection, draw_fits], draw: [draw_marks, draw_cursors] } };
-  const still = { cursor: { show: false } };
-  position = new Chart("position", [samples_series(), line("fit", "fit", null, 1), line("rest", "rest", [6, 4], 1)], ["time / s", what], select);
-  amplitude = new Chart("amplitude", [points("amplitude")], ["time / s", `amplitude / ${unit()}`], still);
-  phase = new Chart("phase", [points("velocity", 3)], [what, `velocity / (${unit()}/s)`], { ...still, scales: { x: { time: false, range: (_, min, max) => phase_range("x", min, max) }, y: { range: (_, min, max) => phase_range("y", min, max) } } });
-  spectrum = new Chart("spectrum", [line("amplitude", "data", null, 1)], ["frequency / Hz", `amplitude / ${unit()}`], { ...still, scales: { x: { time: false }, y: { distr: 3 } }, hooks: { draw: [draw_peaks] } }, true);
+  const select = { cursor: { x: false, y: false, points: { show: false }, drag: { x: true, y: false, setScale: false } }, hooks: { setSelect: [selected], drawAxes: [draw_selection, draw_fits], draw: [draw_cursors] } };
+  const still = { cursor: { show: false } }, make = (id, label, x_label, more, shape) => new Panel($(id), { label, x_label, log: null, series: [], ...shape }, more);
+  position = make("position", what, "time / s", select);
+  amplitude = make("amplitude", `amplitude / ${unit()}`, "time / s", still);
+  phase = make("phase", `velocity / (${unit()}/s)`, what, still, { equal: true });
+  spectrum = make("spectrum", `amplitude / ${unit()}`, "frequency / Hz", still, { log: true });
   forget_selection();
   if (motion) show_motion();
   dirty = true;
@@ -75,12 +75,10 @@ function show_motion() {
   $("findings").replaceChildren(...(message.findings || []).map((f) => item(f.advice ? `${f.message.replace(/\.$/, "")}. ${f.advice}` : f.message, f.severity)));
   if (!(message.findings || []).length) $("findings").replaceChildren(item(message.count || message.type === "moment" ? "No warnings." : "No analysis yet."));
   if (message.amplitude) {
-    const laws = message.laws, times = message.amplitude.t;
-    const series = [points("amplitude"), ...laws.map((law, i) => line(law.name === message.stated_law ? `${law.name} (stated)` : law.name, law.name === message.law ? "fit" : `other-${(i % 4) + 1}`, law.name === message.law ? null : DASHES[i % 4]))];
-    if (series.map((s) => s.label).join() !== amplitude.series.map((s) => s.label).join()) amplitude.build(series);
-    const k = scale();
-    const columns = [[times, message.amplitude.value.map((x) => x * k)], ...laws.map((law) => [law.t, law.value.map((x) => x * k)])];
-    amplitude.show(uPlot.join(columns));
+    const k = scale(), grown = (values) => values.map((x) => x * k), { t, value, u } = message.amplitude;
+    const laws = message.laws.map((law) => ({ label: law.name === message.stated_law ? `${law.name} (stated)` : law.name, role: law.name === message.law ? "law" : "other", line: true, x: law.t, y: grown(law.value) }));
+    amplitude.show({ ...amplitude.panel, range: around(grown(value)), series: [...laws, { label: "amplitude", role: "data", x: t, y: grown(value), u: grown(u) }] });
+    name_series(amplitude);
   }
   if (message.spectrum && message.spectrum.f.length) show_spectrum(message.spectrum);
   if (selection) show_region_fits();
@@ -116,66 +114,39 @@ function stopping(stop, age_s) {
   return left > 0 ? `${interval} About ${seconds(left)} s more for ${wanted}.` : interval;
 }
 
+// The names of a panel's series under it.
+function name_series(chart) {
+  const names = entriesOf({ panels: [chart.panel] }, isDark(chart.box)).map((entry) => {
+    const found = item(entry.label), key = document.createElement("canvas");
+    [key.width, key.height] = [24, 12];
+    drawKey(key.getContext("2d"), entry, 0, 6, 1);
+    found.prepend(key, " ");
+    return found;
+  });
+  $(`${chart.box.id}-names`).replaceChildren(...names);
+}
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (amplitude) name_series(amplitude); });
+
 // The highest peaks are at the low end of the spectrum; frequencies far above them are cut off.
-function show_spectrum({ f, value, peaks: found }) {
-  peaks = found || [];
-  const highest = Math.max(...peaks.map((peak) => peak.f), 0), end = Math.max(10, 4 * highest);
+function show_spectrum({ f, value, peaks }) {
+  const highest = Math.max(...peaks.map((peak) => peak.f), 0), end = Math.max(10, 4 * highest), k = scale();
   const stop = f.findIndex((x) => x > end), upto = stop < 0 ? f.length : stop;
-  spectrum.show([f.slice(1, upto), value.slice(1, upto).map((x) => x * scale())]);
-}
-
-function draw_peaks(plot) {
-  const { ctx, bbox } = plot, taken = [];
-  ctx.save();
-  ctx.fillStyle = COLOURS.ink;
-  ctx.textAlign = "left";
-  ctx.font = `${11 * devicePixelRatio}px system-ui`;
-  for (const { f, value, step } of [...peaks].sort((a, b) => b.value - a.value)) {
-    const text = `${f.toFixed(Math.max(0, Math.ceil(-Math.log10(step))))} Hz`, wide = ctx.measureText(text).width, high = 13 * devicePixelRatio;
-    const x = Math.min(plot.valToPos(f, "x", true) + 4, bbox.left + bbox.width - wide), y = Math.max(plot.valToPos(value * scale(), "y", true), bbox.top + high);
-    if (taken.some((box) => x < box.x + box.wide && box.x < x + wide && Math.abs(y - box.y) < high)) continue;
-    taken.push({ x, y, wide });
-    ctx.fillText(text, x, y);
-  }
-  ctx.restore();
-}
-
-// Velocity divided by angular frequency has the unit of position; with equal scales for both, a swing is drawn as a
-// circle.
-function phase_range(axis, min, max) {
-  if (!phase_span || !phase || !(phase_span.reach > 0)) return min === null ? [-1, 1] : uPlot.rangeNum(min, max, 0.1, true);
-  const { width, height } = phase.plot.bbox, { middle, reach, omega } = phase_span, wider = Math.max(1, width / height), higher = Math.max(1, height / width);
-  return axis === "x" ? [middle - reach * wider, middle + reach * wider] : [-reach * omega * higher, reach * omega * higher];
-}
-
-// Draw each mark as a dashed line with its text.
-function draw_marks(plot) {
-  if (!state) return;
-  const { ctx, bbox } = plot, { min, max } = plot.scales.x;
-  ctx.save();
-  ctx.strokeStyle = ctx.fillStyle = COLOURS["other-2"];
-  ctx.setLineDash([4, 4]);
-  ctx.font = `${11 * devicePixelRatio}px system-ui`;
-  for (const [t, text] of state.marks) {
-    if (t < min || t > max) continue;
-    const x = plot.valToPos(t, "x", true);
-    ctx.beginPath();
-    ctx.moveTo(x, bbox.top);
-    ctx.lineTo(x, bbox.top + bbox.height);
-    ctx.stroke();
-    const far = x > bbox.left + bbox.width / 2;
-    ctx.textAlign = far ? "right" : "left";
-    ctx.fillText(text.slice(0, 30), x + (far ? -4 : 4), bbox.top + 12 * devicePixelRatio);
-  }
-  ctx.restore();
+  const text = (peak) => `${peak.f.toFixed(Math.max(0, Math.ceil(-Math.log10(peak.step))))} Hz`;
+  const ordered = [...peaks].sort((a, b) => b.value - a.value);
+  const size = value.slice(1, upto).map((x) => x * k);
+  spectrum.show({ ...spectrum.panel, range: around(size, true), series: [
+    { label: "amplitude", role: "data", line: true, x: f.slice(1, upto), y: size },
+    { label: "peaks", role: "mark", x: ordered.map((peak) => peak.f), y: ordered.map((peak) => peak.value * k), why: ordered.map(text) },
+  ] });
 }
 
 // The fits are thin lines below the samples, with two points per pixel.
 const LEAST_SWING_PX = 6;
 function draw_fits(plot) {
   const message = shown_message(), { min, max } = plot.scales.x;
-  if (message && message.fit) draw_fit(plot, message.fit, Math.max(min, message.fit.moment - 20), Math.min(max, end_time()), "fit");
-  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, selection.from, region.fit.moment - 20), Math.min(max, selection.to), "other-1");
+  if (message && message.fit) draw_fit(plot, message.fit, Math.max(min, message.fit.moment - 20), Math.min(max, end_time()), ["flagged", 0]);
+  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, selection.from, region.fit.moment - 20), Math.min(max, selection.to), ["other", 0]);
 }
 
 function draw_fit(plot, fit, from, to, name) {
@@ -187,7 +158,7 @@ function draw_fit(plot, fit, from, to, name) {
     const y = fit.rest + fit.amplitude * decay(fit.decay, t - fit.moment) * Math.cos(fit.omega * (t - fit.moment) + fit.phase);
     ctx.lineTo(plot.valToPos(t, "x", true), plot.valToPos((y - zero()) * scale(), "y", true));
   }
-  ctx.strokeStyle = COLOURS[name];
+  ctx.strokeStyle = lookOf(...name, position.dark).colour;
   ctx.lineWidth = devicePixelRatio;
   ctx.stroke();
   ctx.restore();
@@ -235,16 +206,18 @@ function draw() {
   const [from, end] = in_view(), all = samples[0], message = shown_message();
   const [t, y] = all.between(from, end, Math.max(200, $("position").clientWidth));
   const k = scale(), z = zero(), shown = (v) => (v === null ? null : (v - z) * k);
-  const rest = t.map(() => (message && message.rest_m !== undefined ? shown(message.rest_m) : null));
-  const keep = fixed ? { ...position.plot.scales.y } : null;
-  position.show([t, y.map(shown), t.map(() => null), rest]);
-  if (keep && keep.min != null) position.plot.setScale("y", { min: keep.min, max: keep.max });
+  const level = message && message.rest_m !== undefined ? shown(message.rest_m) : null, ends = t.length ? [t[0], t[t.length - 1]] : [];
+  const marks = ((state && state.marks) || []).filter(([at]) => ends.length && at >= ends[0] && at <= ends[1]);
+  // Samples that are far enough apart are drawn as dots, so that the fit below is visible; denser ones as a line.
+  const dense = t.length > 0.7 * $("position").clientWidth, { min, max } = position.plot.scales.y;
+  position.show({ ...position.panel, range: fixed && min != null ? [min, max] : around(y.map(shown)), series: [
+    { label: "rest", role: "rest", line: true, x: level === null ? [] : ends, y: ends.map(() => level) },
+    { label: "samples", role: "data", line: dense, x: t, y: y.map(shown) },
+    { label: "marks", role: "mark", x: marks.map(([at]) => at), y: marks.map(() => null), why: marks.map(([, text]) => text) },
+  ] });
   const omega = message && message.omega, swing = omega ? (2 * Math.PI) / omega : 1;
-  const reach = Math.max(1, Math.round((swing / 40) * run.rate_hz));
-  const orbit = all.orbit(end - 3 * swing, end, reach).sort((a, b) => a[0] - b[0]);
-  if (omega && orbit.length) {
-    const low = shown(orbit[0][0]), high = shown(orbit[orbit.length - 1][0]), fastest = Math.max(...orbit.map(([, v]) => Math.abs(v))) * k;
-    phase_span = { middle: (low + high) / 2, reach: 1.1 * Math.max((high - low) / 2, fastest / omega), omega };
-  } else phase_span = null;
-  phase.show([orbit.map(([p]) => shown(p)), orbit.map(([, v]) => v * k)]);
+  const orbit = all.orbit(end - 3 * swing, end, Math.max(1, Math.round((swing / 40) * run.rate_hz)));
+  const x = orbit.map(([p]) => shown(p)), v = orbit.map(([, v_m]) => v_m * k), fastest = Math.max(...v.map(Math.abs)), middle = (Math.max(...x) + Math.min(...x)) / 2;
+  // Velocity divided by angular frequency has the unit of position; with equal scales for both, a swing is a circle.
+  if (x.length) phase.show({ ...phase.panel, range: [-1.1 * fastest, 1.1 * fastest], ...(omega && { span: [middle - fastest / omega, middle + fastest / omega] }), series: [{ label: "velocity", role: "data", x, y: v }] });
 }

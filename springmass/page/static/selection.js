@@ -3,7 +3,7 @@
 let pinned = null, cursor = null, cursor_on = false, selection = null, region = null, dragged = false;
 
 // Redraw the layers above the samples, even while the samples are frozen; a chart without samples has no axes yet.
-function redraw() { if (position && position.plot.data[0].length) position.plot.redraw(false); }
+function redraw() { if (position) position.plot.redraw(false); }
 
 function forget_selection() {
   pinned = cursor = selection = region = null;
@@ -127,7 +127,7 @@ function draw_selection(plot) {
   const left = plot.valToPos(Math.max(selection.from, min), "x", true), right = plot.valToPos(Math.min(selection.to, max), "x", true);
   ctx.save();
   ctx.globalAlpha = 0.15;
-  ctx.fillStyle = COLOURS["other-3"];
+  ctx.fillStyle = lookOf("other", 2, position.dark).colour;
   ctx.fillRect(left, bbox.top, right - left, bbox.height);
   ctx.restore();
 }
@@ -136,11 +136,11 @@ function draw_cursors(plot) {
   const { ctx, bbox } = plot, { min, max } = plot.scales.x;
   ctx.save();
   ctx.lineWidth = devicePixelRatio;
-  for (const [sample, name] of [[pinned, "other-1"], [cursor, "ink"]]) {
+  for (const [sample, name] of [[pinned, "other"], [cursor, "law"]]) {
     if (!sample || sample[0] < min || sample[0] > max) continue;
     const x = plot.valToPos(sample[0], "x", true), y = plot.valToPos(sample[1], "y", true);
-    ctx.strokeStyle = ctx.fillStyle = COLOURS[name];
-    ctx.setLineDash(name === "ink" ? [3, 3] : []);
+    ctx.strokeStyle = ctx.fillStyle = lookOf(name, 0, position.dark).colour;
+    ctx.setLineDash(name === "law" ? [3, 3] : []);
     ctx.beginPath();
     ctx.moveTo(x, bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);

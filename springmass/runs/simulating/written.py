@@ -5,9 +5,9 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,12 +25,14 @@ from springmass.runs.simulating.simulation import FINE, Against, Simulation, cou
 from springmass.runs.simulating.summaries import band_columns
 from springmass.session.simulated_bench import REST_M
 
-__all__ = ["write_folder", "write_readings"]
+if TYPE_CHECKING:
+    from springmass.charts.draw import Kind
 
+PAGE = "simulation.html"
 FIGURES = ("position", "velocity", "energy", "phase", "error", "band", "against")
 FILES = frozenset(
-    {"run.h5", "simulation.json", "band.csv", "against.csv"}
-    | {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf")}
+    {"run.h5", PAGE, "simulation.json", "band.csv", "against.csv"}
+    | {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf", "png")}
 )
 
 
@@ -42,23 +44,25 @@ def write_folder(
     where: str,
     out: str | Path,
     results: Mapping[str, Any],
+    kinds: Sequence[Kind] = (),
 ) -> Path:
-    """Write run file, figures, tables and JSON into NAME.simulated; return the folder."""
-    from springmass.report.figures import save
-    from springmass.report.figures.trajectories import against_figure, band_figure, draw_simulation
+    """Write run file, page of charts, tables, JSON and the kinds of figures into NAME.simulated; return the folder."""
+    from springmass.charts import simulation as charted
+    from springmass.charts.draw import save
+    from springmass.report.html import Figures, drawn_by_script, template
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 
     name = Path(where).name.removesuffix(".toml").removesuffix(".scene")
     target = make_folder(out) / in_a_name(name, ".simulated")
-    figures, tables = draw_simulation(simulation, effective_mass_kg(scene)), {}
+    charts, tables = list(charted.simulation(simulation, effective_mass_kg(scene))), {}
     trajectory = simulation.trajectory
     if band is not None:
-        figures["band"] = band_figure(simulation, band)
+        charts.append(charted.band(simulation, band))
         columns = band_columns(band, trajectory.t, trajectory.y)
         tables["band"] = {"t_s": trajectory.t, "displacement_m": trajectory.y, **columns}
     if against is not None:
-        figures["against"] = against_figure(against)
+        charts.insert(0, charted.against(against))
         tables["against"] = {"t_s": against.t, "measured_m": against.measured, "predicted_m": against.predicted}
         if against.band is not None:
             around = against.predicted + against.band
@@ -67,9 +71,11 @@ def write_folder(
         title = f"{Path(where).name} by {simulation.solution.integrator.name}"
         configuration = {"rest_m": rest_m(trajectory), **results}
         _write_run(folder / "run.h5", *plain_block(trajectory, Path(where).name), scene, title, configuration)
-        pictures = make_folder(folder / "figures")
-        for figure_name, figure in figures.items():
-            save(figure, pictures, figure_name)
+        drawn = save(charts, make_folder(folder / "figures"), kinds) if kinds else {}
+        figures = Figures({name: files["svg"] for name, files in drawn.items() if "svg" in files})
+        shown = [figures.add(chart) for chart in charts]
+        page = template("charts.html.j2").render(title=title, figures=shown, **drawn_by_script(figures.charts))
+        write_whole(folder / PAGE, page)
         for table_name, table in tables.items():
             write_whole(folder / f"{table_name}.csv", _table(table))
         write_whole(folder / "simulation.json", json.dumps(results, indent=2) + "\n")

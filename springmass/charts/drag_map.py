@@ -1,0 +1,71 @@
+"""Drag coefficients of many runs against Reynolds and Keulegan-Carpenter number, beside lines from the literature."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.errors import visible
+from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
+from pipeline.track import F8
+from springmass.charts.chart import Chart, Panel, Series, line_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DragRun:
+    """One run's drag coefficient at several of its amplitudes: (n, 4) of Re, KC, the coefficient and its u."""
+
+    disc: str
+    points: F8
+
+
+def drag_of_disc_at_rest(reynolds: F8) -> F8:
+    """Return the drag coefficient of a disc perpendicular to a steady stream, at Reynolds numbers (n,).
+
+    :math:`64/(\\pi Re)` for creeping flow (A. Oberbeck, J. reine angew. Math. 81 (1876) 62; H. Lamb, Hydrodynamics,
+    art. 339), up to the intersection with 1.17 for high Reynolds numbers (S. F. Hoerner, Fluid-Dynamic Drag, 1965,
+    section III). These are the two limits; the transition between them is not modelled.
+    """
+    return np.maximum(64.0 / (np.pi * reynolds), STEADY_DISC_DRAG)
+
+
+def drag_of_plate(keulegan_carpenter: F8) -> F8:
+    """Return the drag coefficient of a long flat plate that oscillates broadside on, at KC numbers (n,).
+
+    :math:`\\max(10\\,KC^{-1/3}, 1.95)`, fitted (M. Luhar, H. M. Nepf, J. Fluids Struct. 61 (2016) 20) to coefficients
+    measured by Keulegan and Carpenter (1958) and by Sarpkaya and O'Keefe (1996).
+    """
+    return np.maximum(10.0 * keulegan_carpenter ** (-1.0 / 3.0), 1.95)
+
+
+def drag_map(runs: Sequence[DragRun]) -> Chart:
+    """Return the map: one line per disc with the band of each run; ValueError without a positive coefficient."""
+    if not any((run.points[:, 2] > 0).any() for run in runs):
+        raise ValueError("a map of drag needs a run with a positive drag coefficient")
+    panels = []
+    for column, label in enumerate(("Reynolds number", "Keulegan-Carpenter number")):
+        series, ends, heights = [], [], []
+        for disc in dict.fromkeys(run.disc for run in runs):
+            parts = [run.points[run.points[:, 2] > 0][:, [column, 2, 3]] for run in runs if run.disc == disc]
+            rows = np.concatenate(
+                [np.vstack([part, np.full((1, 3), np.nan)]) for part in parts if len(part)] or [np.empty((0, 3))]
+            )
+            if len(rows):
+                words = f"disc {visible(disc)}" if disc else "runs"
+                series.append(Series(words, rows[:, 0], rows[:, 1], "other", line=True, u=rows[:, 2]))
+                ends += [np.nanmin(rows[:, 0]), np.nanmax(rows[:, 0])]
+                heights.append(rows[:, 1])
+        grid = np.geomspace(0.8 * min(ends), 1.25 * max(ends), 200)
+        if column == 0:
+            line, words = drag_of_disc_at_rest(grid), "disc, steady stream (limits)"
+        else:
+            line, words = drag_of_plate(grid), "oscillating flat plate, Luhar and Nepf 2016"
+            assumed = np.array([disc_drag_coefficient(x) for x in grid.tolist()])
+            series.append(line_of("oscillating disc, as simulate assumes", grid, assumed, "rest"))
+        series.append(line_of(words, grid, line))
+        low, high = np.nanquantile(np.concatenate(heights), (0.01, 0.99)).tolist()
+        shown = (0.7 * min(low, float(line.min())), 1.4 * max(high, STEADY_DISC_DRAG))
+        panels.append(Panel("effective drag coefficient", tuple(series), 3.6, label, log=True, log_x=True, range=shown))
+    return Chart("drag-map", "Drag of discs", "", tuple(panels))

@@ -1,0 +1,471 @@
+"""The charts of one run: position, amplitude, frequency, spectrum, drag, energy, motion, phase plot, classic method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.analyse import Analysis, Oscillation, Overdamped
+from pipeline.errors import AnalysisError
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.quantity import SHOWN, noun
+from pipeline.results.classic import CYCLES, Classic
+from pipeline.results.curves import Curve
+from pipeline.results.kinematics import Smoothed
+from pipeline.track import F8, UNUSABLE, Quality
+from springmass.charts.chart import Chart, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
+from springmass.charts.spectrum import peaks_of, spectrum_of
+from springmass.report.recorded import Note
+from springmass.report.tables import law_status, pretty
+
+REASONS: tuple[tuple[int, str], ...] = (
+    (int(Quality.CLIPPED), "clipped: cut off at the end of the range"),
+    (int(Quality.FALSE_ECHO), "false echo: far from where the motion puts the bob"),
+    (int(Quality.DUPLICATE_TIME), "repeats an earlier time"),
+    (int(Quality.NON_MONOTONIC_TIME), "runs backward in time"),
+    (int(Quality.OUTSIDE), "outside the analysed part"),
+    (int(UNUSABLE), "not usable"),
+)
+"""Bits of a sample's flags, the most serious first, and why such a sample is left out."""
+EXPONENTIAL = "linear"
+"""The law with which others are compared: linear drag."""
+MOST_NAMED = 4  # laws with an entry of their own in the legend
+DETAIL_PERIODS = 8
+PER_PERIOD = 26  # points of a drawn period: a polygon that looks round
+MOST_PERIODS = 460  # of more periods the envelope is drawn, which a screen cannot tell from the motion
+MOST_STRETCHES, LEAST_WINDOWS = 24, 6
+LEAST_TURNS, MOST_TURNS = 4, 24
+MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
+MOST_MEANS = 120  # of kinetic and potential energy; of more periods, one mean covers several
+
+
+def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
+    """Samples with their fit, residuals over the noise of one sample, and the rest position if it moves."""
+    track, factor = a.track, SHOWN[a.track.unit].factor
+    rows = np.flatnonzero(np.isfinite(track.t))
+    rows = rows[np.argsort(track.t[rows], kind="stable")]
+    t, y, used = track.t[rows], track.y[rows] * factor, _used(a)[rows]
+    out = np.flatnonzero(~used)
+    why = tuple(_reason(int(a.flags[rows[i]]), y[i]) for i in out)
+    what = "position" if track.unit == "m" else noun(track.unit)
+    samples = Series("samples used", t, np.where(used, y, np.nan))
+    # A missing distance has no place; its time is marked at the middle of the others.
+    middle = float(np.median(y[used])) if used.any() else 0.0
+    places = np.where(np.isfinite(y[out]), y[out], middle)
+    flagged = [Series(f"left out ({out.size})", t[out], places, "flagged", why=why)] if out.size else []
+    series = [samples, *flagged, *_marks(notes)]
+    sigma = pretty(_in_shown(a, a.estimates["noise"]))
+    motion = a.motion
+    if isinstance(motion, Overdamped):
+        grid, curve = _relaxing(a, motion)
+        series.insert(0, line_of("fit", grid, curve * factor))
+    if not isinstance(motion, Oscillation):
+        caption = f"The recording. Samples scatter by {sigma}."
+        return Chart("position", "Position", caption, (Panel(value_label(what, track.unit), tuple(series)),))
+    series[:0] = _fit_lines(a, motion, factor)
+    residual = np.where(used, motion.waveform.residual[rows], np.nan) / (a.estimates["noise"].value or 1.0)
+    panels = [
+        Panel(value_label(what, track.unit), tuple(series)),
+        Panel("residual / σ", (Series("residual", t, residual),), 1.3, zero=True),
+    ]
+    if motion.rest.drifts:
+        panels.append(_rest(a, motion, factor))
+    f = motion.cycles.frequency_hz
+    end = float(t[used][0]) + DETAIL_PERIODS / f if motion.cycles.count > 2 * DETAIL_PERIODS else None
+    caption = f"Samples and fit; below, residuals divided by the noise of one sample, σ = {sigma}."
+    return Chart("position", "Position and residuals", caption, tuple(panels), end)
+
+
+def _used(a: Analysis) -> NDArray[np.bool_]:
+    return np.asarray(((a.flags & UNUSABLE) == 0) & np.isfinite(a.track.y) & np.isfinite(a.track.t), np.bool_)
+
+
+def _reason(flags: int, y: float) -> str:
+    if not np.isfinite(y):
+        return "missing: the sensor gave no distance"
+    return next((words for bit, words in REASONS if flags & bit), "not usable")
+
+
+def _in_shown(a: Analysis, x: Estimate) -> Estimate:
+    shown = SHOWN[a.track.unit]
+    return Estimate(shown.factor * x.value, shown.factor * x.u, shown.unit)
+
+
+def _marks(notes: Sequence[Note]) -> list[Series]:
+    """Marks of the recording, its trigger and its losses, as vertical lines."""
+    chosen = [note for note in notes if note.kind in ("mark", "trigger", "lost", "reopened")]
+    texts = [note.text if note.kind == "mark" else note.kind for note in chosen]
+    return [mark("marks", [note.t_s for note in chosen], texts)] if chosen else []
+
+
+def _fit_lines(a: Analysis, motion: Oscillation, factor: float) -> list[Series]:
+    """The fitted motion where the recording was analysed, or its envelope if its periods are too many to draw."""
+    inside = np.isfinite(a.track.t) & ((a.flags & Quality.OUTSIDE) == 0)
+    start, end = float(np.min(a.track.t[inside])), float(np.max(a.track.t[inside]))
+    periods = (end - start) * motion.cycles.frequency_hz
+    grid = np.linspace(start, end, int(PER_PERIOD * min(periods, MOST_PERIODS)) + 2)
+    rest = motion.rest.at(grid)
+    if periods <= MOST_PERIODS:
+        return [line_of("fit", grid, (rest + model_motion(motion, grid)[0]) * factor)]
+    reach = motion.damping.best.amplitude(grid - motion.damping.t0)
+    return [line_of("fit: rest ± amplitude", grid, (rest + s * reach) * factor) for s in (1, -1)]
+
+
+def model_motion(motion: Oscillation, t: F8) -> tuple[F8, F8]:
+    """Return fitted displacement and velocity at times t, in the record's unit and in that unit per second."""
+    law, angle = motion.damping.best, motion.phase.total(t)
+    amplitude = law.amplitude(t - motion.phase.t0)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    velocity = law.law.rate(amplitude, law.joint.values) * cosine - amplitude * motion.phase.rate(amplitude) * sine
+    return amplitude * cosine, velocity
+
+
+def _relaxing(a: Analysis, motion: Overdamped) -> tuple[F8, F8]:
+    """Return times and values of a relaxation: a linear fit of amplitudes and rest at the fitted rates."""
+    x, used = motion.estimates, _used(a) & (a.track.t >= motion.start_s)
+
+    def columns(t: F8) -> F8:
+        since = t - motion.start_s
+        if motion.kind == "strong":
+            turn = x["angular_frequency"].value * since
+            pair = np.exp(-x["damping_rate"].value * since) * np.array([np.cos(turn), np.sin(turn)])
+        elif motion.kind == "critical":
+            pair = np.exp(-x["relaxation_rate"].value * since) * np.array([np.ones_like(since), since])
+        else:
+            pair = np.array([np.exp(-x[f"relaxation_rate_{name}"].value * since) for name in ("slow", "fast")])
+        return np.column_stack([np.ones_like(since), *pair])
+
+    weights, *_ = np.linalg.lstsq(columns(a.track.t[used]), a.track.y[used], rcond=None)
+    grid = np.linspace(motion.start_s, float(np.nanmax(a.track.t)), 600)
+    return grid, np.asarray(columns(grid) @ weights)
+
+
+def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:
+    """Rest positions of the windows minus their mean, and the curve that was fitted to them."""
+    rest, windows = motion.rest, motion.demodulated
+    own = windows.offset - rest.mean.value
+    grid = np.linspace(float(windows.t.min()), float(windows.t.max()), 400)
+    curve = line_of("rest position, fitted", grid, (rest.at(grid) - rest.mean.value) * factor)
+    points = Series("rest of one window", windows.t, own * factor, u=np.sqrt(windows.covariance[:, 2, 2]) * factor)
+    return Panel(value_label("rest", a.track.unit), (curve, points), 1.2)
+
+
+def amplitude(a: Analysis, laws: Sequence[str] | None = None) -> Chart | None:
+    """Amplitudes of the windows with the damping laws, and the selected law's residuals over u."""
+    if not isinstance(a.motion, Oscillation):
+        return None
+    damping, windows, factor = a.motion.damping, a.motion.demodulated, SHOWN[a.track.unit].factor
+    t, y, u, kept = windows.t, windows.amplitude * factor, damping.scatter.u * factor, damping.scatter.kept
+    curves = _law_lines(a, a.motion, laws)
+    points = Series("amplitude of one window", t[kept], y[kept], u=u[kept])
+    why = ("left out of the fits of the laws: far from its neighbours",) * int(np.count_nonzero(~kept))
+    out = [] if kept.all() else [Series("left out of the fits", t[~kept], y[~kept], "flagged", why=why)]
+    shown = kept if kept.any() else ~kept
+    low, high = float(np.min((y - u)[shown])), float(np.max((y + u)[shown]))
+    margin = 0.1 * max(high - low, 1e-9 * abs(high)) or 1.0
+    residual = (y - damping.best.amplitude(t - damping.t0) * factor) / np.where(u > 0.0, u, 1.0)
+    ends, log = (low - margin, high + margin), None if low <= 0.0 else False
+    above = Panel(value_label("amplitude", a.track.unit), (*curves, points, *out), log=log, range=ends)
+    below = Panel("residual / u", (Series("residual", t[kept], residual[kept]),), 1.3, zero=True)
+    caption = "Amplitude of each window (one period or a few) ± u, with the damping laws; below, residuals of the law "
+    return Chart("amplitude", "Amplitude and damping laws", f"{caption}{damping.selected} over u.", (above, below))
+
+
+def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> list[Series]:
+    """The selected law, the exponential and the best of the laws that cannot be ruled out; others without a name."""
+    damping = motion.damping
+    grid = np.linspace(damping.t0, float(np.nanmax(a.track.t)), 160)
+    named = list(laws or dict.fromkeys((damping.selected, *damping.admissible)))[: len(laws or ()) or MOST_NAMED]
+    if laws is None and EXPONENTIAL in damping.fits and EXPONENTIAL not in named:
+        named.append(EXPONENTIAL)
+    rest = [] if laws else [name for name in damping.fits if name not in named]
+    lines = []
+    for name in (*rest, *sorted(named, key=lambda name: name != damping.selected)):
+        words = "exponential, linear drag" if name == EXPONENTIAL else name
+        together = name in rest and len(rest) > 1
+        label = f"{len(rest)} other laws" if together else f"{words} ({law_status(damping, name)})"
+        curve = damping.fits[name].amplitude(grid - damping.t0) * SHOWN[a.track.unit].factor
+        role: Role = "law" if name == damping.selected else "rest" if name in rest else "other"
+        lines.append(line_of(label, grid, curve, role))
+    return lines
+
+
+def frequency(a: Analysis) -> Chart | None:
+    """Frequency of stretches of the run against their amplitude, with the model of the phase.
+
+    In each stretch a straight line is fitted to the phases of its windows, weighted by their inverse variances, which
+    are multiplied by the reduced chi-square of all phases if that exceeds one.
+    """
+    if not isinstance(a.motion, Oscillation) or a.motion.demodulated.t.size < LEAST_WINDOWS:
+        return None
+    phase, windows = a.motion.phase, a.motion.demodulated
+    order = np.argsort(windows.t, kind="stable")
+    points = []
+    for part in np.array_split(order, min(MOST_STRETCHES, order.size // 2)):
+        t, turned = windows.t[part], windows.phase[part]
+        weight = 1.0 / np.maximum(windows.covariance[part, 1, 1] * max(phase.reduced_chi2, 1.0), 1e-30)
+        middle = np.average(t, weights=weight)
+        spread = float(np.sum(weight * (t - middle) ** 2))
+        slope = float(np.sum(weight * (t - middle) * turned)) / spread
+        points.append((float(np.mean(windows.amplitude[part])), slope, spread**-0.5))
+    size, slope, u = np.array(sorted(points), np.float64).T
+    factor, mean = SHOWN[a.track.unit].factor, phase.angular_frequency.value
+    grid = np.linspace(float(size[0]), float(size[-1]), 100)
+    shift = 1e3 / (2.0 * np.pi)
+    changes = phase.backbone is not None
+    model = "model: the frequency depends on the amplitude" if changes else "model: one frequency"
+    law = line_of(model, grid * factor, shift * (phase.rate(grid) - mean))
+    stretches = Series("a stretch of the run", size * factor, shift * (slope - mean), u=shift * u)
+    label = f"(frequency − {mean / (2.0 * np.pi):.5g} Hz) / mHz"
+    panel = Panel(label, (law, stretches), x_label=value_label("amplitude", a.track.unit))
+    found = "changes" if changes else "is constant"
+    caption = f"Frequency of stretches of the run ± u; in the fitted model it {found}."
+    return Chart("frequency", "Frequency against amplitude", caption, (panel,))
+
+
+def spectrum(a: Analysis) -> Chart | None:
+    """Amplitude spectra of the recording and of the residuals of its fit, with the highest peaks."""
+    if not isinstance(a.motion, Oscillation) or (found := spectrum_of(a, a.motion)) is None:
+        return None
+    f, whole, left = found
+    factor, best = SHOWN[a.track.unit].factor, peaks_of(whole)
+    floor = float(np.median(left[left > 0])) if (left > 0).any() else float(whole.max()) * 1e-6
+    lines = (
+        line_of("residuals of the fit", f, left * factor, "other"),
+        Series("recording", f, whole * factor, line=True),
+        Series("peaks", f[best], whole[best] * factor, "mark", why=tuple(f"{f[i]:.3g} Hz" for i in best)),
+    )
+    ends = (floor * factor / 20.0, float(whole.max()) * factor * 8.0)
+    panel = Panel(value_label("amplitude", a.track.unit), lines, x_label="frequency / Hz", log=True, range=ends)
+    caption = "Amplitude spectra (Hann window). A peak of the residuals is a motion that the fit does not describe."
+    return Chart("spectrum", "Spectrum", caption, (panel,))
+
+
+def drag(a: Analysis) -> Chart | None:
+    """Effective drag coefficient against amplitude, if scene and recording determine it."""
+    if not isinstance(a.motion, Oscillation):
+        return None
+    motion, unit = a.motion, a.track.unit
+    curve = motion.derived.drag_curve(motion.damping, motion.demodulated)
+    if curve is None:
+        return None
+    # The long error bar of a stretch with hardly any damping would compress everything else.
+    most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
+    ends = np.concatenate([curve.y - curve.u, curve.y + curve.u, curve.y_points - curve.u_points])
+    tops = curve.y_points + curve.u_points
+    low, high = min(0.0, max(float(np.min(ends)), -most)), min(float(np.max(tops, initial=0.0)), most)
+    high = max(high, float(np.max(curve.y + curve.u)))
+    series = _with_band(curve, SHOWN[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}")
+    shown = (low, high + 0.08 * (high - low))
+    panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
+    caption = (
+        "−dA/dt · 3π m/(2 ω ρ S A²): the coefficient of purely quadratic drag on the disc with the same energy loss, "
+        "that of the spring included. Where it depends on the amplitude, a constant does not describe the drag."
+    )
+    return Chart("drag", "Effective drag coefficient", caption, (panel,))
+
+
+def _with_band(curve: Curve, x: float, y: float, points: str, law: str) -> tuple[Series, ...]:
+    return (
+        band_of("± u of the law", x * curve.x, y * curve.y, y * curve.u),
+        line_of(law, x * curve.x, y * curve.y),
+        Series(points, x * curve.x_points, y * curve.y_points, u=y * curve.u_points),
+    )
+
+
+def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
+    """Mechanical energy with its band, means of its two parts, and the deviation of single amplitudes from the law."""
+    if not isinstance(a.motion, Oscillation):
+        return None
+    motion = a.motion
+    curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
+    if curve is None:
+        return None
+    parts = _energy_means(motion, smoothed or _smoothed(a)) if a.track.unit == "m" else ()
+    low, high = float(np.min(curve.y - curve.u)), float(np.max(curve.y))
+    law = np.interp(curve.x_points, curve.x, curve.y)
+    # Where friction has stopped the motion, the law predicts no energy for comparison.
+    there, moves = law > 0.0, curve.y > 0.0
+    off = 100.0 * (curve.y_points[there] / law[there] - 1.0)
+    width = 100.0 * curve.u[moves] / curve.y[moves]
+    label = "energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)"
+    series = _with_band(curve, 1.0, 1e3, "from single amplitudes", f"law {motion.damping.selected}")
+    above = Panel(label, (*series, *parts), 2.6, log=low < high / 20.0 if low > 0.0 else None)
+    band = band_of("± u of the law", curve.x[moves], np.zeros(width.size), width)
+    points = Series("deviation", curve.x_points[there], off, u=100.0 * curve.u_points[there] / law[there])
+    below = Panel("deviation / %", (band, points), 1.3, zero=True)
+    mass = motion.derived.effective_mass_kg
+    of = f"the mass that oscillates, {pretty(mass)}" if mass is not None else "one kilogram, as no mass was given"
+    caption = f"Energy m ω² A²/2 of {of}; below, the deviation of single amplitudes from the law."
+    return Chart("energy", "Energy", caption, (above, below))
+
+
+def _energy_means(motion: Oscillation, smoothed: Smoothed | None) -> tuple[Series, ...]:
+    """Means of kinetic and potential energy over whole periods: each is half of the energy."""
+    stiffness = motion.derived.half_stiffness
+    if stiffness is None or smoothed is None:
+        return ()
+    rows = np.flatnonzero(np.isfinite(smoothed.position))
+    rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
+    t, f = smoothed.t[rows], motion.cycles.frequency_hz
+    together = max(1, int(np.ceil(motion.cycles.count / MOST_MEANS)))
+    turn = np.floor((t - t[0]) * f / together).astype(np.intp)
+    counts = np.bincount(turn)
+    whole = counts >= np.median(counts) - 1  # a period is not a whole number of samples
+    times = np.bincount(turn, t)[whole] / counts[whole]
+    # Both energies use the same constant, because m v^2 / 2 = k (v/omega)^2 / 2.
+    squares = {
+        "kinetic, mean of a period": (smoothed.velocity[rows] / motion.phase.angular_frequency.value) ** 2,
+        "potential, mean of a period": (smoothed.position[rows] - motion.rest.at(t)) ** 2,
+    }
+    means = {name: 1e3 * stiffness.value * np.bincount(turn, x)[whole] / counts[whole] for name, x in squares.items()}
+    # The means lie on one line, so their points alternate and neither covers the other.
+    return tuple(Series(name, times[i::2], y[i::2], "other") for i, (name, y) in enumerate(means.items()))
+
+
+def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
+    """Velocity and acceleration, and the difference of the velocity from the fitted law in its band of u."""
+    smoothed, unit = smoothed or _smoothed(a), a.track.unit
+    if smoothed is None or not isinstance(a.motion, Oscillation):
+        return None
+    rows = np.flatnonzero(np.isfinite(smoothed.position))
+    rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
+    rows = rows[:: max(1, round(a.track.rate_hz / a.motion.cycles.frequency_hz / PER_PERIOD))]
+    t, velocity, u = smoothed.t[rows], smoothed.velocity[rows], smoothed.u_velocity[rows]
+    names = ("velocity", "acceleration") if unit == "m" else ("derivative", "2nd derivative")
+    k = SHOWN[unit].factor
+    off = k * (velocity - model_motion(a.motion, t)[1])
+    band = rows.size // 400 + 1  # u changes slowly
+    first = [line_of(names[0], t, velocity)]
+    if a.track.velocity is not None:
+        first.append(Series("as recorded", t, np.where(_used(a), a.track.velocity, np.nan)[rows]))
+    around = band_of(f"± u of the {names[0]}", t[::band], np.zeros(t[::band].size), k * u[::band])
+    label = "v − law / (mm/s)" if unit == "m" else rate_label("deviation", 1, unit)
+    panels = (
+        Panel(rate_label(names[0], 1, unit), tuple(first)),
+        Panel(rate_label(names[1], 2, unit), (line_of(names[1], t, smoothed.acceleration[rows]),), 1.6),
+        Panel(label, (around, line_of(f"{names[0]} − law", t, off)), 1.3, zero=True),
+    )
+    caption = (
+        f"{names[0].capitalize()} and {names[1]} from the fit, not by differences of neighbours; below, the "
+        f"difference from the fitted law, with ±u. motion.csv holds them with their uncertainties at every sample."
+    )
+    end = float(t[0]) + DETAIL_PERIODS / a.motion.cycles.frequency_hz
+    return Chart("motion", "Velocity and acceleration", caption, panels, end if end < t[-1] else None)
+
+
+def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
+    """Velocity against displacement: turns of the fitted motion, and the values of samples."""
+    if not isinstance(a.motion, Oscillation):
+        return None
+    motion, track, unit = a.motion, a.track, a.track.unit
+    factor, period = SHOWN[unit].factor, 2.0 * np.pi / a.motion.phase.angular_frequency.value
+    size = motion.demodulated.amplitude
+    wanted = 32.0 * float(np.ptp(size) / np.max(size))
+    step = max(1, int(np.ceil(motion.cycles.count / min(max(wanted, LEAST_TURNS), MOST_TURNS))))
+    inside = (a.flags & Quality.OUTSIDE) == 0
+    first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
+    recorded = track.velocity is not None and np.isfinite(track.velocity).any()
+    smoothed = smoothed or _smoothed(a)
+    moving = track.velocity if recorded else np.nan if smoothed is None else smoothed.velocity
+    velocity = np.where(_used(a), np.asarray(moving, np.float64), np.nan)
+    words = "samples, velocity as recorded" if recorded else "samples, velocity by the fit"
+    displacement, turn = track.y - motion.rest.at(track.t), np.floor((track.t - first) / period)
+    seen = np.flatnonzero(np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, step) == 0))
+    turns = []
+    for start in np.arange(first, end, period * step).tolist():
+        t = np.linspace(start, min(start + period, end), 49)
+        turns.append(np.column_stack(model_motion(motion, t)))
+        turns.append(np.full((1, 2), np.nan))  # lifts the pen
+    line = np.concatenate(turns)
+    fastest = 1.1 * float(np.nanmax(np.abs(line[:, 1])))
+    series = (
+        Series(words, displacement[seen] * factor, velocity[seen], "rest"),
+        line_of("fitted motion", line[:, 0] * factor, line[:, 1]),
+    )
+    label = rate_label("velocity" if unit == "m" else "derivative", 1, unit)
+    x_label = value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit)
+    panel = Panel(label, series, 4.4, x_label, equal=True, range=(-fastest, fastest))
+    caption = "Velocity against displacement from rest." + (f" One turn in {step} is drawn." if step > 1 else "")
+    return Chart("phase", "Phase plot", caption, (panel,))
+
+
+def classic_method(a: Analysis, classic: Classic) -> Chart | None:
+    """The lab report's choices over this analysis: two maxima, two extremes, sliding windows and their exponential."""
+    own = amplitude(a, [a.motion.damping.selected]) if isinstance(a.motion, Oscillation) else None
+    if own is None:
+        return None
+    factor, period = SHOWN[a.track.unit].factor, classic.estimates["period"].value
+    start, end = (float(classic.crests_t[i]) + s * 0.75 * period for i, s in ((0, -1), (-1, 1)))
+    near = np.flatnonzero(_used(a) & (a.track.t >= start) & (a.track.t <= end))
+    if not near.size:
+        return None
+    chosen = np.array([0, CYCLES])
+    picked = f"picked maxima, {CYCLES} periods apart"
+    t, y = classic.crests_t[chosen], classic.crests_y[chosen] * factor
+    extremes = [factor * each for _, each in classic.extremes]
+    span = np.array([a.track.t[near[0]], a.track.t[near[-1]]])
+    picks = (
+        Series("samples used", a.track.t[near], a.track.y[near] * factor),
+        Series(picked, t, y, "mark", why=("", "")),
+        *(line_of("extremes of the whole recording", span, np.full(2, x), "other") for x in extremes),
+    )
+    above = Panel(value_label("position", a.track.unit), picks, x_label="time of the picked maxima / s")
+    every = slice(None, None, classic.window_t.size // MOST_SLIDING + 1)
+    times, amplitudes = classic.window_t[every], factor * classic.window_amplitude[every]
+    sliding = line_of("half the range in 1.5 s", times, amplitudes, "rest")
+    fitted = line_of("its exponential", times, factor * classic.exponential()[every], "other")
+    both = np.concatenate([sliding.y, fitted.y])
+    ends = (float(np.min(both)), 1.05 * float(np.max(both)))
+    below = Panel(own.panels[0].label, (*own.panels[0].series, sliding, fitted), range=ends)
+    caption = (
+        "The lab report's method on this recording, for comparison only. Above, its maxima and extremes; below, half "
+        "the range within 1.5 s of every sample and its exponential, with the amplitudes and the law of this analysis."
+    )
+    return Chart("classic", "The lab report's method", caption, (above, below))
+
+
+def _smoothed(a: Analysis) -> Smoothed | None:
+    """Return the motion at every sample, or None if the recording does not allow it."""
+    try:
+        found = a.smoothed()
+    except AnalysisError:
+        return None
+    return found if np.isfinite(found.position).any() else None
+
+
+CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
+    "position": position,
+    "amplitude": amplitude,
+    "frequency": frequency,
+    "spectrum": spectrum,
+    "drag": drag,
+    "energy": energy,
+    "motion": motion,
+    "phase": phase,
+}
+"""The charts of a run by name, in the report's order; the classic method needs its own analysis."""
+
+
+def charts_of(
+    a: Analysis,
+    notes: Sequence[Note] = (),
+    classic: Classic | None = None,
+    smoothed: Smoothed | None = None,
+) -> dict[str, Chart]:
+    """Return all charts that a run allows, in the report's order; only the position if nothing oscillates."""
+    smoothed = smoothed or _smoothed(a)
+    makers: dict[str, Callable[[Analysis], Chart | None]] = {
+        **CHARTS,
+        "position": partial(position, notes=notes),
+        "energy": partial(energy, smoothed=smoothed),
+        "motion": partial(motion, smoothed=smoothed),
+        "phase": partial(phase, smoothed=smoothed),
+    }
+    charts = {name: make(a) for name, make in makers.items()}
+    if classic is not None:
+        charts["classic"] = classic_method(a, classic)
+    return {name: chart for name, chart in charts.items() if chart is not None}

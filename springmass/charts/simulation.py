@@ -1,0 +1,135 @@
+"""Charts of a simulation: forward and symplectic Euler as in the lab report, beside the exact solution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.dynamics import Trajectory
+from pipeline.dynamics.band import Band
+from pipeline.track import F8
+from springmass.charts.chart import Chart, Panel, Series, band_of, line_of
+from springmass.runs.simulating.eulers import EULERS, Eulers, beside_exact
+from springmass.runs.simulating.simulation import Against, Simulation
+
+PERIODS, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
+POINTS = 1500
+GROWN = 1e6  # multiple of the starting amplitude above which curves are cut off
+
+
+def simulation(found: Simulation, mass_kg: float | None) -> tuple[Chart, ...]:
+    """Return the charts of a simulation; without a mass, the energy is that of one kilogram."""
+    runs = beside_exact(found)
+    exact = runs.exact
+    period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
+    turns = max(2, int(TURNS * period / exact.spacing_s) + 1)
+    end = PERIODS * period if exact.t[-1] > 2 * PERIODS * period else None
+    of_position = _both(runs, "y / mm", lambda of, n: (of.t[:n], of.y[:n] * 1e3))
+    of_velocity = _both(runs, "v / (m/s)", lambda of, n: (of.t[:n], of.v[:n]))
+    label = "E / mJ" if mass_kg is not None else "E per mass / (mJ/kg)"
+    of_energy = _both(runs, label, lambda of, n: _energy(of, n, mass_kg), log=True)
+    shown = slice(0, turns)
+    of_phase = _both(runs, "v / (m/s)", lambda of, n: (of.y[:n][shown] * 1e3, of.v[:n][shown]), equal=True)
+    beside = "Each method beside the exact motion."
+    return (
+        Chart("position", "Position", beside, of_position, end),
+        Chart("velocity", "Velocity", beside, of_velocity, end),
+        Chart("energy", "Energy", beside, of_energy),
+        Chart("phase", "Phase plot", f"The first {TURNS} turns of each method.", of_phase),
+        Chart("error", "Error of each method", "Largest difference so far from the exact motion.", _error(found, runs)),
+    )
+
+
+def _both(
+    runs: Eulers,
+    label: str,
+    values: Callable[[Trajectory, int], tuple[F8, F8]],
+    *,
+    log: bool | None = None,
+    equal: bool = False,
+) -> tuple[Panel, ...]:
+    """Return a panel for each method; ``values`` takes a trajectory and the number of its rows."""
+    panels = []
+    for (_, words), run in zip(EULERS, runs.eulers, strict=True):
+        x, y = values(run, len(run.y))
+        beside_x, beside_y = values(runs.exact, len(run.y))
+        series = (Series(words, x, y, line=True), line_of(runs.words, beside_x, beside_y))
+        grows = log and float(np.min(y)) > 0.0 and float(np.max(y)) > 20.0 * float(np.max(beside_y))
+        height, x_label = (3.6, "displacement y / mm") if equal else (2.4, "time / s")
+        panels.append(Panel(f"{words}: {label}", series, height, x_label, log=log and bool(grows), equal=equal))
+    return tuple(panels)
+
+
+def _energy(of: Trajectory, count: int, mass_kg: float | None) -> tuple[F8, F8]:
+    """Return times and energies in mJ, up to the end of a run or until its amplitude exceeds ``GROWN``."""
+    relative = of.relative_energy()[:count]
+    grown = np.flatnonzero(relative > GROWN**2)
+    end = max(2, int(grown[0])) if grown.size else count
+    rows = np.unique(np.linspace(0, end - 1, min(end, POINTS)).astype(np.intp))
+    start = of.problem.amplitude_m() * of.problem.equation.angular_frequency_per_s
+    return of.t[rows], 0.5e3 * (1.0 if mass_kg is None else mass_kg) * start * start * relative[rows]
+
+
+def _error(found: Simulation, runs: Eulers) -> tuple[Panel, ...]:
+    """Return running maxima of the errors, because an error crosses zero twice per period."""
+    start = found.problem.amplitude_m() or 1.0
+    curves = [(run, words) for run, (_, words) in zip(runs.eulers, EULERS, strict=True)]
+    if found.solution.integrator.name not in [name for name, _ in EULERS] and found.trajectory is not runs.exact:
+        curves.append((found.trajectory, found.solution.integrator.words))
+    series = []
+    for run, words in curves:
+        error = np.maximum.accumulate(np.abs(run.y - runs.exact.y[: len(run.y)])) / start
+        drawn = np.flatnonzero((error > 0) & (error < GROWN))
+        rows = drawn[np.unique(np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp))]
+        series.append(line_of(words, run.t[rows], error[rows], "other"))
+    predicted = found.solution.error
+    if predicted is not None and 0.0 < predicted < GROWN:
+        ends = runs.exact.t[[0, -1]]
+        series.append(line_of("predicted", ends, np.full(2, predicted)))
+    return (Panel("largest error so far / amplitude", tuple(series), 3.0, log=True),)
+
+
+def against(found: Against) -> Chart:
+    """A measured run with its prediction and the band from the uncertain inputs, and the residuals."""
+    bands = [] if found.band is None else _bands(found.t, found.band, 1e3)
+    over = [] if found.band is None else _bands(found.t, found.band + found.predicted, 1e3)
+    predicted = line_of("predicted", found.t, found.predicted * 1e3)
+    measured = Series("measured", found.t, found.measured * 1e3)
+    residual = Series("residual", found.t, (found.measured - found.predicted) * 1e3)
+    panels = (
+        Panel("distance / mm", (*over, predicted, measured)),
+        Panel("residual / mm", (*bands, residual), 1.6, zero=True),
+    )
+    return Chart("against", "Measured and predicted", "The measured run over the prediction of its scene.", panels)
+
+
+def band(found: Simulation, spread: Band) -> Chart:
+    """Motion, amplitude and phase with the band from the scene's uncertainties, and the band alone."""
+    end = float(found.trajectory.t[-1])
+    # The motion is drawn for the last periods, where the grid is fine enough; amplitude and band for the whole run.
+    period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
+    last: F8 = np.linspace(max(0.0, end - PERIODS * period), end, POINTS)
+    whole = spread.t[spread.t <= end]
+    amplitude, of_amplitude = spread.amplitude_at(whole)
+    middle = found.trajectory.at(last)
+    law, late = "the scene's values", "time in the last periods / s"
+    motion = (*_bands(last, middle + spread.displacement_at(last), 1e3), line_of(law, last, middle * 1e3))
+    size = (*_bands(whole, of_amplitude, 1e3), line_of(law, whole, amplitude * 1e3))
+    panels = (
+        Panel("displacement / mm", motion, 2.0, late),
+        Panel("amplitude / mm", size, 1.6),
+        Panel("phase / rad", tuple(_bands(whole, spread.phase_at(whole), 1.0)), 1.6),
+        Panel("band / mm", tuple(_bands(whole, spread.displacement_at(whole), 1e3)), 1.6),
+    )
+    return Chart("band", "Band", "Where 68 % and 95 % of all such benches would be.", panels)
+
+
+def _bands(t: F8, levels: F8, factor: float) -> list[Series]:
+    """Return the bands between the quantiles (4, n) of 95 % and 68 %."""
+    bands = []
+    for low, high, share in ((0, 3, 95), (1, 2, 68)):
+        middle, half = 0.5 * (levels[high] + levels[low]), 0.5 * (levels[high] - levels[low])
+        bands.append(band_of(f"{share} %", t, middle * factor, half * factor))
+    return bands
