@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -195,14 +195,15 @@ def assembled(
     residual = track.y - position
     left = residual if used.all() else residual[used]
 
-    def moving() -> F8:
-        growth = best.law.rate(amplitude, best.joint.values)
-        return np.asarray(growth * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
-
     rms_m = math.sqrt(float(left @ left) / left.size)
     whole = position + disturbances.position if disturbances else position
-    waveform = Waveform(whole, moving, residual, rms_m)
+    waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, angle), residual, rms_m)
     return Fitted(windows, disturbances, damping, phase, rest, waveform, method, "")
+
+
+def _velocity(best: LawFit, phase: Phase, amplitude: F8, angle: F8) -> F8:
+    growth = best.law.rate(amplitude, best.joint.values)
+    return np.asarray(growth * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
 
 
 def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:

@@ -291,5 +291,5 @@ def _described(
     windows = replace(windows, flags=flags, residual=residual, noise=noise)
     # The rest position is the constant one of the record; the place where friction holds the bob may differ.
     rest = Rest(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
-    waveform = Waveform(position, lambda: model.motion.velocity(rows.t, theta), residual, rms_m)
+    waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms_m)
     return Fitted(windows, Disturbances.nothing(samples), damping, phase, rest, waveform, "equation", why)
