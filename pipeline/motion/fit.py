@@ -28,6 +28,7 @@ Bools = NDArray[np.bool_]
 # with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
 STEADY = 1e-4
 MORE_THAN_NOISE = 1.5  # ratio of residuals to noise above which no sample is excluded by its size
+DEPENDENT = 1e-13  # eigenvalue, relative to the largest, below which columns count as linearly dependent
 FEWEST_PERIODS = 8  # minimum number of periods whose sums show how far residuals are correlated
 
 
@@ -75,7 +76,7 @@ class Rows:
     def residuals(self, model: Model) -> Callable[[F8], tuple[F8, Callable[[], F8]]]:
         """Return a function of the parameters that gives the residuals over u and their derivatives."""
         t, y = self.t[self.used], self.y[self.used]
-        base = None if self.columns is None else np.linalg.qr(self.columns[self.used])[0]
+        base = None if self.columns is None else self.columns[self.used] @ self._turn()
 
         def beyond(values: F8) -> F8:
             return values if base is None else values - base @ (base.T @ values)
@@ -91,8 +92,21 @@ class Rows:
         left = self.y - model.at(self.t, values)[0]
         if self.columns is None:
             return np.asarray(left)
-        base, turn = np.linalg.qr(self.columns[self.used])
-        return np.asarray(left - self.columns @ np.linalg.lstsq(turn, base.T @ left[self.used], rcond=1e-13)[0])
+        turn = self._turn()
+        return np.asarray(left - self.columns @ (turn @ (turn.T @ (self.columns[self.used].T @ left[self.used]))))
+
+    def _turn(self) -> F8:
+        """Return the matrix that makes the columns of the samples used orthonormal, less those that depend on others.
+
+        The eigenvectors of the normal matrix take 0.5 ms for 28 columns of 12,000 rows; a decomposition takes 20 ms.
+        """
+        assert self.columns is not None
+        part = self.columns[self.used]
+        normal = part.T @ part
+        scale = np.maximum(np.sqrt(np.diag(normal)), 1e-300)
+        values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+        kept = values > DEPENDENT * values[-1]
+        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])
 
 
 def fit(model: Model, rows: Rows, start: F8, steps: int = STEPS) -> Fit:
