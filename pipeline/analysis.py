@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from pipeline.bench.scene import Scene
 from pipeline.checks.echoes import count_quality
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.averaged import Fitted
 from pipeline.motion.overdamped import Overdamped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
@@ -25,29 +25,22 @@ from pipeline.windows.cycles import Cycles
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Oscillation(Fitted):
-    """An oscillation, strongly damped or not: its fit and the results derived from it.
-
-    Parameters
-    ----------
-    cycles : Cycles
-    derived : Derived
-    """
+    """An oscillation, strongly damped or not: its fit and the results derived from it."""
 
     cycles: Cycles
     derived: Derived
 
+    @classmethod
+    def of(cls, fitted: Fitted, cycles: Cycles, derived: Derived) -> Oscillation:
+        """Return a fit with its results."""
+        return cls(**{each.name: getattr(fitted, each.name) for each in fields(fitted)}, cycles=cycles, derived=derived)
+
 
 @dataclass(frozen=True, slots=True)
 class Still:
-    """A recording without a motion that the stages can fit.
+    """A recording without a motion that the stages can fit."""
 
-    Parameters
-    ----------
-    why : str
-        The reason, one sentence.
-    """
-
-    why: str
+    why: str  # the reason, one sentence
 
 
 Motion = Oscillation | Overdamped | Still

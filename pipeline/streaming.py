@@ -19,51 +19,27 @@ from pipeline.track import F8, U8, Track
 
 @dataclass(frozen=True, slots=True)
 class LiveMotion:
-    """The motion in the latest seconds.
+    """The motion in the latest seconds."""
 
-    Parameters
-    ----------
-    period, amplitude, offset, noise : Estimate
-        The estimates of :func:`pipeline.analyse.analyse` for the stored samples; the amplitude is that at their start.
-    seconds : float
-        Time from the first to the last stored sample, s.
-    """
-
+    # period, amplitude, offset, noise: the estimates of :func:`pipeline.analyse.analyse` for the stored samples; the
+    # amplitude is that at their start.
     period: Estimate
     amplitude: Estimate
     offset: Estimate
     noise: Estimate
-    seconds: float
+    seconds: float  # time from the first to the last stored sample, s
 
 
 @dataclass(frozen=True, slots=True)
 class NotYet:
-    """The reason why no value is available yet.
+    """The reason why no value is available yet."""
 
-    Parameters
-    ----------
-    why : str
-        The reason, in one line.
-    """
-
-    why: str
+    why: str  # the reason, in one line
 
 
 class MotionAccumulator:
     """Buffer of the latest samples, analysed on request.
 
-    Parameters
-    ----------
-    rate_hz : float
-        Nominal samples per second, Hz.
-    window_s : float
-        Duration of the stored samples, s.
-    options : pipeline.options.Options, optional
-    quantity, unit : str
-        Recorded quantity and its unit.
-
-    Notes
-    -----
     The memory needed depends on the window and not on the length of the run. A value over 10 s at 100 Hz takes a few
     milliseconds, so one value a second uses less than a hundredth of a core.
     """

@@ -48,8 +48,6 @@ def saturation_pressure(temperature_c: float) -> float:
 def air_density(temperature_c: float, pressure_pa: float = 101325.0, relative_humidity: float = 0.0) -> float:
     """Return the density of humid air, kg/m^3, by CIPM-2007 [1]_ (600 to 1100 hPa, 15 to 27 degC).
 
-    Examples
-    --------
     >>> round(air_density(20.0), 4)
     1.2046
     """
@@ -88,8 +86,6 @@ def _compressibility(t: float, p: float, x: float) -> float:
 def air_viscosity(temperature_c: float, pressure_pa: float = 101325.0) -> float:
     """Return the dynamic viscosity of dry air, Pa s, by Lemmon and Jacobsen's equation [3]_.
 
-    Examples
-    --------
     >>> round(air_viscosity(20.0) * 1e6, 2)
     18.21
     """
@@ -107,8 +103,6 @@ def air_viscosity(temperature_c: float, pressure_pa: float = 101325.0) -> float:
 def speed_of_sound(temperature_c: float, pressure_pa: float = 101325.0, relative_humidity: float = 0.0) -> float:
     """Return the speed of sound in humid air, m/s, by Cramer's equation [2]_ (0 to 30 degC, 75 to 102 kPa).
 
-    Examples
-    --------
     >>> round(speed_of_sound(20.0), 1), round(speed_of_sound(20.0, relative_humidity=1.0), 1)
     (343.4, 344.6)
     """

@@ -21,51 +21,22 @@ bytes by up to 16 ms (FTDI AN232B-04), and a host that becomes busy wakes its re
 
 @dataclass(frozen=True, slots=True)
 class Instrument:
-    """Clock and scale of the sensor.
+    """Clock and scale of the sensor."""
 
-    Parameters
-    ----------
-    clock : str
-        Source of the times: "nominal", "device" or "host".
-    clock_rate : Estimate
-        Factor on every frequency; its value is 1 unless frequencies are corrected to the host's clock.
-    clock_words : str
-        Origin of the rate, for the effects table.
-    clock_refused : bool
-        Whether the clocks differ by more than both their errors allow, or held readings prevented a comparison.
-    speed_of_sound_m_per_s : float or None
-        Speed of sound used for the distances, m/s.
-    u_scale : float
-        Relative standard uncertainty of the scale from a calibration; 0 without a calibration.
-    u_offset_m : float
-        Standard uncertainty of the zero, m.
-    """
-
-    clock: str
+    clock: str  # source of the times: "nominal", "device" or "host"
+    # Factor on every frequency; its value is 1 unless frequencies are corrected to the host's clock.
     clock_rate: Estimate
-    clock_words: str
-    speed_of_sound_m_per_s: float | None = None
-    u_scale: float = 0.0
-    u_offset_m: float = 0.0
+    clock_words: str  # origin of the rate, for the effects table
+    speed_of_sound_m_per_s: float | None = None  # speed of sound used for the distances, m/s
+    u_scale: float = 0.0  # relative standard uncertainty of the scale from a calibration; 0 without a calibration
+    u_offset_m: float = 0.0  # standard uncertainty of the zero, m
+    # Whether the clocks differ by more than both their errors allow, or held readings prevented a comparison.
     clock_refused: bool = False
 
     @classmethod
     def of(cls, track: Track, *, u_crystal: float = U_CRYSTAL) -> Instrument:
         """Return the clock and scale that a track states for its sensor.
 
-        Parameters
-        ----------
-        track : Track
-        u_crystal : float
-            Relative standard uncertainty of a clock from its crystal's specification.
-
-        Raises
-        ------
-        TrackError
-            If an uncertainty or a limit is negative or not finite, or a measured rate error has no uncertainty.
-
-        Notes
-        -----
         A clock that was not compared with another is known only to its crystal's specification. A comparison of the
         sensor's clock with the host's gives their difference but not which of them is right. So it changes nothing as
         long as both can meet their specifications. If the difference exceeds three standard uncertainties, the host is
@@ -81,8 +52,6 @@ class Instrument:
         the comparison cannot exclude a clock at its limit. Its own uncertainty is then added, up to that of the limit;
         without any comparison, the limit itself counts as the half-width.
 
-        Examples
-        --------
         >>> track = Track.from_arrays([0.0, 0.01], [0.2, 0.2])
         >>> print(Instrument.of(track).clock_rate)
         1.000000 +- 0.000029

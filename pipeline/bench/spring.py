@@ -16,26 +16,13 @@ SERIES = 1e-4  # ratio of spring mass to load up to which the series is exact to
 def oscillating_mass_kg(spring_kg: float, load_kg: float) -> float:
     """Return the mass M, kg, for which k = omega^2 M is valid for a load on a uniform spring.
 
-    Parameters
-    ----------
-    spring_kg : float
-        Mass of the spring. The series is continued to negative values, which a fit may try.
-    load_kg : float
-        Mass of the load at its end; positive.
-
-    Notes
-    -----
     Waves along the spring give :math:`x \\tan x = m_s/m` with :math:`x = \\omega\\sqrt{m_s/k}`, whose smallest root
     gives :math:`k = \\omega^2 m_s/x^2`. For a light spring :math:`m_s/x^2 = m + m_s/3 + m_s^2/(45 m) - \\ldots`. With a
     third of the spring's mass, M is too small by the fraction 2.1e-4 for :math:`m_s/m = 0.1` and 42e-4 for 0.5.
 
-    References
-    ----------
     J. G. Fox, J. Mahanty, "The effective mass of an oscillating spring", Am. J. Phys. 38 (1970) 98,
     doi:10.1119/1.1976240.
 
-    Examples
-    --------
     >>> round(oscillating_mass_kg(0.1, 1.0) / (1.0 + 0.1 / 3.0) - 1.0, 6)
     0.00021
     """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.motion.phase import PhaseFit
+from pipeline.motion.averaged import Phase
 from pipeline.track import U8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
@@ -26,31 +26,18 @@ COUNTED = {
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """Clusters of false echoes.
+    """Clusters of false echoes."""
 
-    Parameters
-    ----------
-    count : int
-        Number of clusters.
-    samples : int
-        Number of false echoes in clusters.
-    turning : int
-        Number of clusters whose middle is within an eighth of a period of a turning point; half of them by chance.
-    shift_m : float
-        Increase of the mean amplitude if all false echoes were used, m.
-    """
-
-    count: int
-    samples: int
+    count: int  # number of clusters
+    samples: int  # number of false echoes in clusters
+    # Number of clusters whose middle is within an eighth of a period of a turning point; half of them by chance.
     turning: int
-    shift_m: float
+    shift_m: float  # increase of the mean amplitude if all false echoes were used, m
 
 
 def count_quality(flags: U8) -> dict[str, int]:
     """Return the number of samples with each flag, and the number of samples used.
 
-    Examples
-    --------
     >>> count_quality(np.array([0, 1, 2, 2], np.uint8))["false_echo"]
     2
     """
@@ -63,16 +50,6 @@ def count_quality(flags: U8) -> dict[str, int]:
 def echoes_by_chance(before: U8, demodulated: Demodulated, clip_sigmas: float) -> bool:
     """Return whether normal noise explains both the number and the size of the false echoes.
 
-    Parameters
-    ----------
-    before : (n,) uint8
-        Flags before the windows were fitted; false echoes among them are far from the motion.
-    demodulated : Demodulated
-    clip_sigmas : float
-        Number of standard deviations beyond which windows clip samples.
-
-    Notes
-    -----
     The number of n samples of normal noise beyond c standard deviations has a Poisson distribution with the mean
     :math:`n\\alpha`, :math:`\\alpha = 2\\Phi(-c)`. No sample lies beyond the quantile of :math:`10^{-3}/2n`. The noise
     of a window is known only to a tenth, so up to twice as many samples are clipped.
@@ -92,18 +69,9 @@ def echoes_by_chance(before: U8, demodulated: Demodulated, clip_sigmas: float) -
     )
 
 
-def find_clusters(track: Track, demodulated: Demodulated, phase: PhaseFit) -> Clusters:
+def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> Clusters:
     """Count clusters of false echoes.
 
-    Parameters
-    ----------
-    track : Track
-    demodulated : Demodulated
-        The demodulation, with its flags and the residuals of flagged samples.
-    phase : PhaseFit
-
-    Notes
-    -----
     The shift is the first-order change of a least-squares fit by the residuals r of the false echoes:
     :math:`2\\sum r_i\\cos\\varphi_i/N`. The sum is over the false echoes; N is the number of samples fitted, including
     them.

@@ -1,42 +1,32 @@
-"""Sensor: whether neighbouring samples are alike, because readings are held or smoothed."""
+"""The sensor: whether neighbouring samples are alike, because readings are held or smoothed."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.misfit import Misfit
-from pipeline.checks.residuals import Residuals
+from pipeline.checks.residual import Outcome, Residual
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
 ALIKE = 0.4  # correlation of neighbouring residuals that shows a filter: a running mean over two samples gives 0.5
 STEADY = 2.0  # maximum ratio of the covariances in the halves: noise is constant, residuals of the motion decay
+# Minimum fall of the correlation from one sample to the next, over the mean fall within the correlation length: 1 for a
+# running mean, 2 for a lag. A motion or a curve that is smooth by itself falls far less from the first to the second.
+CUSP = 0.5
 LINES = 1.8  # samples per bend, over those of white noise, above which readings are joined by lines
 STEPS = 2.4  # maximum bend by rounding, over the noise, up to which bends by noise show
 
 
-@dataclass(frozen=True, slots=True)
-class Smoothing:
-    """A sensor whose neighbouring samples are alike over a number of samples."""
-
-    correlation: float
-    samples: float
-    loss: float
-    late_s: float
-    misfit: Misfit
-
-
-def held_count(conditioned: Conditioned) -> int:
+def held_count(samples: Conditioned) -> int:
     """Return the number of samples over which each reading is held; 1 if every sample is new.
 
     Readings in coarse steps are repeated too, but they change at any row. Held ones change only at every k-th row.
     """
-    y = conditioned.track.y[conditioned.used]
+    y = samples.track.y[samples.used]
     changes = np.flatnonzero(np.diff(y))
     if not 8 <= changes.size <= 0.6 * y.size:
         return 1
@@ -48,52 +38,80 @@ def held_count(conditioned: Conditioned) -> int:
     return 1
 
 
-def held(conditioned: Conditioned, residuals: Residuals) -> Misfit | None:
-    """Return the effect of readings that are held over N samples, or joined by straight lines; None without either.
+def held_numbers(count: int, step_s: float) -> dict[str, float | None]:
+    """Return how often a sensor slower than its recording repeats each value; 1 means that they are joined by lines."""
+    if count == 1:
+        return {}
+    return {"count": count, "interval_s": count * step_s, "late_s": 0.5 * step_s * (count - 1)}
+
+
+def held(residual: Residual) -> Outcome | None:
+    """Test for readings that are held over N samples, or joined by straight lines.
 
     Holding acts as one running mean over N samples, joining as two without delay.
     """
-    turn, count, late = residuals.radians_per_sample, float(held_count(conditioned)), 1.0
-    if count == 1.0:
-        y = conditioned.track.y[conditioned.used]
-        rounding = max(2.02 * (conditioned.quantum_m or 0.0), 1e-12 * float(np.ptp(y)))
+    if not residual.enough:
+        return None
+    samples, turn, late = residual.samples, residual.turn, 1.0
+    repeats = held_count(samples)
+    count = float(repeats)
+    if repeats == 1:
+        y = samples.track.y[samples.used]
+        rounding = max(2.02 * (samples.quantum_m or 0.0), 1e-12 * float(np.ptp(y)))
         # White noise of deviation s bends the line by more than x at a share erfc(x/(sqrt(12) s)) of the samples.
-        white = math.erfc(rounding / (math.sqrt(12.0) * max(residuals.noise_m, 1e-300)))
+        white = math.erfc(rounding / (math.sqrt(12.0) * max(residual.noise_m, 1e-300)))
         share = max(float(np.mean(np.abs(np.diff(y, 2)) > rounding)), 1e-3)
-        if rounding > STEPS * residuals.noise_m or share > white / LINES:
+        if rounding > STEPS * residual.noise_m or share > white / LINES:
             return None
         # A reading between two samples bends the line at both.
         count, late = 2.0 * white / share, 0.0
     loss = min((2.0 - late) * (count * turn) ** 2 / 24.0, 1.0)
-    amplitude_m, phase_rad = residuals.amplitude_m * loss, late * 0.5 * (count - 1.0) * turn
-    return Misfit(name="held_samples", amplitude_m=amplitude_m, phase_rad=phase_rad)
+    amplitude_m, phase_rad = residual.amplitude_m * loss, late * 0.5 * (count - 1.0) * turn
+    misfit = Misfit(name="held_samples", amplitude_m=amplitude_m, phase_rad=phase_rad)
+    return Outcome("held_samples", held_numbers(repeats, residual.step_s), misfit, lags=math.inf)
 
 
-def find_smoothing(residuals: Residuals, u_amplitude_m: float, stated: SensorFilter | None = None) -> Smoothing | None:
-    """Return how far neighbouring samples are alike; None if they are not, or if that affects no result.
+def smoothed(residual: Residual) -> Outcome | None:
+    """Test how far neighbouring samples are alike; None if that affects no result.
 
     A running mean over N samples correlates white noise over N samples, :math:`1 + 2\\sum\\rho_l = N`, takes
     :math:`(N\\omega h)^2/24` of the amplitude and is :math:`Nh/2` late. A first-order lag with the same sum takes
     three times as much and is as late. The correlations do not tell which it is, so the larger loss is taken. A filter
-    in the scene may explain a quarter of it.
+    in the scene may explain a quarter of it, and a scene that states no filter is believed.
+
+    A filter cannot make more of noise than its own correlation, which falls from the first sample on. Where it does
+    not, the residual is not noise that a filter has smoothed, and shows no filter.
     """
-    whole, mask = residuals.on_grid, residuals.used.astype(np.float64)
+    stated = residual.filter
+    if stated is not None and stated.mean_samples.value == 1.0 and stated.lag_s.value == 0.0:
+        return None
+    if not residual.enough or math.isinf(residual.lags) or not residual.noisy:
+        return None
+    whole, mask = residual.on_grid()
     halves = slice(whole.size // 2), slice(whole.size // 2, None)
     first, *each = (_neighbours(whole[rows], mask[rows]) for rows in (slice(None), *halves))
     variance = float(whole @ whole) / max(float(mask.sum()), 1.0)
     if not (variance > 0.0 and first > ALIKE * variance and 0.0 < max(each) < STEADY * min(each)):
         return None
-    count, turn = correlation_length(whole), residuals.radians_per_sample
-    # The fit of a window has taken away three of its L/N independent values.
-    count /= max(1.0 - 3.0 * count / residuals.samples_per_window, 0.25)
-    loss = min((count * turn) ** 2 / 8.0, 1.0)
-    expected = 0.0 if stated is None else 1.0 - stated.gain(turn / residuals.interval_s)
-    if loss * residuals.amplitude_m < 0.5 * u_amplitude_m or loss < 4.0 * expected:
+    count, turn = correlation_length(whole), residual.turn
+    if (1.0 - first / variance) * count < CUSP:
         return None
-    misfit = Misfit(
-        name="sensor_smoothing", amplitude_m=residuals.amplitude_m * loss, phase_rad=0.5 * (count - 1.0) * turn
-    )
-    return Smoothing(first / variance, count, loss, 0.5 * (count - 1.0) * residuals.interval_s, misfit)
+    # The fit of a window has taken away three of its L/N independent values.
+    count /= max(1.0 - 3.0 * count / residual.per_window, 0.25)
+    loss = min((count * turn) ** 2 / 8.0, 1.0)
+    expected = 0.0 if stated is None else 1.0 - stated.gain(turn / residual.step_s)
+    u_amplitude_m = residual.fitted.damping.best.joint["A0"].u
+    if loss * residual.amplitude_m < 0.5 * u_amplitude_m or loss < 4.0 * expected:
+        return None
+    late = 0.5 * (count - 1.0)
+    misfit = Misfit(name="sensor_smoothing", amplitude_m=residual.amplitude_m * loss, phase_rad=late * turn)
+    numbers = {
+        "correlation": first / variance,
+        "amplitude_loss": loss,
+        "late_s": late * residual.step_s,
+        "alike_samples": count,
+    }
+    return Outcome("smoothed_sensor", numbers, misfit, lags=math.ceil(2.0 * count))
 
 
 def _neighbours(values: F8, used: F8) -> float:

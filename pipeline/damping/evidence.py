@@ -14,11 +14,13 @@ from typing import Protocol
 
 import numpy as np
 
-from pipeline.damping.law_fit import LawFit, Minimum, Rejection, joint_of
+from pipeline.damping.law_fit import LawFit, Rejection, joint_of
 from pipeline.damping.laws import LAWS, Law
+from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 
+REJECTION = 1e-3  # probability with which chi-square rejects a true law
 # Difference of BIC below which evidence is "not worth more than a bare mention": Kass and Raftery, J. Am. Stat. Assoc.
 # 90 (1995) 773.
 BARE_MENTION = 2.0
@@ -29,51 +31,38 @@ SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # limits of the lower end of thi
 NEGATIVE = 2.0
 
 
-def least_chi2(fits: Mapping[str, Minimum], laws: Mapping[str, Law] = LAWS) -> dict[str, float]:
+def least_chi2(fits: Mapping[str, Fit], laws: Mapping[str, Law] = LAWS) -> dict[str, float]:
     """Return the minimum chi-square of each law without negative coefficients: its own or that of a special case."""
     least: dict[str, float] = {}
     for name in sorted(fits, key=lambda name: len(laws[name].parameters)):
         fit = fits[name]
-        least[name] = fit.chi2
-        if fit.theta.min() < 0.0:
+        least[name] = fit.cost
+        if fit.values.min() < 0.0:
             with np.errstate(divide="ignore", invalid="ignore"):
-                below = np.minimum(fit.theta, 0.0) ** 2 / np.diag(fit.covariance)
+                below = np.minimum(fit.values, 0.0) ** 2 / np.diag(fit.covariance)
             cases = [least[case] for case in laws[name].cases if case in least]
             # If no special case was fitted: the increase of chi-square if the most negative coefficient is set to zero.
-            least[name] = min(cases) if cases else fit.chi2 + float(np.max(below))
+            least[name] = min(cases) if cases else fit.cost + float(np.max(below))
     return least
 
 
-def weigh(law: Law, fit: Minimum, least_chi2: float, points: int, correlation: float, rejection_level: float) -> LawFit:
-    """Test the fit of one law against the points.
+def weigh(law: Law, fit: Fit, least_chi2: float, points: int, correlation: float, unit: str) -> LawFit:
+    """Test the fit of one law against a number of points, of which ``correlation`` count as one.
 
-    Parameters
-    ----------
-    law : Law
-    fit : Minimum
-    least_chi2 : float
-        The law's value from :func:`least_chi2`, for the BIC.
-    points : int
-        Number of points.
-    correlation : float
-        Correlation length: the number of points that count as one independent point.
-    rejection_level : float
-        Probability with which chi-square rejects a true law.
+    ``least_chi2`` is the law's value from :func:`least_chi2`, for the BIC.
     """
     count = len(law.parameters)
     covariance = correlation * fit.covariance
     free = points - count
     dof = max(free / correlation, 1.0) if free > 0 else 0.0
-    reduced = fit.chi2 / free if free > 0 else math.nan
+    reduced = fit.cost / free if free > 0 else math.nan
     bic = least_chi2 / correlation + count * math.log(max(points / correlation, 2.0))
     rejection: Rejection = ""
-    if dof > 0 and reduced * dof > chi2_quantile(1.0 - rejection_level, dof):
+    if dof > 0 and reduced * dof > chi2_quantile(1.0 - REJECTION, dof):
         rejection = "misfit"
-    elif np.any(fit.theta < -NEGATIVE * np.sqrt(np.diag(covariance))):
+    elif np.any(fit.values < -NEGATIVE * np.sqrt(np.diag(covariance))):
         rejection = "negative"
-    elif not fit.converged:
-        rejection = "not converged"
-    return LawFit(law, joint_of(law, fit.theta, covariance), reduced, dof, bic, fit.converged, rejection, fit.tried)
+    return LawFit(law, joint_of(law, fit.values, covariance, unit), reduced, dof, bic, rejection)
 
 
 class Weighed(Protocol):
@@ -114,16 +103,6 @@ def choose(fits: Mapping[str, Weighed], evidence: float, span: Callable[[str], F
 
     If all laws are rejected, the law that fits best is selected and no law is admissible.
 
-    Parameters
-    ----------
-    fits : mapping of str to fit
-    evidence : float
-        A law is not admissible if its BIC exceeds the lowest BIC by more than this.
-    span : callable
-        Returns the largest and the smallest amplitude, m, of a law over the points.
-
-    Notes
-    -----
     A law that contains the selected one as a special case is left out of the admissible laws on two conditions. Its
     further coefficient improves nothing: its BIC is higher by more than 2. Its damping, with twice its uncertainty, is
     within a tenth of the simpler law's at both ends of the span. The lower end of the span is at most a third of the

@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, choose
+from pipeline.damping.evidence import NEGATIVE, REJECTION, choose
 from pipeline.damping.law_fit import LawFit, rates_of
 from pipeline.damping.laws import Law, words_of
-from pipeline.damping.select import EVIDENCE, REJECTION, Damping
+from pipeline.damping.select import EVIDENCE, Damping
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Joint
 from pipeline.numerics.regression import chi2_quantile

@@ -1,10 +1,10 @@
-"""Fit of one damping law to one record: the minimum of chi-square, and results from it with their uncertainties."""
+"""Fit of one damping law to one record, and results from it with their uncertainties."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,70 +12,28 @@ import numpy as np
 from pipeline.damping.laws import Drag, Law, in_units, units_of
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.numerics.regression import covariance_of, solve_weighted
+from pipeline.numerics.least_squares import Fit
+from pipeline.numerics.regression import solve_weighted
 from pipeline.track import F8
 
-Rejection = Literal["", "misfit", "negative", "not converged"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Minimum:
-    """The result of the fit of one law.
-
-    Parameters
-    ----------
-    theta : (p,) float64
-        Parameters.
-    covariance : (p, p) float64
-        :math:`(J^T J)^{-1}` from the standard uncertainties of the points; infinite if they do not determine the law.
-    chi2 : float
-    converged : bool
-    tried : str
-        What was tried if the fit did not converge.
-    """
-
-    theta: F8
-    covariance: F8
-    chi2: float
-    converged: bool
-    tried: str
+Rejection = Literal["", "misfit", "negative"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LawFit:
     """The fit of one law to one record, and its test.
 
-    Parameters
-    ----------
-    law : Law
-    joint : Joint
-        Parameters with their covariance; the amplitude at the start is the first one.
-    reduced_chi2 : float
-        Reduced chi-square, with noise and excess scatter as uncertainties.
-    dof : float
-        Degrees of freedom, reduced for the correlation between points.
-    bic : float
-        Bayesian information criterion of the law's best fit without negative coefficients, up to a constant that is
-        the same for all laws.
-    converged : bool
-    rejection : {"", "misfit", "negative", "not converged"}
-        Why the law is rejected, if it is: chi-square is improbable, a coefficient is negative by more than two standard
-        uncertainties, or the fit did not converge.
-    tried : str
-        What was tried if the fit did not converge.
-    widening : float
-        Factor by which the covariance was multiplied because chi-square rejects the law; 1 if it does not.
+    A law is rejected if chi-square is improbable, or if a coefficient is negative by more than two standard
+    uncertainties.
     """
 
     law: Law
-    joint: Joint
-    reduced_chi2: float
-    dof: float
-    bic: float
-    converged: bool
+    joint: Joint  # parameters with their covariance; the amplitude at the start is the first one
+    reduced_chi2: float  # with noise and excess scatter as uncertainties
+    dof: float  # reduced for the correlation between points
+    bic: float  # of the best fit without negative coefficients, up to a constant that all laws share
     rejection: Rejection
-    tried: str = ""
-    widening: float = 1.0
+    widening: float = 1.0  # factor of the covariance because chi-square rejects the law
 
     @property
     def rejected(self) -> bool:
@@ -100,13 +58,13 @@ class LawFit:
         return self.law.curve(t, self.joint.values)[0]
 
     def u_amplitude(self, t: F8) -> F8:
-        """Return the standard uncertainty of :meth:`amplitude`, (n,) float64, m."""
+        """Return the standard uncertainty (n,) of :meth:`amplitude`."""
         _, jacobian = self.law.curve(t, self.joint.values)
         variance = np.einsum("ni,ij,nj->n", jacobian, self.joint.covariance, jacobian)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def rates(self, amplitude: F8) -> tuple[F8, F8]:
-        """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty, both (n,) in m/s."""
+        """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty."""
         return rates_of(self.law, amplitude, self.joint.values, self.joint.covariance)
 
     def rate_at_start(self) -> float:
@@ -128,13 +86,13 @@ class LawFit:
         return Estimate(self.rate_at_start(), math.sqrt(max(variance, 0.0)), "1/s")
 
 
-def joint_of(law: Law, theta: F8, covariance: F8) -> Joint:
-    """Return a law's parameters (p,) and their covariance (p, p) with names and units."""
-    return Joint(tuple(law.parameters), theta, covariance, units_of(law))
+def joint_of(law: Law, theta: F8, covariance: F8, unit: str = "m") -> Joint:
+    """Return a law's parameters (p,) and their covariance with names, and units for a record in a unit."""
+    return Joint(tuple(law.parameters), theta, covariance, units_of(law, unit))
 
 
 def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
-    """Return -dA/dt of a law at amplitudes (n,) in m, and its standard uncertainty, both in m/s."""
+    """Return -dA/dt of a law at amplitudes (n,) in m, and its standard uncertainty."""
     gradient = _slopes(lambda at: law.rate(amplitude, at), theta, covariance)
     variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
     return -law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
@@ -155,18 +113,10 @@ def _relative_rate(law: Law, theta: F8) -> float:
 
 
 def mean_squared_rate(fit: LawFit, amplitude: F8, weights: F8 | None = None) -> float:
-    """Return the mean decrease of the squared angular frequency by drag, 1/s^2.
+    """Return the mean decrease of the squared angular frequency by drag, 1/s^2, over amplitudes (n,).
 
-    Parameters
-    ----------
-    fit : LawFit
-    amplitude : (n,) float64, m
-        Amplitudes of the law; those that are 0 are ignored.
-    weights : (n,) float64, optional
-        Weights; by default the squared amplitudes, as in the fit of a straight line to the phases of windows.
+    The default weights are the squared amplitudes, as in the fit of a straight line to the phases of windows.
 
-    Notes
-    -----
     The decrease is calculated as :math:`r r'/A`, where :math:`r(A)` is :math:`-\\dot A` without dry friction. It is
     :math:`\\gamma^2` for linear drag. Friction does not change the frequency, with linear drag or without: it moves the
     rest position of a half-cycle but does not change its duration. Both statements are exact. For quadratic drag the
@@ -182,29 +132,15 @@ def mean_squared_rate(fit: LawFit, amplitude: F8, weights: F8 | None = None) -> 
     return float(np.sum(weights / amplitude**2 * rate * slope)) / (2e-4 * float(np.sum(weights)))
 
 
-def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:
-    """Fit a law to points by weighted least squares, starting from the law's own guess.
+def fit_law(law: Law, t: F8, y: F8, u: F8) -> Fit:
+    """Fit a law to at least as many points as it has parameters, starting from the law's own guess.
 
-    Parameters
-    ----------
-    law : Law
-        A law with at most as many parameters as points.
-    t, y, u : (n,) float64
-        Times in s in ascending order, amplitudes and their standard uncertainties in m.
-
-    Returns
-    -------
-    Minimum
-        The result of the fit; not finite if the numbers of the law overflowed.
-
-    Notes
-    -----
-    The search uses the root mean square of the amplitudes as the unit of length, so that the choice of metres does not
-    affect it.
+    The unit of length in the search is the root mean square of the amplitudes, so that the choice of metres does not
+    affect it. The result is not finite if the numbers of the law overflowed.
     """
     if len(law.parameters) == 1 and not law.rate(y, y[:1]).any():  # a constant amplitude is a mean and needs no search
         line = solve_weighted(np.ones((t.size, 1)), y, u)
-        return Minimum(line.values, line.covariance, line.chi2, True, "")
+        return Fit(line.values, line.covariance, line.residual / u, line.chi2, True, "", 1)
     length = math.sqrt(float(y @ y) / y.size) or 1.0
     at, inverse_u = y / u, length / u
 
@@ -215,14 +151,8 @@ def minimum_of(law: Law, t: F8, y: F8, u: F8) -> Minimum:
     def in_metres(theta: F8) -> F8:
         return in_units(law, theta, length_m=1.0 / length)
 
-    residuals, jacobian = least_squares.evaluated_once(both)
-    fit = least_squares.minimise(residuals, law.guess(t, y / length), jacobian)
+    search = least_squares.remembering(both)
+    fit = least_squares.minimise(lambda x: search(x)[0], law.guess(t, y / length), lambda x: search(x)[1])
     with np.errstate(all="ignore"):
-        theta = in_metres(fit.values)
-        if fit.converged:
-            turn = least_squares.central_differences(in_metres, fit.values)
-            return Minimum(theta, turn @ fit.covariance @ turn.T, fit.cost, True, "")
-        covariance = covariance_of(law.curve(t, theta)[1] / u[:, None])
-    return Minimum(
-        theta, covariance, fit.cost, False, f"{fit.steps} steps of Levenberg-Marquardt from the law's own guess"
-    )
+        turn = least_squares.central_differences(in_metres, fit.values)
+        return replace(fit, values=in_metres(fit.values), covariance=turn @ fit.covariance @ turn.T)

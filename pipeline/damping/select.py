@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pipeline.damping.evidence import choose, least_chi2, weigh
-from pipeline.damping.law_fit import LawFit, Minimum, mean_squared_rate, minimum_of
+from pipeline.damping.law_fit import LawFit, fit_law, mean_squared_rate
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
+from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 
-REJECTION = 1e-3  # probability with which chi-square rejects a true law
 # A law is not admissible if its BIC exceeds the lowest by more than this, which is "strong" evidence: R. E. Kass,
 # A. E. Raftery, J. Am. Stat. Assoc. 90 (1995) 773.
 EVIDENCE = 6.0
@@ -31,34 +31,20 @@ LOOSEST_POWER = 3.0  # maximum standard uncertainty of a free power that is stat
 class Damping:
     """The damping laws fitted to a record, and which of them it admits.
 
-    Parameters
-    ----------
-    t0 : float
-        Time at which the analysed part starts, s; laws count time from here.
-    fits : mapping of str to LawFit
-        Every law that could be fitted, by name.
-    selected : str
-        The admissible law with the lowest BIC, or the law that fits best if all are rejected (:func:`choose`). If the
-        BIC differs by less than 2 ("not worth more than a bare mention"), it is the law with fewer parameters, then the
-        law listed first. A stated law is always selected if it could be fitted.
-    admissible : tuple of str
-        Laws that the record does not contradict and whose BIC is near the lowest, from best to worst. Laws that are
-        equivalent to a simpler one are left out (:func:`choose`).
-    scatter : Scatter
-        Scatter of the amplitudes about a smooth curve.
-    unfitted : mapping of str to str
-        The reason why a law has no fit, by name.
-    stated : str
-        Name of the law that the user stated; empty if none was stated.
+    The selected law is the admissible law with the lowest BIC, or the law that fits best if all are rejected
+    (:func:`choose`). If the BIC differs by less than 2 ("not worth more than a bare mention"), it is the law with fewer
+    parameters, then the law listed first. A stated law is always selected if it could be fitted.
     """
 
-    t0: float
-    fits: Mapping[str, LawFit]
+    t0: float  # time at which the analysed part starts, s; laws count time from here
+    fits: Mapping[str, LawFit]  # every law that could be fitted, by name
     selected: str
+    # Laws that the record does not contradict and whose BIC is near the lowest, from best to worst, without those that
+    # are equivalent to a simpler one.
     admissible: tuple[str, ...]
-    scatter: Scatter
-    unfitted: Mapping[str, str] = field(default_factory=dict)
-    stated: str = ""
+    scatter: Scatter  # of the amplitudes about a smooth curve
+    unfitted: Mapping[str, str] = field(default_factory=dict)  # the reason why a law has no fit, by name
+    stated: str = ""  # the law that the user stated
 
     @property
     def by_statement(self) -> bool:
@@ -93,31 +79,18 @@ class Damping:
         return mean_squared_rate(self.best, self.best.amplitude(t - self.t0))
 
 
-def fit_damping(
-    demodulated: Demodulated, t0: float, laws: Sequence[str | Law] = tuple(LAWS), stated: str | Law | None = None
+def fit_laws(
+    windows: Demodulated,
+    t0: float,
+    laws: Sequence[str | Law] = tuple(LAWS),
+    stated: str | Law | None = None,
+    unit: str = "m",
 ) -> Damping:
-    """Fit the damping laws to the windows' amplitudes.
+    """Fit the damping laws to the windows' amplitudes; times count from ``t0``.
 
-    Parameters
-    ----------
-    demodulated : Demodulated
-    t0 : float
-        Time at which the analysed part starts, s.
-    laws, stated
-        As in :class:`pipeline.options.Options`. A stated law is tried in addition to ``laws`` and selected however well
-        other laws fit; the record may still contradict it.
+    A stated law is tried in addition to ``laws`` and selected however well other laws fit; the record may still
+    contradict it. An :class:`AnalysisError` says that no law can be fitted.
 
-    Returns
-    -------
-    Damping
-
-    Raises
-    ------
-    AnalysisError
-        If no law can be fitted.
-
-    Notes
-    -----
     Real amplitudes scatter more than their noise, for example because of beats with a sideways mode or clusters of
     false echoes. The excess scatter is measured about a smooth curve that is independent of all laws, so that a
     wrong law cannot hide its misfit in it. If few windows decay fast, or friction stops the motion, no smooth curve
@@ -131,19 +104,19 @@ def fit_damping(
     standard uncertainties. The BIC is that of the law's best fit without negative coefficients, which is that of one
     of its special cases.
     """
-    t, amplitude = demodulated.t - t0, demodulated.amplitude
-    noise = np.sqrt(demodulated.covariance[:, 0, 0])
+    t, amplitude = windows.t - t0, windows.amplitude
+    noise = np.sqrt(windows.covariance[:, 0, 0])
     if t.size < 3:
         # One or two points determine no law: the decrease of the amplitude since the start then counts as uncertainty.
-        noise = np.hypot(noise, amplitude * demodulated.decay * t)
+        noise = np.hypot(noise, amplitude * windows.decay * t)
     # Even for computed data the windows are not exact.
     noise = np.maximum(noise, ROUNDING * float(np.max(amplitude)) + 1e-100)
-    points = _Points(t0, t, amplitude, noise, scatter(t, amplitude, noise))
+    points = _Points(t, amplitude, noise, scatter(t, amplitude, noise))
     known = None if stated is None else find_law(stated)
-    found = _fit_laws(points, laws, known)
+    found = _fit_laws(points, t0, laws, known, unit)
     # No wrong law is stated because only a few laws were tried to save time.
     enough = tuple(laws) != FEW_LAWS or (found.admissible and not _curved(found))
-    return found if enough else _fit_laws(points, tuple(LAWS), known)
+    return found if enough else _fit_laws(points, t0, tuple(LAWS), known, unit)
 
 
 def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> tuple[str, tuple[str, ...]]:
@@ -172,69 +145,52 @@ def _curved(damping: Damping) -> bool:
 class _Points:
     """Amplitudes (n,) at times (n,) since t0, their noise and scatter, and the fits of laws made so far."""
 
-    t0: float
     t: F8
     amplitude: F8
     noise: F8
     spread: Scatter
-    minima: dict[str, Minimum] = field(default_factory=dict)
+    found: dict[str, Fit] = field(default_factory=dict)
 
-    def minimum(self, law: Law) -> Minimum:
+    @property
+    def kept(self) -> tuple[F8, F8, F8]:
+        """Times, amplitudes and uncertainties of the points that are no outliers."""
+        kept = self.spread.kept
+        return self.t[kept], self.amplitude[kept], self.spread.u[kept]
+
+    def fit(self, law: Law) -> Fit:
         """Return the fit of a law, which is calculated only once."""
-        if law.name not in self.minima:
-            kept = self.spread.kept
-            self.minima[law.name] = minimum_of(law, self.t[kept], self.amplitude[kept], self.spread.u[kept])
-        return self.minima[law.name]
+        if law.name not in self.found:
+            self.found[law.name] = fit_law(law, *self.kept)
+        return self.found[law.name]
 
 
-def _fit_laws(points: _Points, wanted: Sequence[str | Law], known: Law | None) -> Damping:
+def _fit_laws(points: _Points, t0: float, wanted: Sequence[str | Law], known: Law | None, unit: str) -> Damping:
     """Fit some laws and select among them."""
-    unfitted: dict[str, str] = {}
-    every = [find_law(law) for law in wanted]
-    if known is not None and known.name not in [law.name for law in every]:
-        every.append(known)
-    laws = _affordable(every, int(np.count_nonzero(points.spread.kept)), unfitted)
-    fits = _weigh_all(laws, points, unfitted)
+    laws = {law.name: law for law in map(find_law, wanted)}
+    if known is not None:
+        laws.setdefault(known.name, known)
+    fits, unfitted = _weighed(laws, points, unit)
     if fits and (closer := _corner(fits, points)) is not None:
-        points = replace(points, spread=closer, minima={})
-        fits = _weigh_all(laws, points, unfitted)
+        points = replace(points, spread=closer, found={})
+        fits, unfitted = _weighed(laws, points, unit)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
     stated = "" if known is None else known.name
     selected, admissible = select_law(fits, stated, float(points.t[-1]))
-    return Damping(points.t0, fits, selected, admissible, points.spread, unfitted, stated)
+    return Damping(t0, fits, selected, admissible, points.spread, unfitted, stated)
 
 
-def _affordable(wanted: Sequence[Law], points: int, unfitted: dict[str, str]) -> list[Law]:
-    laws = []
-    for law in wanted:
-        needed = len(law.parameters)
-        if points >= needed:
-            laws.append(law)
-        else:
-            unfitted[law.name] = f"{needed} parameters need as many windows, and there are {points}"
-    return laws
-
-
-def _weigh_all(laws: Sequence[Law], points: _Points, unfitted: dict[str, str]) -> dict[str, LawFit]:
-    """Fit the laws and test each against the points; laws without a usable fit are added to ``unfitted``."""
-    spread = points.spread
-    t, y, u = points.t[spread.kept], points.amplitude[spread.kept], spread.u[spread.kept]
-    sound = {}
-    for law in laws:
-        if (why := _astray(law, points.minimum(law), t, y)) is None:
-            sound[law.name] = points.minimum(law)
-            unfitted.pop(law.name, None)
-        else:
-            unfitted[law.name] = why
-    by_name = {law.name: law for law in laws}
-    least = least_chi2(sound, by_name)
-    weighed = {}
+def _weighed(laws: Mapping[str, Law], points: _Points, unit: str) -> tuple[dict[str, LawFit], dict[str, str]]:
+    """Fit the laws and test each against the points; return the fits, and why other laws have none."""
+    t, y, u = points.kept
+    reasons = {name: _astray(law, points) for name, law in laws.items()}
+    sound = {name: points.fit(law) for name, law in laws.items() if not reasons[name]}
+    least = least_chi2(sound, laws)
+    correlation, weighed = points.spread.correlation, {}
     for name, fit in sound.items():
-        weighed[name] = weigh(by_name[name], fit, least[name], y.size, spread.correlation, REJECTION)
-        if weighed[name].rejection == "misfit":
-            weighed[name] = _widened(weighed[name], (y - weighed[name].amplitude(t)) / u, spread.correlation)
-    return weighed
+        one = weigh(laws[name], fit, least[name], y.size, correlation, unit)
+        weighed[name] = _widened(one, (y - one.amplitude(t)) / u, correlation) if one.rejection == "misfit" else one
+    return weighed, {name: why for name, why in reasons.items() if why}
 
 
 def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
@@ -245,25 +201,29 @@ def _widened(fit: LawFit, residual: F8, correlation: float) -> LawFit:
     return replace(fit, joint=replace(fit.joint, covariance=widening * fit.joint.covariance), widening=widening)
 
 
-def _astray(law: Law, fit: Minimum, t: F8, y: F8) -> str | None:
-    """Return why a fit is not usable; None if it is."""
-    top = float(np.max(y))
-    if not 1e-3 * top <= fit.theta[0] <= 1e3 * top or not math.isfinite(fit.chi2):
+def _astray(law: Law, points: _Points) -> str:
+    """Return why a law has no usable fit; empty if it has one."""
+    t, y, _ = points.kept
+    needed = len(law.parameters)
+    if y.size < needed:
+        return f"{needed} parameters need as many windows, and there are {y.size}"
+    fit, top = points.fit(law), float(np.max(y))
+    if not 1e-3 * top <= fit.values[0] <= 1e3 * top or not math.isfinite(fit.cost):
         return "its numbers ran out of range"
-    if not np.isfinite(fit.covariance).all():
-        return "the windows do not determine its parameters"
+    if not fit.converged:
+        return f"its search found {fit.tried}"
     power = free_power(law)
     if power is not None and np.diag(fit.covariance)[list(law.parameters).index(power)] > LOOSEST_POWER**2:
         return "the windows do not determine its power"
-    if fit.theta.min() >= 0.0:
-        return None
+    if fit.values.min() >= 0.0:
+        return ""
     # Samples reach half a window beyond the last centre.
     end = t[-1:] + 0.5 * np.max(np.diff(t), initial=0.0)
     with np.errstate(all="ignore"):
-        growth = law.rate(y, fit.theta) * (t[-1] - t[0])
+        growth = law.rate(y, fit.values) * (t[-1] - t[0])
         # A fit has failed if its growth rate times the duration exceeds 20 times the largest amplitude, or at a pole.
-        astray = np.any(growth > 20.0 * top) or not np.isfinite(law.curve(end, fit.theta)[0][0])
-    return "its numbers ran out of range" if astray else None
+        astray = np.any(growth > 20.0 * top) or not np.isfinite(law.curve(end, fit.values)[0][0])
+    return "its numbers ran out of range" if astray else ""
 
 
 def _corner(fits: Mapping[str, LawFit], points: _Points) -> Scatter | None:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
-from pipeline.findings.finding import Found
 from pipeline.numerics.quantity import number
+from pipeline.registry.found import Found
 
 # Difference of BIC that is "very strong" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773. If two laws
 # have the same prior probability, a wrong law beats the true law by this much in fewer than exp(-5) of recordings.
@@ -57,9 +57,7 @@ def _reasons(damping: Damping) -> dict[str, str]:
     reasons = {reason: ", ".join(laws) for reason, laws in by_reason.items() if reason in ("misfit", "negative")}
     if "misfit" in by_reason:
         reasons["selected"] = f"{words_of(best.law)}{_chi2(best)}"
-    failed = [fit for fit in damping.fits.values() if fit.rejection == "not converged"]
-    unfitted = [f"{words_of(fit.law)}, no convergence after {fit.tried}" for fit in failed]
-    unfitted += [f"{name}, because {why}" for name, why in damping.unfitted.items()]
+    unfitted = [f"{name}, because {why}" for name, why in damping.unfitted.items()]
     return reasons | ({"unfitted": "; ".join(unfitted)} if unfitted else {})
 
 

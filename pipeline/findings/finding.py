@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from pipeline.numerics.quantity import amount, noun, number, plural
+from pipeline.registry.found import Found, Severity
 
-Severity = Literal["info", "warning", "error"]
 RANK = {"error": 0, "warning": 1, "info": 2}
 
 # The code for a note in a run file of another version of springmass that this one does not know.
@@ -19,19 +19,6 @@ UNKNOWN_CODE = "unknown_code"
 
 # Unit and usual form of a number whose name ends so; one that ends in _m has the unit of the recording.
 UNITS = {"_s": ("s", ".3g"), "_hz": ("Hz", ".4g"), "_metres": ("m", ".3g"), "_rad": ("rad", ".2g")}
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """What a stage found: a code, and its numbers or names as the sentences in ``findings.toml`` call them.
-
-    A number is in SI units, its name ends in the unit, and None means that there is none. Without a severity it is the
-    first one of the code.
-    """
-
-    code: str
-    numbers: Mapping[str, float | str | None] = field(default_factory=dict)
-    severity: Severity | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,21 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.bench.spring import GRAVITY_M_PER_S2
-from pipeline.checks.harmonics import Harmonics
-from pipeline.checks.model import Contradiction, ModelCheck
-from pipeline.checks.plausibility import Plausibility
-from pipeline.checks.sensor import Smoothing
-from pipeline.findings.finding import Found
-from pipeline.motion.equation_fit import EquationFit, EquationMisfit
-from pipeline.motion.fitted import Fitted
+from pipeline.motion.averaged import Fitted, Rest
 from pipeline.motion.overdamped import Overdamped
-from pipeline.motion.waveform import Rest
-from pipeline.motion.waveform_fit import FullFit
 from pipeline.numerics.quantity import amount
+from pipeline.registry.found import Found
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import model_error
 
-TOLD = 0.002  # minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones
 SIDEWAYS = 0.01  # share of a second mode in the amplitude above which the finding is a warning and not a note
 FEWEST = 4  # minimum number of windows for the test of a damping law
 
@@ -36,19 +28,19 @@ def overdamped_findings(found: Overdamped) -> Iterator[Found]:
         yield Found("overdamped", {**rates, "why": found.why})
 
 
-def fit_findings(full: FullFit | None, solved: EquationFit | EquationMisfit | None) -> Iterator[Found]:
-    """Yield what the fits of the whole waveform and of the equation of motion came to."""
-    if full is not None and not full.converged:
-        yield Found("not_converged", {"tried": full.tried})
-    if isinstance(solved, EquationFit):
-        yield Found("strongly_damped", {"why": solved.why})
-    elif solved is not None:
-        yield Found("not_converged", {"why": solved.why})
+def fit_findings(fitted: Fitted, misfit: str) -> Iterator[Found]:
+    """Yield what the fits of the samples came to; ``misfit`` says why the equation of motion was not fitted."""
+    if fitted.method == "equation":
+        yield Found("strongly_damped", {"why": fitted.why})
+    elif fitted.why:
+        yield Found("not_converged", {"tried": fitted.why})
+    if misfit:
+        yield Found("not_converged", {"why": misfit})
 
 
-def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Found]:
+def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Found]:
     """Yield what the fit shows of the motion."""
-    demodulated, phase = fitted.demodulated, fitted.phase
+    demodulated, phase, rest = fitted.demodulated, fitted.phase, fitted.rest
     windows, omega = demodulated.t.size, phase.angular_frequency.value
     if windows < FEWEST:
         yield Found("short_record", {"periods": cycles.count, "windows": windows})
@@ -56,16 +48,16 @@ def motion_findings(cycles: Cycles, fitted: Fitted, rest: Rest) -> Iterator[Foun
         lost = {"periods": demodulated.lost, "all_periods": demodulated.lost + windows}
         yield Found("missing_samples", lost, "warning")
     if phase.backbone is not None:
-        start = phase.damping.best.joint["A0"].value
+        start = fitted.damping.best.joint["A0"].value
         shift = phase.backbone.value * start**2 / omega
         # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
-        if abs(shift) > (phase.damping.best.rate_at_start() / omega) ** 2:
+        if abs(shift) > (fitted.damping.best.rate_at_start() / omega) ** 2:
             numbers = {"relative_shift": shift, "amplitude_m": start}
             yield Found("amplitude_dependent_frequency", {**numbers, "higher" if shift > 0 else "lower": abs(shift)})
     # In computed data, changes of the rest position below the error of the sinusoidal model affect no number.
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
     if rest.drifts and rest.drift_m > float(np.max(errors)):
-        yield _rest_drift(rest, phase.damping.best.damping_rate().u)
+        yield _rest_drift(rest, fitted.damping.best.damping_rate().u)
     yield from _modes(fitted, rest.mean.unit)
 
 
@@ -95,56 +87,3 @@ def _modes(fitted: Fitted, unit: str) -> Iterator[Found]:
         "further": further or None,
     }
     yield Found("sideways_mode", numbers, "warning" if disturbances.modelled and large else "info")
-
-
-def harmonics_findings(found: Harmonics) -> Iterator[Found]:
-    """Yield by how much periods are no sinusoids, and in which way."""
-    if found.share < TOLD:
-        return
-    if found.even > 0.9 and found.second > 0.95:
-        way = {"even": found.even}
-    elif found.even < 0.1:
-        way = {"odd": 1.0 - found.even}
-    else:
-        way = {"near_peak_m" if found.near_end else "far_peak_m": found.peak_m}
-    yield Found("not_sinusoidal", {"peak_m": found.peak_m, "share": found.share, **way})
-
-
-def smoothing_findings(found: Smoothing) -> Iterator[Found]:
-    """Yield by how much a sensor smooths."""
-    numbers = {
-        "correlation": found.correlation,
-        "amplitude_loss": found.loss,
-        "late_s": found.late_s,
-        "alike_samples": found.samples,
-    }
-    yield Found("smoothed_sensor", numbers)
-
-
-def model_findings(check: ModelCheck) -> Iterator[Found]:
-    """Yield how a model fails to describe the whole run, with the numbers of those tests only that contradict it."""
-    numbers: dict[str, float] = {}
-    if Contradiction.RESIDUALS in check.contradictions:
-        numbers |= {"rms_m": check.rms_m, "noise_m": check.noise_m}
-    if Contradiction.HALVES in check.contradictions:
-        numbers["halves"] = check.halves
-    if Contradiction.COLOUR in check.contradictions:
-        numbers |= {"correlation": check.correlation, "lag_s": check.lag_s}
-    if Contradiction.PHASE in check.contradictions:
-        numbers |= {"phase_chi2": check.phase_chi2, "phase_scatter": math.sqrt(check.phase_chi2)}
-    if numbers:
-        yield Found("model_misfit", {**numbers, "scatter_excess_m": check.scatter_excess_m or None})
-
-
-def plausibility_findings(found: Plausibility) -> Iterator[Found]:
-    """Yield what no bob on a spring can do, or no distance sensor measure."""
-    f = found.frequency_hz
-    if found.undersampled:
-        yield Found("undersampled", {"samples_per_period": found.samples_per_period})
-    if found.too_fast:
-        numbers = {"gravities": found.gravities, "amplitude_m": found.amplitude, "frequency_hz": f}
-        yield Found("implausible_motion", numbers)
-    if found.too_slow:
-        yield Found("implausible_sag", {"period_s": 1.0 / f, "sag_metres": found.sag_m})
-    if found.out_of_range:
-        yield Found("implausible_distance", {"low_m": found.low_m, "high_m": found.high_m})

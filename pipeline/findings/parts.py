@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from pipeline.findings.finding import Found
+from pipeline.registry.found import Found
 from pipeline.windows.segments import Segments, Span, SpanKind
 
 SHOWN = 5  # maximum number of times listed in one text

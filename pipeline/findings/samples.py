@@ -7,12 +7,12 @@ from collections.abc import Iterator, Sequence
 
 from pipeline.bench.instrument import Instrument
 from pipeline.checks.echoes import Clusters, count_quality
-from pipeline.findings.finding import Found
+from pipeline.checks.residual import COARSE
+from pipeline.registry.found import Found
 from pipeline.samples.condition import Conditioned
 from pipeline.track import U8, Track
 
 MANY = 0.1  # share of false echoes from which the finding is a warning: the sensor is probably badly placed
-COARSE = 2.6  # ratio of step to noise above which the step is coarse: for rounding noise alone it is sqrt(12) = 3.5
 GUESSED = 3.0  # minimum ratio of a stated error to the scatter: a normal distribution has one sample in 370 beyond it
 
 
@@ -75,16 +75,11 @@ def _distance_to_move(levels_m: Sequence[float], swing_m: tuple[float, float]) -
     return {way: math.ceil(100.0 * lack_m + 1.0)}
 
 
-def held_findings(count: int, step_s: float) -> Iterator[Found]:
-    """Yield how often a sensor slower than its recording repeats each value; 1 means that they are joined by lines."""
-    numbers = {"count": count, "interval_s": count * step_s, "late_s": 0.5 * step_s * (count - 1)}
-    yield Found("held_samples", numbers if count > 1 else {})
-
-
-def clock_findings(track: Track, instrument: Instrument) -> Iterator[Found]:
+def clock_findings(track: Track) -> Iterator[Found]:
     """Yield what is known of the clock of the sensor and of late readings."""
     if track.clock == "nominal":
         yield Found("nominal_clock")
+    instrument = Instrument.of(track)
     if instrument.clock_refused:
         yield Found("clock_refused", {"why": instrument.clock_words})
     if track.held_samples:

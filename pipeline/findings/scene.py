@@ -6,15 +6,13 @@ from collections.abc import Iterator
 
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE
-from pipeline.findings.finding import Found
+from pipeline.registry.found import Found
 from pipeline.results.effects import Effect
 
 
 def scene_findings(scene: Scene, effects: tuple[Effect, ...]) -> Iterator[Found]:
     """Yield what is missing or implausible in a scene; the effects say whether the mass of the spring counts.
 
-    Examples
-    --------
     >>> bare = Scene.from_mapping({"bob": {"mass_kg": 0.2}})
     >>> [found.code for found in scene_findings(bare, ())]
     ['spring_mass_missing', 'uncertainty_missing']

@@ -12,7 +12,8 @@ import numpy as np
 from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.motion.decay import DecayFit, best_decay, critical_decay, lone_exponential
+from pipeline.motion.fit import Rows
+from pipeline.motion.relaxing import FREE, Decay, best_decay, critical_decay, lone_exponential
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import noun
 from pipeline.samples.condition import Conditioned
@@ -35,50 +36,28 @@ U_CLOCK = 50e-6 / math.sqrt(3.0)
 class Overdamped:
     """A motion that damping ends within a few cycles or before the first one.
 
-    Parameters
-    ----------
-    why : str
-        One sentence that states the rates or the damping ratio.
-    kind : {"overdamped", "critical", "strong"}
-        Relaxation with two rates, relaxation with one rate, or an oscillation whose damping ratio is large.
-    damping_ratio : Estimate
-        :math:`\\zeta = g/\\omega_0`.
-    squared_frequency : Estimate
-        :math:`\\omega_0^2` of the undamped motion, rad^2/s^2; multiplied by the mass it is the spring constant.
-    estimates : mapping of str to Estimate
-        All other fitted quantities by name.
-    start_s : float
-        Time at which the fitted part of the motion begins, s.
+    It relaxes with two rates or with one, or it is an oscillation whose damping ratio is large.
     """
 
-    why: str
+    why: str  # one sentence that states the rates or the damping ratio
     kind: Kind
-    damping_ratio: Estimate
-    squared_frequency: Estimate
+    damping_ratio: Estimate  # g/omega0
+    squared_frequency: Estimate  # omega0^2; multiplied by the mass it is the spring constant
     estimates: Mapping[str, Estimate]
-    start_s: float
+    start_s: float  # time at which the fitted part of the motion begins
 
 
 def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | None:
     """Fit the free motion of a linearly damped bob and classify its damping.
 
-    Parameters
-    ----------
-    conditioned : Conditioned
+    The result is :class:`NoOscillation` if the record is a single exponential, which a drift can resemble. It is None
+    if the record is no relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
 
-    Returns
-    -------
-    Overdamped, NoOscillation or None
-        NoOscillation if the record is a single exponential, which a drift can resemble. None if the record is no
-        relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
-
-    Notes
-    -----
-    :func:`pipeline.motion.decay.best_decay` covers all strengths of damping. A relaxation is accepted if its residual
-    is at most 1.5 times the noise, also in its moving part alone, and if it ends within the record (:math:`gT > 2`).
-    Its BIC must also be lower by ten than that of every polynomial up to degree three, every step and every ramp.
-    Critical damping and the free fit (two rates or an oscillation) are compared by BIC; the better one must have a
-    BIC lower by six than a single exponential. If a record begins before the release, the fit begins where the
+    :func:`pipeline.motion.relaxing.best_decay` covers all strengths of damping. A relaxation is accepted if its
+    residual is at most 1.5 times the noise, also in its moving part alone, and if it ends within the record
+    (:math:`gT > 2`). Its BIC must also be lower by ten than that of every polynomial up to degree three, every step and
+    every ramp. Critical damping and the free fit (two rates or an oscillation) are compared by BIC; the better one must
+    have a BIC lower by six than a single exponential. If a record begins before the release, the fit begins where the
     displacement begins to fall.
     """
     used = conditioned.used
@@ -86,7 +65,7 @@ def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | No
     if t.size < FEWEST:
         return None
     noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
-    if not (noise > 0.0 and _moves(y, noise, EVIDENCE)):
+    if not (noise > 0.0 and _moves(y, noise)):
         return None
     for first in _starts(y, noise):
         found = _follow(t[first:], y[first:], noise, conditioned)
@@ -95,12 +74,12 @@ def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | No
     return None
 
 
-def _moves(y: F8, noise: float, evidence: float) -> bool:
+def _moves(y: F8, noise: float) -> bool:
     """Return whether block means of the record vary enough for a relaxation to explain the variation."""
     size = max(1, y.size // POINTS)
     values = y[: y.size // size * size].reshape(-1, size).mean(axis=1)
     excess = float(np.sum((values - values.mean()) ** 2)) * size / noise**2 - values.size
-    return bool(excess > evidence + 5.0 * math.log(values.size))
+    return bool(excess > EVIDENCE + 5.0 * math.log(values.size))
 
 
 def _starts(y: F8, noise: float) -> Iterator[int]:
@@ -113,55 +92,49 @@ def _starts(y: F8, noise: float) -> Iterator[int]:
         yield int(held[-1])
 
 
-def _follow(t: F8, y: F8, noise: float, conditioned: Conditioned) -> Overdamped | NoOscillation | None:
-    tau = t - t[0]
-    fit = best_decay(tau, y, noise, conditioned.track.rate_hz)
-    if fit is None or not fit.rate * tau[-1] > 2.0 or _misses(tau, y, fit, MISFIT):
+def _follow(t: F8, y: F8, noise: float, samples: Conditioned) -> Overdamped | NoOscillation | None:
+    every = np.ones(t.size, np.bool_)
+    rows, track = Rows(t - t[0], y, every, every, noise), samples.track
+    found = best_decay(rows, track.rate_hz)
+    if found is None or not found.rate * rows.t[-1] > 2.0 or _misses(rows, found):
         return None
-    if not _beats_other_shapes(tau, y, fit, noise, EVIDENCE):
+    if not _beats_other_shapes(rows, found):
         return None
-    choice = _kind(tau, y, fit, 0.5 * conditioned.track.rate_hz, conditioned.track.unit)
+    choice = _kind(rows, found, 0.5 * track.rate_hz, track.unit)
     if choice is None or isinstance(choice, NoOscillation):
         return choice
-    kind, fit = choice
+    kind, found = choice
     # A residual larger than the noise increases the uncertainties.
-    fit = replace(fit, covariance=fit.covariance * max(1.0, fit.chi2 / max(t.size - 5, 1)))
-    found = _described(fit, kind, float(t[0]), t.size, U_CLOCK, conditioned.track.unit)
-    return None if kind == "strong" and found.damping_ratio.value < LEAST_DAMPING else found
+    found = replace(found, covariance=found.covariance * max(1.0, found.chi2 / max(t.size - 5, 1)))
+    spread = math.sqrt(found.chi2 / max(t.size - 5, 1)) * noise
+    noise_found = Estimate(spread, spread / math.sqrt(2.0 * t.size), track.unit)
+    result = _described(found, kind, float(t[0]), noise_found, track.unit)
+    return None if kind == "strong" and result.damping_ratio.value < LEAST_DAMPING else result
 
 
-def _misses(tau: F8, y: F8, fit: DecayFit, misfit: float) -> bool:
+def _misses(rows: Rows, found: Decay) -> bool:
     """Return whether the residual is too large over the whole record or over its moving part."""
-    squares = ((y - fit.position(tau)) / fit.noise) ** 2
-    count = max(int(np.searchsorted(tau, 4.0 / fit.slowest)), 12)
-    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > misfit**2)
+    squares = (rows.left(FREE, found.values) / rows.u) ** 2
+    count = max(int(np.searchsorted(rows.t, 4.0 / found.slowest)), 12)
+    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > MISFIT**2)
 
 
-def _beats_other_shapes(tau: F8, y: F8, fit: DecayFit, noise: float, evidence: float) -> bool:
+def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
     """Return whether the relaxation explains the record better than any polynomial, step or ramp does."""
-    size = max(1, tau.size // POINTS)
-    whole = tau.size // size * size
-    t, values, model = (x[:whole].reshape(-1, size).mean(axis=1) for x in (tau, y, fit.position(tau)))
-    sigma = max(noise, fit.noise) / math.sqrt(size)
-    mine = float(np.sum((values - model) ** 2)) / sigma**2 + 5.0 * math.log(t.size)
+    size = max(1, rows.t.size // POINTS)
+    whole = rows.t.size // size * size
+    each = (rows.t, rows.y, rows.left(FREE, found.values))
+    t, values, left = (x[:whole].reshape(-1, size).mean(axis=1) for x in each)
+    sigma = rows.u / math.sqrt(size)
+    mine = float(np.sum(left**2)) / sigma**2 + 5.0 * math.log(t.size)
     others = min(left / sigma**2 + count * math.log(t.size) for left, count in _other_shapes(t, values))
-    return mine + evidence < others
+    return mine + EVIDENCE < others
 
 
 def _other_shapes(t: F8, y: F8) -> Iterator[tuple[float, int]]:
     """Fit polynomials up to degree three, the best step and a grid of ramps.
 
-    Parameters
-    ----------
-    t, y : (n,) float64
-        Ascending times from 0 (in s) and distances (in m).
-
-    Yields
-    ------
-    left : float
-        Residual sum of squares of a shape, m^2: one per degree, one for the best step and one per ramp.
-    count : int
-        Number of parameters of that shape.
+    Yield the residual sum of squares and the number of parameters of each shape.
     """
     x = 2.0 * t / t[-1] - 1.0
     for degree in range(4):
@@ -184,15 +157,15 @@ def _left(design: F8, y: F8) -> float:
     return float(np.sum(residual**2))
 
 
-def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float, unit: str) -> tuple[Kind, DecayFit] | NoOscillation | None:
+def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[Kind, Decay] | NoOscillation | None:
     """Return the kind of damping with the lowest BIC and its fit, unless a single exponential suffices.
 
     Return None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, where a
     relaxation cannot be distinguished from a step.
     """
-    price = math.log(tau.size)
-    rate, left = lone_exponential(tau, y, fit.noise, fit.slowest)
-    one = critical_decay(tau, y, fit)
+    price = math.log(rows.t.size)
+    rate, left = lone_exponential(rows, fit.slowest)
+    one = critical_decay(rows, fit)
     critical = math.inf if one is None else one.chi2 + 4.0 * price
     free = fit.chi2 + 5.0 * price
     if min(critical, free) > left + 3.0 * price - 6.0:
@@ -208,16 +181,14 @@ def _kind(tau: F8, y: F8, fit: DecayFit, fastest: float, unit: str) -> tuple[Kin
     return ("overdamped" if fit.square > 0.0 else "strong"), fit
 
 
-def _described(fit: DecayFit, kind: Kind, start_s: float, count: int, u_clock: float, unit: str) -> Overdamped:
-    """Return the results of a fit to ``count`` samples; ``u_clock`` is the clock's relative standard uncertainty."""
+def _described(fit: Decay, kind: Kind, start_s: float, noise: Estimate, unit: str) -> Overdamped:
     from uncertainties import correlated_values, ufloat, umath
 
-    clock = ufloat(1.0, u_clock)
-    offset, a, v, *logarithms = correlated_values(fit.theta, fit.covariance)
+    clock = ufloat(1.0, U_CLOCK)
+    offset, a, v, *logarithms = correlated_values(fit.values, fit.covariance)
     v, rate = v * clock, umath.exp(logarithms[0]) * clock
     stiffness = rate**2 if fit.critical else umath.exp(logarithms[1]) * clock**2
-    spread = math.sqrt(fit.chi2 / max(count - 5, 1)) * fit.noise
-    found = {"offset": _estimate(offset, unit), "noise": Estimate(spread, spread / math.sqrt(2.0 * count), unit)}
+    found = {"offset": _estimate(offset, unit), "noise": noise}
     squared, natural = _estimate(stiffness, "rad^2/s^2"), umath.sqrt(stiffness)
     ratio = Estimate(1.0, 0.0) if kind == "critical" else _estimate(rate / natural, "")
     if kind == "critical":
@@ -256,8 +227,6 @@ def _estimate(quantity: Any, unit: str) -> Estimate:
 def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
     """Return the spring constant (in N/m) by name; empty if the scene gives no bob mass.
 
-    Notes
-    -----
     :math:`k = \\omega_0^2 M` with the undamped frequency and the oscillating mass M: the bob, the air that a disc
     carries along, and the spring's share (:func:`pipeline.bench.spring.oscillating_mass_kg`).
     """

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.bench.instrument import U_CRYSTAL
+from pipeline.motion.fit import Rows, fit
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.least_squares import minimise
 from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
@@ -21,10 +22,7 @@ LEFT = 0.1  # maximum share of the variance that remains in the residual of two 
 WEAKER = 1.0 / 3.0
 # Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
 # distinguished from one that changes.
-BEATS = 0.8
-# Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
-# distinguished from one that changes.
-PERIODS = 3.0
+BEATS, PERIODS = 0.8, 3.0
 MOST = 100_000  # maximum number of samples; longer records are not fitted
 THIN = 50.0  # maximum mean spacing of the samples, in units of their median spacing
 
@@ -33,32 +31,44 @@ THIN = 50.0  # maximum mean spacing of the samples, in units of their median spa
 class TwoModes:
     """Two simultaneous oscillations.
 
-    Parameters
-    ----------
-    why : str
-        One sentence that states the periods and amplitudes of both modes.
-    estimates : mapping of str to Estimate
-        ``first_mode_period`` and ``first_mode_amplitude`` (at the first sample), and likewise for the second mode.
-        The first mode is the stronger one.
+    The estimates are ``first_mode_period`` and ``first_mode_amplitude`` (at the first sample), and likewise for the
+    second mode. The first mode is the stronger one.
     """
 
-    why: str
+    why: str  # one sentence that states the periods and amplitudes of both modes
     estimates: dict[str, Estimate]
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """The model of some decaying modes: rest position, then a, b, omega and g of each."""
+
+    count: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each parameter."""
+        return ("rest", *(f"{name}{i}" for i in range(self.count) for name in ("a", "b", "omega", "g")))
+
+    def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
+        """Return the positions (n,) at t, and a function that gives their derivatives (n, p)."""
+        total, slopes = np.full(t.size, values[0]), [np.ones_like(t)]
+        for a, b, omega, g in values[1:].reshape(-1, 4):
+            fall = np.exp(-np.clip(g * t, -20.0, 200.0))
+            cosine, sine = fall * np.cos(omega * t), fall * np.sin(omega * t)
+            wave = a * cosine + b * sine
+            total = total + wave
+            slopes += [cosine, sine, t * (b * cosine - a * sine), -t * wave]
+        return total, lambda: np.stack(slopes, axis=1)
 
 
 def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     """Return the two modes that a record consists of; None if two modes do not describe it.
 
-    Parameters
-    ----------
-    conditioned : Conditioned
-
-    Notes
-    -----
     :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted by least squares to all samples
     used. It starts from the strongest line of the spectrum and from the strongest line of the residual of the first.
-    Covariances are scaled by the residuals, including their correlation. Records above the limits of
-    the limits in length or mean spacing are not searched.
+    Covariances are scaled by the residuals, including their correlation. Records above the limits in length or mean
+    spacing are not searched.
     """
     used = conditioned.used & np.isfinite(conditioned.track.t)
     t, y, unit = conditioned.track.t[used], conditioned.track.y[used], conditioned.track.unit
@@ -72,14 +82,15 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
         return None
     values = (y - y.mean()) / scale
     first = _strongest(tau, values)
-    second = _strongest(tau, values - _model(_linear(tau, values, (first,)), tau)[0])
+    second = _strongest(tau, values - Modes(1).at(tau, _linear(tau, values, (first,)))[0])
     start = _linear(tau, values, (first, second))
-    fit = minimise(lambda x: _model(x, tau)[0] - values, start, lambda x: _model(x, tau)[1])
-    if not np.all(np.isfinite(fit.covariance)) or not float(fit.residual @ fit.residual) < LEFT * y.size:
+    every = np.ones(y.size, np.bool_)
+    found = fit(Modes(2), Rows(tau, values, every, every), start)
+    if not np.all(np.isfinite(found.covariance)) or not float(found.residual @ found.residual) < LEFT * y.size:
         return None
-    places = sorted((1, 5), key=lambda i: -float(np.hypot(*fit.values[i : i + 2])))
-    omegas = [abs(float(fit.values[i + 2])) for i in places]
-    sizes = [float(np.hypot(*fit.values[i : i + 2])) for i in places]
+    places = sorted((1, 5), key=lambda i: -float(np.hypot(*found.values[i : i + 2])))
+    omegas = [abs(float(found.values[i + 2])) for i in places]
+    sizes = [float(np.hypot(*found.values[i : i + 2])) for i in places]
     beats = abs(omegas[0] - omegas[1]) * span / (2.0 * math.pi)
     if min(omegas) * span < 2.0 * math.pi * PERIODS or beats < BEATS or sizes[1] < WEAKER * sizes[0]:
         return None
@@ -87,20 +98,20 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     # A component at a multiple of the slower frequency is not a second mode but a harmonic, as of a square wave.
     if round(fast / slow) > 1 and abs(fast - round(fast / slow) * slow) * span < math.pi:
         return None
-    widened = float(fit.residual @ fit.residual) / max(y.size - 9, 1) * correlation_length(fit.residual)
-    u = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0) * widened)
-    found = {}
+    widened = float(found.residual @ found.residual) / max(y.size - 9, 1) * correlation_length(found.residual)
+    u = np.sqrt(np.maximum(np.diag(found.covariance), 0.0) * widened)
+    results = {}
     for name, i, omega, size in zip(("first", "second"), places, omegas, sizes, strict=True):
         period = 2.0 * math.pi / omega
         relative = math.hypot(float(u[i + 2]) / omega, U_CRYSTAL)
-        found[f"{name}_mode_period"] = Estimate(period, period * relative, "s")
-        found[f"{name}_mode_amplitude"] = Estimate(scale * size, scale * float(np.max(u[i : i + 2])), unit)
+        results[f"{name}_mode_period"] = Estimate(period, period * relative, "s")
+        results[f"{name}_mode_amplitude"] = Estimate(scale * size, scale * float(np.max(u[i : i + 2])), unit)
     descriptions = [
-        f"{found[f'{name}_mode_period']} ({amount(found[f'{name}_mode_amplitude'].value, unit)})"
+        f"{results[f'{name}_mode_period']} ({amount(results[f'{name}_mode_amplitude'].value, unit)})"
         for name in ("first", "second")
     ]
     why = f"two modes of like strength oscillate together, at periods of {descriptions[0]} and {descriptions[1]}: "
-    return TwoModes(f"{why}they beat every {span / beats:.3g} s", found)
+    return TwoModes(f"{why}they beat every {span / beats:.3g} s", results)
 
 
 def _strongest(tau: F8, values: F8) -> float:
@@ -119,15 +130,3 @@ def _linear(tau: F8, values: F8, omegas: tuple[float, ...]) -> F8:
     solved = np.linalg.lstsq(np.stack([np.ones_like(tau), *waves], axis=1), values, rcond=None)[0]
     each = [[solved[1 + 2 * i], solved[2 + 2 * i], omega, 0.0] for i, omega in enumerate(omegas)]
     return np.concatenate([solved[:1], *each])
-
-
-def _model(x: F8, tau: F8) -> tuple[F8, F8]:
-    """Return the motion (n,) of m modes and its derivatives (n, 1 + 4 m) by their parameters."""
-    total, slopes = np.full(tau.size, x[0]), [np.ones_like(tau)]
-    for a, b, omega, g in x[1:].reshape(-1, 4):
-        fall = np.exp(-np.clip(g * tau, -20.0, 200.0))
-        cosine, sine = fall * np.cos(omega * tau), fall * np.sin(omega * tau)
-        wave = a * cosine + b * sine
-        total = total + wave
-        slopes += [cosine, sine, tau * (b * cosine - a * sine), -tau * wave]
-    return total, np.stack(slopes, axis=1)

@@ -124,8 +124,6 @@ class UpperLimit(Estimate):
 
     It is written as an upper limit. Its value and its standard uncertainty remain those of the unbounded estimate.
 
-    Examples
-    --------
     >>> UpperLimit(0.019, 0.095, "1/(m s)")
     < 0.20 1/(m s) (95 %)
     """
@@ -141,8 +139,6 @@ class UpperLimit(Estimate):
     def limit(self) -> float:
         """The value below which the non-negative quantity lies with a probability of 95 %, in ``unit``.
 
-        Notes
-        -----
         For a normal distribution with mean x and standard deviation u, truncated at zero, the limit is
         :math:`x + u\\,\\Phi^{-1}(1 - 0.05\\,\\Phi(x/u))`. It is positive for every x. It is never below the one-sided
         limit of the untruncated distribution, so it covers the true value in at least 95 % of runs. S. Navas et al.
@@ -162,8 +158,6 @@ class UpperLimit(Estimate):
 def format_limit(limit: float) -> str:
     """Write a positive upper limit to two significant digits, rounded up.
 
-    Examples
-    --------
     >>> format_limit(0.1991), format_limit(1.21e-6)
     ('0.20', '1.3e-06')
     """
@@ -181,20 +175,11 @@ def _number(other: Any) -> Any:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joint:
-    """Several parameters estimated together.
-
-    Parameters
-    ----------
-    names : tuple of str
-    values : (p,) float64
-    covariance : (p, p) float64
-        In the products of the parameters' units.
-    units : tuple of str
-    """
+    """Several parameters estimated together."""
 
     names: tuple[str, ...]
-    values: F8
-    covariance: F8
+    values: F8  # (p,)
+    covariance: F8  # (p, p) in the products of the parameters' units
     units: tuple[str, ...]
 
     def __getitem__(self, name: str) -> Estimate:

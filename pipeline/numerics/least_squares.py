@@ -38,32 +38,17 @@ STEPS = 60  # maximum number of trial steps: of the fits that converged on 96 re
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """The result of a fit.
+    """The result of a fit."""
 
-    Parameters
-    ----------
-    values : (p,) float64
-    covariance : (p, p) float64
-        :math:`(J^T J)^{-1}`, for residuals in units of their standard uncertainties. Multiply it by
-        ``cost / (n - p)`` if the uncertainties are known only up to a factor. NaN if the fit has not converged.
-    residual : (n,) float64
-        Residuals at ``values``.
-    cost : float
-        Sum of squared residuals.
-    converged : bool
-    tried : str
-        What was done and how it ended, worded for a finding.
-    steps : int
-        Number of evaluations of the residuals.
-    """
-
-    values: F8
+    values: F8  # (p,)
+    # (p, p) :math:`(J^T J)^{-1}`, for residuals in units of their standard uncertainties. Multiply it by ``cost / (n -
+    # p)`` if the uncertainties are known only up to a factor. NaN if the fit has not converged.
     covariance: F8
-    residual: F8
-    cost: float
+    residual: F8  # (n,) residuals at ``values``
+    cost: float  # sum of squared residuals
     converged: bool
-    tried: str
-    steps: int
+    tried: str  # what was done and how it ended, worded for a finding
+    steps: int  # number of evaluations of the residuals
 
 
 class _NoDerivativeError(ArithmeticError):
@@ -87,45 +72,20 @@ def minimise(
 ) -> Fit:
     """Find the parameters that minimise the sum of squared residuals.
 
-    Parameters
-    ----------
-    residuals : callable
-        Maps (p,) float64 to (n,) float64: the difference of model and data over the standard uncertainty. It may
-        return non-finite values where the model has no value; such steps are not taken.
-    start : (p,) array_like
-    jacobian : callable, optional
-        Maps (p,) to (n, p): derivatives of the residuals. The default is central differences, which are accurate to
-        about ten digits.
-    precision : float
-        Stop when the remaining step is this fraction of the parameters' standard uncertainties, as estimated from the
-        residuals; 1e-8 is for reference values.
-    steps : int
-        Maximum number of trial steps; each takes one evaluation of the residuals.
+    Check ``converged`` before using the numbers. ``residuals`` gives the difference of model and data over the standard
+    uncertainty, at least as many as parameters. It may return non-finite values where the model has no value; such
+    steps are not taken. ``jacobian`` is by central differences if there is none, which are accurate to about ten
+    digits. The search stops when the remaining step is ``precision`` of the parameters' standard uncertainties, as
+    estimated from the residuals; 1e-8 is for reference values.
 
-    Returns
-    -------
-    Fit
-        Check ``converged`` before using its numbers.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer residuals than parameters, or no parameters. The caller can rule this out beforehand.
-
-    Notes
-    -----
     Where the relative offset is ``precision``, the remaining step lowers the sum of squares by the fraction
     :math:`\\mathrm{precision}^2 p/(n-p)`, which is the search's tolerance. The end is judged by the offset itself [1]_:
     the length of the residuals' projection on the columns of the Jacobian, relative to the length of the residuals.
     It does not depend on the units or scales of the parameters. An offset within rounding error is accepted too.
 
-    References
-    ----------
     .. [1] D. M. Bates, D. G. Watts, "A relative offset orthogonality convergence criterion for nonlinear least
        squares", Technometrics 23 (1981) 179, doi:10.1080/00401706.1981.10486257.
 
-    Examples
-    --------
     >>> t = np.linspace(0, 5, 50)
     >>> fit = minimise(lambda b: b[0] * np.exp(-b[1] * t) - 3.0 * np.exp(-0.7 * t), [1.0, 0.0])
     >>> fit.converged, fit.values.round(9)
@@ -154,7 +114,7 @@ def _searched(
         # A copy, because MINPACK overwrites the first array that it receives.
         return residual.copy() if at.tobytes() == start else residuals(at)
 
-    @_remembering
+    @remembering
     def slopes(at: F8) -> F8:
         slope = np.asarray(jacobian(at), np.float64)
         if not np.isfinite(slope).all():
@@ -195,18 +155,6 @@ def _judged(values: F8, residual: F8, slope: F8, largest: F8, steps: int, precis
     return _failed(values, residual, f"{ended}: {_shown(values)}", steps)
 
 
-def evaluated_once(both: Callable[[F8], tuple[F8, F8]]) -> tuple[Callable[[F8], F8], Callable[[F8], F8]]:
-    """Split a function that evaluates residuals and Jacobian together into two functions.
-
-    Parameters
-    ----------
-    both : callable
-        Maps (p,) to (n,) and (n, p). Its result for the last parameters is cached.
-    """
-    at = _remembering(both)
-    return lambda theta: at(theta)[0], lambda theta: at(theta)[1]
-
-
 def central_differences(function: Callable[[F8], F8], theta: F8) -> F8:
     """Return the derivatives (n, p) of a function from (p,) to (n,); steps are relative, and absolute near zero."""
     columns = []
@@ -219,14 +167,14 @@ def central_differences(function: Callable[[F8], F8], theta: F8) -> F8:
     return np.stack(columns, axis=1)
 
 
-def _remembering(function: Callable[[F8], T]) -> Callable[[F8], T]:
+def remembering(function: Callable[[F8], T]) -> Callable[[F8], T]:
     """Cache a function's result for its last parameters, because MINPACK's wrapper evaluates the start twice."""
     last: list[tuple[bytes, T]] = []
 
     def at(theta: F8) -> T:
         key = theta.tobytes()
         if not last or last[0][0] != key:
-            last[:] = [(key, function(theta))]
+            last[:] = [(key, function(theta.copy()))]  # MINPACK overwrites its parameters
         return last[0][1]
 
     return at

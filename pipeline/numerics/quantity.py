@@ -5,25 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from functools import cache
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """Name and display unit of the values in one unit.
+    """Name and display unit of the values in one unit."""
 
-    Parameters
-    ----------
-    noun : str
-        Name of one value.
-    unit : str
-        Unit in which sentences and figures write the value.
-    factor : float
-        Factor from the record's unit to ``unit``.
-    """
-
-    noun: str
-    unit: str
-    factor: float
+    noun: str  # name of one value
+    unit: str  # unit in which sentences and figures write the value
+    factor: float  # factor from the record's unit to ``unit``
 
 
 SHOWN = {
@@ -69,29 +60,32 @@ class Unit:
         >>> Unit(1, -1, less="n").of("rad/s"), Unit(-2, -1, radian=1).of("1")
         ('(rad/s)^(1-n)/s', 'rad/s')
         """
-        symbol, _, divisor = unit.partition("/")
-        powers, above, below = {"rad": self.radian}, list[str](), list[str]()
-        seconds = self.second
-        if unit != "1" and self.less:
-            above.append(f"{f'({unit})' if divisor else unit}^({self.metre:g}-{self.less})")
-        elif unit != "1":
-            powers[symbol] = powers.get(symbol, 0.0) + self.metre
-            seconds -= self.metre * {"": 0.0, "s": 1.0, "s^2": 2.0}[divisor]
-        for name, exponent in (powers | {"s": seconds}).items():
-            size = Fraction(abs(exponent)).limit_denominator(1000)
-            if exponent:
-                (above if exponent > 0.0 else below).append(name if size == 1 else f"{name}^{size}")
-        if not below:
-            return " ".join(above) or ("1" if self.metre else "")
-        divided_by = below[0] if len(below) == 1 else f"({' '.join(below)})"
-        return f"{' '.join(above) or '1'}/{divided_by}"
+        return _of(self, unit)
+
+
+@cache
+def _of(each: Unit, unit: str) -> str:
+    symbol, _, divisor = unit.partition("/")
+    powers, above, below = {"rad": each.radian}, list[str](), list[str]()
+    seconds = each.second
+    if unit != "1" and each.less:
+        above.append(f"{f'({unit})' if divisor else unit}^({each.metre:g}-{each.less})")
+    elif unit != "1":
+        powers[symbol] = powers.get(symbol, 0.0) + each.metre
+        seconds -= each.metre * {"": 0.0, "s": 1.0, "s^2": 2.0}[divisor]
+    for name, exponent in (powers | {"s": seconds}).items():
+        size = Fraction(abs(exponent)).limit_denominator(1000)
+        if exponent:
+            (above if exponent > 0.0 else below).append(name if size == 1 else f"{name}^{size}")
+    if not below:
+        return " ".join(above) or ("1" if each.metre else "")
+    divided_by = below[0] if len(below) == 1 else f"({' '.join(below)})"
+    return f"{' '.join(above) or '1'}/{divided_by}"
 
 
 def number(value: float, form: str = "") -> str:
     """Write a number, by default an integer or three significant digits, without an exponent if it has a usual size.
 
-    Examples
-    --------
     >>> number(12172), number(5.98123), number(23164.2), number(140, ".2g"), number(3e-5, ".1g"), number(1e-9)
     ('12,172', '5.98', '23,200', '140', '0.00003', '1e-09')
     """
@@ -106,8 +100,6 @@ def amount(value: float, unit: str, form: str = ".2g") -> str:
 
     In other units than m, where typical sizes are unknown, four digits replace a fixed number of decimals.
 
-    Examples
-    --------
     >>> amount(0.00234, "m"), amount(23.945, "m", ".4g"), amount(0.0234, "rad"), amount(1.2345678, "V", ".1f")
     ('2.3 mm', '23.95 m', '0.023 rad', '1.235 V')
     """
@@ -127,8 +119,6 @@ def noun(unit: str) -> str:
 def plural(unit: str) -> str:
     """Return the plural noun for values of a record in this unit.
 
-    Examples
-    --------
     >>> plural("m"), plural("rad/s")
     ('distances', 'angular velocities')
     """

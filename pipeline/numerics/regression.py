@@ -18,43 +18,22 @@ LAGS = 16  # lags computed together; most residuals are uncorrelated beyond thes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """A weighted linear least-squares solution.
+    """A weighted linear least-squares solution."""
 
-    Parameters
-    ----------
-    values : (p,) float64
-    covariance : (p, p) float64
-        From the stated standard uncertainties, without scaling.
-    residual : (n,) float64
-    chi2 : float
-    """
-
-    values: F8
-    covariance: F8
-    residual: F8
+    values: F8  # (p,)
+    covariance: F8  # (p, p) from the stated standard uncertainties, without scaling
+    residual: F8  # (n,)
     chi2: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scatter:
-    """Scatter of points about a smooth curve, independent of the law that they follow.
+    """Scatter of points about a smooth curve, independent of the law that they follow."""
 
-    Parameters
-    ----------
-    u : (n,) float64
-        Standard uncertainty of each point, with the excess added in quadrature.
-    excess : float
-        Scatter of the points beyond their own noise: beats, sideways swing, steps.
-    kept : (n,) bool
-        False for single points more than five standard uncertainties from the curve.
-    correlation : float
-        Number of points that count as one, :math:`1 + 2\\sum\\rho_k \\ge 1`.
-    """
-
-    u: F8
-    excess: float
-    kept: NDArray[np.bool_]
-    correlation: float
+    u: F8  # (n,) standard uncertainty of each point, with the excess added in quadrature
+    excess: float  # scatter of the points beyond their own noise: beats, sideways swing, steps
+    kept: NDArray[np.bool_]  # (n,) False for single points more than five standard uncertainties from the curve
+    correlation: float  # number of points that count as one, :math:`1 + 2\\sum\\rho_k \\ge 1`
 
 
 def smooth_columns(t: F8, degree: int) -> F8:
@@ -84,13 +63,6 @@ def beyond(basis: F8, columns: F8) -> F8:
 def solve_weighted(design: F8, y: F8, u: F8) -> Line:
     """Solve :math:`y = X\\theta` with standard uncertainties ``u``.
 
-    Parameters
-    ----------
-    design : (n, p) float64
-    y, u : (n,) float64
-
-    Notes
-    -----
     Where columns are linearly dependent, the result is the minimum-norm solution for columns scaled to unit length.
     """
     weight = 1.0 / u
@@ -104,20 +76,9 @@ def solve_weighted(design: F8, y: F8, u: F8) -> Line:
 def decompose(matrix: F8, least: float = 1e-13) -> tuple[F8, F8, bool]:
     """Return factors of the pseudo-inverse of a matrix with more rows than columns and any units.
 
-    Parameters
-    ----------
-    matrix : (n, p) float64
-    least : float
-        Relative singular value, of the columns scaled to unit length, up to which it counts as zero.
-
-    Returns
-    -------
-    left : (n, k) float64
-        Orthonormal columns that span the column space of the matrix.
-    root : (p, k) float64
-        Multiplied by its transpose it gives :math:`(J^T J)^{-1}`; by that of ``left``, the pseudo-inverse.
-    independent : bool
-        Whether no singular value counts as zero.
+    The first factor has orthonormal columns that span the column space. The second, multiplied by its transpose, gives
+    :math:`(J^T J)^{-1}`, and multiplied by that of the first the pseudo-inverse. Then follows whether no singular
+    value, of the columns scaled to unit length and relative to the largest, is below ``least`` and counts as zero.
     """
     scale = np.sqrt(np.einsum("np,np->p", matrix, matrix))
     scale[scale == 0.0] = 1.0
@@ -130,15 +91,7 @@ def decompose(matrix: F8, least: float = 1e-13) -> tuple[F8, F8, bool]:
 def covariance_of(jacobian: F8) -> F8:
     """Return :math:`(J^T J)^{-1}`, the covariance of a least-squares solution.
 
-    Parameters
-    ----------
-    jacobian : (n, p) float64
-        Each row divided by its point's standard uncertainty.
-
-    Returns
-    -------
-    (p, p) float64
-        Infinite where the points do not determine every parameter; a pseudo-inverse would be finite there.
+    Infinite where the points do not determine every parameter; a pseudo-inverse would be finite there.
     """
     unknown = np.full((jacobian.shape[1],) * 2, np.inf)
     if not np.all(np.isfinite(np.linalg.norm(jacobian, axis=0))):
@@ -150,15 +103,6 @@ def covariance_of(jacobian: F8) -> F8:
 def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
     """Measure the scatter of points about a smooth curve that is independent of any damping law.
 
-    Parameters
-    ----------
-    t, y, u : (n,) float64
-        Points and their standard uncertainties.
-    degree : int
-        Degree of the polynomial; lower for few points (one coefficient per four points).
-
-    Notes
-    -----
     The excess, added in quadrature, makes the uncertainties agree with the spread of the residuals, which is corrected
     for the number of coefficients. The spread is the smaller of the median's and the root mean square. With fewer than
     eight points nothing is measured and ``u`` is kept.
@@ -192,18 +136,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
 
 
 def smooth_curve(t: F8, y: F8, spread: Scatter, *, degree: int = 6) -> tuple[Legendre, float]:
-    """Return a polynomial through points, and the amount by which its BIC is below that of the mean.
-
-    Parameters
-    ----------
-    t, y : (n,) float64
-        Times in ascending order, and values.
-    spread : Scatter
-        Scatter of the points; correlated points count as fewer.
-    degree : int
-        Degree of the polynomial; lower for few points (one coefficient per four points). Below eight points only the
-        mean is taken.
-    """
+    """Return a polynomial through points, and the amount by which its BIC is below that of the mean."""
     kept = spread.kept
     values, weight = y[kept], 1.0 / spread.u[kept]
     mean = float(np.average(values, weights=weight**2))
@@ -250,8 +183,6 @@ def correlation_length(residual: F8) -> float:
 def chi2_quantile(probability: float, dof: float) -> float:
     """Return the quantile of the chi-square distribution.
 
-    Examples
-    --------
     >>> round(chi2_quantile(0.999, 10), 1)
     29.6
     """

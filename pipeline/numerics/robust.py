@@ -27,8 +27,6 @@ def median(x: NDArray[np.number[Any]]) -> float:
 def mad_sigma(deviation: F8) -> float:
     """Return the standard deviation of a normal distribution with the median absolute value of (n,) deviations.
 
-    Examples
-    --------
     >>> round(mad_sigma(np.array([-0.3, 0.1, 0.2])), 3)
     0.297
     """

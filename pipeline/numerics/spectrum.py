@@ -28,32 +28,15 @@ FREEDOM = 6.0  # complex degrees of freedom of the noise power: twelve bins, hal
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blocks:
-    """Means of consecutive samples on an even grid, fine enough for lines at a few times the main frequency.
+    """Means of consecutive samples on an even grid, fine enough for lines at a few times the main frequency."""
 
-    Parameters
-    ----------
-    t : (b,) float64, s
-        Mean times of the samples used, counted from ``origin``; the middle of a block without samples.
-    y : (b,) float64, m
-        Mean values; 0 in a block without samples.
-    weight : (b,) float64
-        Square root of the number of samples used.
-    step : float, s
-        Length of a block.
-    samples : float
-        Number of samples per full block.
-    origin : float, s
-        Start of the first block.
-    taper : (b,) float64
-        Hann window times the share of samples used, scaled so that white noise keeps its variance per block.
-    """
-
-    t: F8
-    y: F8
-    weight: F8
-    step: float
-    samples: float
-    origin: float
+    t: F8  # (b,) s, mean times of the samples used, counted from ``origin``; the middle of a block without samples
+    y: F8  # (b,) m, mean values; 0 in a block without samples
+    weight: F8  # (b,) square root of the number of samples used
+    step: float  # s, length of a block
+    samples: float  # number of samples per full block
+    origin: float  # s, start of the first block
+    # (b,) Hann window times the share of samples used, scaled so that white noise keeps its variance per block.
     taper: F8
 
     def unweighted(self, rows: F8) -> F8:
@@ -91,18 +74,11 @@ class Blocks:
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """The frequencies at which a line is searched.
-
-    Parameters
-    ----------
-    low_hz, high_hz : float
-    holes : tuple of (float, float)
-        Centres and half-widths, Hz, of the ranges that the model already covers.
-    """
+    """The frequencies at which a line is searched."""
 
     low_hz: float
     high_hz: float
-    holes: tuple[tuple[float, float], ...]
+    holes: tuple[tuple[float, float], ...]  # centres and half-widths, Hz, of the ranges that the model already covers
 
     def inside(self, frequency_hz: F8) -> NDArray[np.bool_]:
         """Return for each frequency (k,) whether it belongs to the band."""
@@ -114,23 +90,12 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """The strongest line of a residual.
-
-    Parameters
-    ----------
-    frequency_hz : float
-    density : float, m^2
-        Variance of the noise of one full block at that frequency.
-    evidence : float
-        Half the reduction of chi-square by the line; without a line it is exponentially distributed.
-    false_alarm : float
-        Probability that noise produces a line as strong anywhere in the band.
-    """
+    """The strongest line of a residual."""
 
     frequency_hz: float
-    density: float
-    evidence: float
-    false_alarm: float
+    density: float  # m^2, variance of the noise of one full block at that frequency
+    evidence: float  # half the reduction of chi-square by the line; without a line it is exponentially distributed
+    false_alarm: float  # probability that noise produces a line as strong anywhere in the band
 
 
 def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
@@ -144,18 +109,6 @@ def spectrum(blocks: Blocks, y: F8) -> tuple[F8, F8]:
 def worth_a_look(blocks: Blocks, band: Band, fixed_hz: tuple[float, ...], chance: float) -> bool:
     """Return whether any line could be significant; this quick test spares most records the full search.
 
-    Parameters
-    ----------
-    blocks : Blocks
-        Blocks whose means are the residual.
-    band : Band
-    fixed_hz : tuple of float
-        Frequencies that are tested individually, Hz.
-    chance : float
-        False-alarm probability at which lines are accepted, for the band and for the fixed frequencies alike.
-
-    Notes
-    -----
     A record passes with half the evidence needed for acceptance, relative to the median density of the band.
     """
     frequency, power = spectrum(blocks, blocks.y)
@@ -177,30 +130,14 @@ def _trials(inside: NDArray[np.bool_], spacing_hz: float, blocks: Blocks) -> flo
 def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
     """Find the strongest line, and the probability that pure noise produces one as strong.
 
-    Parameters
-    ----------
-    blocks : Blocks
-    left : (b,) float64
-        Residual of the blocks' values about a linear model, multiplied by their weights.
-    basis : (b, p) float64
-        Orthonormal columns of that model. The component of a line within their span does not count.
-    band : Band
+    None where the band is empty.
 
-    Returns
-    -------
-    Peak or None
-        None where the band is empty.
-
-    Notes
-    -----
     The candidate is the maximum of the spectrum divided by that of a first-order autoregression. The line's evidence is
     half the reduction of chi-square by its cosine and sine beyond the model, over the noise density at its frequency.
     This density is the larger of an autoregression's and the neighbouring frequencies', both without the line. The
     evidence of a noise line would be exponentially distributed if the density were exact. The heavier tail
     :math:`(1 + z/\\nu)^{-\\nu}` accounts for the density's own error [1]_.
 
-    References
-    ----------
     .. [1] D. J. Thomson, "Spectrum estimation and harmonic analysis", Proc. IEEE 70 (1982) 1055,
        doi:10.1109/PROC.1982.12433.
     """
@@ -231,15 +168,6 @@ def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
 def false_alarm(evidence: float, trials: float) -> float:
     """Return the probability that at least one of ``trials`` noise lines reaches this evidence.
 
-    Parameters
-    ----------
-    evidence : float
-        Half the reduction of chi-square, over a density that is known only from about ten neighbouring frequencies.
-    trials : float
-        Number of independent frequencies.
-
-    Examples
-    --------
     >>> false_alarm(0.0, 10.0)
     1.0
     >>> round(false_alarm(30.0, 100.0), 6)
@@ -252,8 +180,6 @@ def false_alarm(evidence: float, trials: float) -> float:
 def evidence_for(chance: float, trials: float) -> float:
     """Return the evidence at which :func:`false_alarm` is ``chance``.
 
-    Examples
-    --------
     >>> round(false_alarm(evidence_for(0.005, 100.0), 100.0), 6)
     0.005
     """
@@ -262,19 +188,7 @@ def evidence_for(chance: float, trials: float) -> float:
 
 
 def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band, smooth: float) -> float:
-    """Return the noise variance of one block at a frequency, m^2: the larger of the smooth and the local one.
-
-    Parameters
-    ----------
-    blocks : Blocks
-    y : (b,) float64, m
-        The residual without the line.
-    frequency_hz : float
-    band : Band
-        Only neighbours inside it count.
-    smooth : float, m^2
-        Result of :func:`smooth_density` at this frequency.
-    """
+    """Return the noise variance of one block at a frequency, m^2: the larger of the smooth and the local one."""
     frequency, power = spectrum(blocks, y)
     reach = FAR / blocks.seconds
     around = slice(*np.searchsorted(frequency, [frequency_hz - reach, frequency_hz + reach]))

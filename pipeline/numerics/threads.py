@@ -15,8 +15,6 @@ from typing import Any
 class _OneThread(ContextDecorator):
     """Restrict numpy's and scipy's linear algebra to one thread, in a ``with`` block or as a decorator.
 
-    Notes
-    -----
     The number of threads applies to the whole process. Where analyses run concurrently, the first to begin sets it and
     the last to end restores it.
     """

@@ -23,12 +23,6 @@ EFFECTS: Mapping[str, str] = {
 
 
 def check_effect(name: str) -> None:
-    """Raise an error if the name of an effect is not registered.
-
-    Raises
-    ------
-    ValueError
-        If the name is not registered.
-    """
+    """Raise an error if the name of an effect is not registered."""
     if name not in EFFECTS:
         raise ValueError(f"effect {name!r} is not registered in pipeline.registry.effects")

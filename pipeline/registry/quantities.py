@@ -10,38 +10,22 @@ from pipeline.numerics.quantity import Unit
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """An estimate.
+    """An estimate."""
 
-    Parameters
-    ----------
-    name : str
-        Name in JSON, tables of numbers and Python.
-    label : str
-        Name in words.
-    symbol, page_symbol, tex_symbol : str
-        Symbol in ASCII, in Unicode (with an index after a space), and in TeX without the ``$``.
-    unit : str or Unit
-        SI unit; a Unit if it depends on what was recorded.
-    in_table : bool
-        Whether Table 1 shows the estimate.
-    by_law : bool
-        Whether Table 1 names the damping law of the estimate, because its value depends on the law.
-    """
-
-    name: str
-    label: str
+    name: str  # name in JSON, tables of numbers and Python
+    label: str  # name in words
+    # symbol, page_symbol, tex_symbol: symbol in ASCII, in Unicode (with an index after a space), and in TeX without the
+    # ``$``.
     symbol: str
     page_symbol: str
     tex_symbol: str
-    unit: str | Unit
-    in_table: bool = True
-    by_law: bool = False
+    unit: str | Unit  # SI unit; a Unit if it depends on what was recorded
+    in_table: bool = True  # whether Table 1 shows the estimate
+    by_law: bool = False  # whether Table 1 names the damping law of the estimate, because its value depends on the law
 
     def unit_in(self, record_unit: str) -> str:
         """Return the unit of the estimate in a run recorded in ``record_unit``.
 
-        Examples
-        --------
         >>> QUANTITIES["beta"].unit_in("m"), QUANTITIES["beta"].unit_in("V"), QUANTITIES["period"].unit_in("V")
         ('1/(m s)', '1/(V s)', 's')
         """
@@ -50,21 +34,11 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """An input of an uncertainty budget.
+    """An input of an uncertainty budget."""
 
-    Parameters
-    ----------
-    label : str
-        Name in words.
-    symbol : str
-        Symbol in ASCII; "" for a group of parameters, or for a possible error without a symbol.
-    unit : str or Unit
-        As :attr:`Quantity.unit`; "" for a ratio or a group.
-    """
-
-    label: str
-    symbol: str = ""
-    unit: str | Unit = ""
+    label: str  # name in words
+    symbol: str = ""  # symbol in ASCII; "" for a group of parameters, or for a possible error without a symbol
+    unit: str | Unit = ""  # as :attr:`Quantity.unit`; "" for a ratio or a group
 
 
 _QUANTITIES = (
@@ -142,24 +116,12 @@ INPUTS: Mapping[str, Input] = {
 
 
 def check_quantity(name: str) -> None:
-    """Raise an error if the name of an estimate is not registered.
-
-    Raises
-    ------
-    ValueError
-        If the name is not registered.
-    """
+    """Raise an error if the name of an estimate is not registered."""
     if name not in QUANTITIES:
         raise ValueError(f"estimate {name!r} is not registered in pipeline.registry.quantities")
 
 
 def check_input(name: str) -> None:
-    """Raise an error if the name of a budget input is not registered.
-
-    Raises
-    ------
-    ValueError
-        If the name is not registered.
-    """
+    """Raise an error if the name of a budget input is not registered."""
     if name not in INPUTS:
         raise ValueError(f"budget input {name!r} is not registered in pipeline.registry.quantities")

@@ -17,16 +17,6 @@ from pipeline.results.budget import Inputs, estimate_of, function_of
 class Ambient:
     """Density, viscosity and distance scale, calculated from the same temperature, pressure and humidity.
 
-    Parameters
-    ----------
-    scene : Scene
-    inputs : Inputs
-        The inputs, to which the variables are added.
-    u_temperature_k : float
-        Standard uncertainty of a temperature stated without one, K.
-
-    Notes
-    -----
     The uncertainties of the formulas are inputs with the value 1. Density and speed of sound share one variable for the
     temperature, so results include their correlation.
     """
@@ -55,8 +45,6 @@ class Ambient:
     def scale(self, instrument: Instrument) -> Any:
         """Return the factor on all distances: 1, with the uncertainty of the speed of sound or of a calibration.
 
-        Notes
-        -----
         A calibrated scale has only the uncertainty of the calibration. Otherwise the uncertainty of the speed of sound
         comes from temperature, pressure, humidity and its formula. If the record used another speed of sound than that
         of the scene's air, the difference is not corrected; it is the half-width of a rectangular distribution. If the

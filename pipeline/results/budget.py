@@ -26,51 +26,24 @@ MANY = 1e6  # degrees of freedom from which they count as infinite: the coverage
 
 @dataclass(frozen=True, slots=True)
 class Contribution:
-    """One line of a budget.
+    """One line of a budget."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the input.
-    kind : {"A", "B"}
-        "A" for scatter of the record, which a longer record reduces by averaging; "B" for other sources.
-    input : Estimate or None
-        Value and standard uncertainty of the input; None for a group of correlated parameters.
-    sensitivity : float or None
-        Derivative of the result by the input; None for a group.
-    u : float
-        Contribution of the input to the standard uncertainty of the result, in the result's unit.
-    share : float
-        Share of the input in the variance of the result; the shares of a budget add up to 1.
-    dof : float
-        Degrees of freedom of u; infinite if u was not estimated from scatter.
-    """
-
-    name: str
-    kind: Kind
-    input: Estimate | None
-    sensitivity: float | None
-    u: float
-    share: float
-    dof: float = math.inf
+    name: str  # name of the input
+    kind: Kind  # "A" for scatter of the record, which a longer record reduces by averaging; "B" for other sources
+    input: Estimate | None  # value and standard uncertainty of the input; None for a group of correlated parameters
+    sensitivity: float | None  # derivative of the result by the input; None for a group
+    u: float  # contribution of the input to the standard uncertainty of the result, in the result's unit
+    share: float  # share of the input in the variance of the result; the shares of a budget add up to 1
+    dof: float = math.inf  # degrees of freedom of u; infinite if u was not estimated from scatter
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """The uncertainty of one result, with the contribution of each input.
+    """The uncertainty of one result, with the contribution of each input."""
 
-    Parameters
-    ----------
-    quantity : str
-        Name of the result.
-    estimate : Estimate
-        Value and standard uncertainty of the result.
-    contributions : tuple of Contribution
-        Contributions in descending order of their shares; empty for an exact result.
-    """
-
-    quantity: str
-    estimate: Estimate
+    quantity: str  # name of the result
+    estimate: Estimate  # value and standard uncertainty of the result
+    # Contributions in descending order of their shares; empty for an exact result.
     contributions: tuple[Contribution, ...]
 
     def u_of(self, kind: Kind) -> float:
@@ -106,8 +79,6 @@ class Budget:
 class Inputs:
     """Input quantities by name, as variables to calculate with.
 
-    Examples
-    --------
     k = omega^2 m, with u(k)^2 = (2 omega m u(omega))^2 + (omega^2 u(m))^2 = 0.0256^2 + 0.0064^2:
 
     >>> inputs = Inputs()
@@ -126,24 +97,7 @@ class Inputs:
         self._single: dict[str, Estimate] = {}
 
     def add(self, name: str, estimate: Estimate, kind: Kind, dof: float = math.inf) -> Any:
-        """Return an input as a variable, or as a plain number if it is exact.
-
-        Parameters
-        ----------
-        name : str
-            One of :data:`pipeline.registry.quantities.INPUTS`; each name may be used only once.
-        estimate : Estimate
-        kind : {"A", "B"}
-        dof : float
-            Degrees of freedom of the uncertainty; values below 1 count as 1.
-
-        Raises
-        ------
-        ValueError
-            If the name was used before, or is not registered.
-        AnalysisError
-            If the uncertainty is negative or not finite.
-        """
+        """Return an input as a variable, or as a plain number if it is exact."""
         from uncertainties import ufloat
 
         self._register(name, kind, dof)
@@ -155,17 +109,7 @@ class Inputs:
         return ufloat(estimate.value, estimate.u, name) if estimate.u > 0 else estimate.value
 
     def add_joint(self, name: str, joint: Joint, kind: Kind, dof: float = math.inf) -> list[Any]:
-        """Return jointly estimated parameters as correlated variables, which are one line in every budget.
-
-        Parameters
-        ----------
-        name : str
-            Name of the group.
-        joint : Joint
-        kind : {"A", "B"}
-        dof : float
-            As in :meth:`add`.
-        """
+        """Return jointly estimated parameters as correlated variables, which are one line in every budget."""
         from uncertainties import correlated_values
 
         self._register(name, kind, dof)
@@ -183,17 +127,7 @@ class Inputs:
         return {key: ufloat(0.0, math.sqrt(w), name) if w > 0 else 0.0 for key, w in weights.items()}
 
     def budget(self, quantity: str, x: Any, unit: str) -> Budget:
-        """Return the budget of a result calculated from these inputs.
-
-        Parameters
-        ----------
-        quantity : str
-            Name of the result.
-        x : number or variable
-            The result.
-        unit : str
-            Unit of the result.
-        """
+        """Return the budget of a result calculated from these inputs."""
         from uncertainties import UFloat
 
         # Sorted by name, because sums of floats depend on their order, and the order of the mapping on addresses.
@@ -233,13 +167,6 @@ def estimate_of(x: Any, unit: str) -> Estimate:
 def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
     """Return estimates with their covariance, from the inputs that they were calculated from.
 
-    Parameters
-    ----------
-    estimates : mapping of str to Estimate
-        Estimates of one analysis, or estimates calculated in a script.
-
-    Examples
-    --------
     >>> period = Estimate(0.8, 0.001, "s")
     >>> print(joint_of({"period": period, "frequency": estimate_of(1 / period, "Hz")}).correlation.round(6).tolist())
     [[1.0, -1.0], [-1.0, 1.0]]

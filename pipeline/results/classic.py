@@ -26,29 +26,20 @@ WINDOW_S = 1.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Classic:
-    """Table 1 of the report, calculated as in the report.
+    """Table 1 of the report, calculated as in the report."""
 
-    Parameters
-    ----------
-    estimates : dict of str to Estimate
-        period, frequency, angular_frequency, amplitude and damping_rate. Also spring_constant if the mass of the bob is
-        stated, velocity_rms if velocities are recorded, and reynolds_number if the disc is stated as well.
-    window_t, window_amplitude : (m,) float64, s, m
-        The sliding amplitude.
-    crests_t, crests_y : (8,) float64, s, m
-        The sampled maxima: seven periods pass from the first to the last.
-    extremes : ((t, y), (t, y))
-        The smallest and the largest distance: the amplitude is half of their difference.
-    chi2 : float
-        Sum of squared deviations of the sliding amplitude from the exponential, over the square of the stated error.
-    """
-
+    # Period, frequency, angular_frequency, amplitude and damping_rate. Also spring_constant if the mass of the bob is
+    # stated, velocity_rms if velocities are recorded, and reynolds_number if the disc is stated as well.
     estimates: dict[str, Estimate]
+    # window_t, window_amplitude: (m,) s, m, the sliding amplitude.
     window_t: F8
     window_amplitude: F8
+    # crests_t, crests_y: (8,) s, m, the sampled maxima: seven periods pass from the first to the last.
     crests_t: F8
     crests_y: F8
+    # The smallest and the largest distance: the amplitude is half of their difference.
     extremes: tuple[tuple[float, float], tuple[float, float]]
+    # Sum of squared deviations of the sliding amplitude from the exponential, over the square of the stated error.
     chi2: float
 
     def exponential(self) -> F8:
@@ -128,24 +119,7 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
 
 
 def sliding_amplitude(t: F8, y: F8, window_s: float) -> tuple[F8, F8]:
-    """Return half the range over [t, t + window] at every sample that is followed by a whole window.
-
-    Parameters
-    ----------
-    t, y : (n,) float64, s, m
-        Times in increasing order, and distances.
-    window_s : float
-        Length of the window, s.
-
-    Returns
-    -------
-    t, amplitude : (m,) float64, s, m
-
-    Raises
-    ------
-    AnalysisError
-        If the record is shorter than the window.
-    """
+    """Return half the range over [t, t + window] at every sample that is followed by a whole window."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     step = float(np.median(np.diff(t)))

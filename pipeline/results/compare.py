@@ -73,55 +73,31 @@ class SpringRun:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Whether runs agree on one spring.
-
-    Parameters
-    ----------
-    names : tuple of str
-    spring_constant : Estimate
-        Generalised mean, N/m, including shared errors.
-    spring_mass : Estimate
-        Mass of the spring, kg: the stated mass combined with the runs, or the mass that the runs determine.
-    spring_mass_stated : bool
-        Whether the mass of the spring was stated. If it was not, the runs may determine it together with the constant.
-    each : tuple of Estimate
-        Spring constant of each run, N/m, including shared errors.
-    own_u : tuple of float
-        Part of the standard uncertainty of each run that it does not share with the others, N/m.
-    pulls : tuple of float
-        Difference between each run and the mean, over the standard uncertainty of this difference.
-    chi2 : float
-        Chi-square of the runs about their mean, and of the spring's mass about the stated value.
-    dof : int
-        Number of runs less one for the constant, and less one more if they determine the spring's mass; 0 if nothing is
-        tested.
-    agree : bool
-        Whether chi-square is below its quantile, and a mass of the spring that the runs determine is plausible.
-    largest_deviation : float
-        Largest difference between two runs over its standard uncertainty, in which shared errors cancel.
-    exchanged : tuple of str
-        Names of two runs, if all runs agree, or agree far better, after the masses (or the periods) of these two are
-        exchanged; otherwise empty.
-    exchanged_chi2 : float or None
-        Chi-square of the runs after this exchange.
-    message : str
-        The result in words.
-    """
+    """Whether runs agree on one spring."""
 
     names: tuple[str, ...]
-    spring_constant: Estimate
+    spring_constant: Estimate  # generalised mean, N/m, including shared errors
+    # Mass of the spring, kg: the stated mass combined with the runs, or the mass that the runs determine.
     spring_mass: Estimate
+    # Whether the mass of the spring was stated. If it was not, the runs may determine it together with the constant.
     spring_mass_stated: bool
-    each: tuple[Estimate, ...]
-    own_u: tuple[float, ...]
+    each: tuple[Estimate, ...]  # spring constant of each run, N/m, including shared errors
+    own_u: tuple[float, ...]  # part of the standard uncertainty of each run that it does not share with the others, N/m
+    # Difference between each run and the mean, over the standard uncertainty of this difference.
     pulls: tuple[float, ...]
-    chi2: float
+    chi2: float  # chi-square of the runs about their mean, and of the spring's mass about the stated value
+    # Number of runs less one for the constant, and less one more if they determine the spring's mass; 0 if nothing is
+    # tested.
     dof: int
+    # Whether chi-square is below its quantile, and a mass of the spring that the runs determine is plausible.
     agree: bool
+    # Largest difference between two runs over its standard uncertainty, in which shared errors cancel.
     largest_deviation: float
+    # Names of two runs, if all runs agree, or agree far better, after the masses (or the periods) of these two are
+    # exchanged; otherwise empty.
     exchanged: tuple[str, ...]
-    exchanged_chi2: float | None
-    message: str
+    exchanged_chi2: float | None  # chi-square of the runs after this exchange
+    message: str  # the result in words
 
 
 @one_thread

@@ -42,33 +42,21 @@ class Suspect:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """The agreement of many runs on one quantity.
+    """The agreement of many runs on one quantity."""
 
-    Parameters
-    ----------
-    quantity, group : str
-        Names of the quantity and of the group of runs.
-    mean : Estimate
-        Mean over benches; its uncertainty includes the scatter between them.
-    within, between : float
-        Standard deviation of runs at one bench, and additional standard deviation between benches. ``within`` is NaN if
-        no bench has two runs, and ``between`` is NaN if there is only one bench.
-    stated : float
-        Root mean square of the standard uncertainties of the runs.
-    runs, benches : int
-        Numbers of runs and benches.
-    chi2, dof : float
-        Chi-square and degrees of freedom of the means of the benches, with the scatter within benches.
-    """
-
+    # quantity, group: names of the quantity and of the group of runs.
     quantity: str
     group: str
-    mean: Estimate
+    mean: Estimate  # mean over benches; its uncertainty includes the scatter between them
+    # within, between: standard deviation of runs at one bench, and additional standard deviation between benches.
+    # ``within`` is NaN if no bench has two runs, and ``between`` is NaN if there is only one bench.
     within: float
     between: float
-    stated: float
+    stated: float  # root mean square of the standard uncertainties of the runs
+    # runs, benches: numbers of runs and benches.
     runs: int
     benches: int
+    # chi2, dof: chi-square and degrees of freedom of the means of the benches, with the scatter within benches.
     chi2: float = math.nan
     dof: int = 0
 
@@ -76,34 +64,14 @@ class Agreement:
 def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Sequence[str]) -> Agreement:
     """Return how far runs of several benches agree on one quantity.
 
-    Parameters
-    ----------
-    quantity, group : str
-        Names of the quantity and of the group of runs.
-    values : sequence of Estimate
-        One value for each run, at least one; u includes only errors that the run does not share.
-    benches : sequence of str
-        Bench of each run.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no run.
-
-    Notes
-    -----
     The model is the one-way layout with random effects :math:`x_{ij} = \\mu + b_j + e_{ij}`, fitted by its moments
     [1]_. The variance within benches is the pooled variance of runs about the mean of their bench. The variance between
     benches is the variance of the means less the part from scatter within benches, by the moments of DerSimonian and
     Laird. The uncertainty of a bench's mean uses the larger of the scatter within benches and the stated uncertainty of
     the runs.
 
-    References
-    ----------
     .. [1] R. DerSimonian, N. Laird, Controlled Clinical Trials 7 (1986) 177.
 
-    Examples
-    --------
     >>> runs = [Estimate(x, 0.01, "N/m") for x in (14.00, 14.02, 14.10, 14.12)]
     >>> found = agreement("spring_constant", "A", runs, ["1", "1", "2", "2"])
     >>> print(found.mean, f"{found.within:.3f} {found.between:.3f}")

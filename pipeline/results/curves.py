@@ -24,23 +24,15 @@ LEAST_IN_GROUP = 4  # minimum number of windows in a group
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """A quantity by the selected law, with its uncertainty band, and points calculated without a law.
+    """A quantity by the selected law, with its uncertainty band, and points calculated without a law."""
 
-    Parameters
-    ----------
-    x, y, u : (n,) float64
-        The curve and its standard uncertainty, including all known contributions.
-    unit : str
-        Unit of y.
-    x_points, y_points, u_points : (m,) float64
-        Points from the amplitudes of windows. ``u_points`` includes only their scatter, and no errors that all points
-        share.
-    """
-
+    # x, y, u: (n,), the curve and its standard uncertainty, including all known contributions.
     x: F8
     y: F8
     u: F8
-    unit: str
+    unit: str  # unit of y
+    # x_points, y_points, u_points: (m,), points from the amplitudes of windows. ``u_points`` includes only their
+    # scatter, and no errors that all points share.
     x_points: F8
     y_points: F8
     u_points: F8
@@ -51,19 +43,6 @@ def energy_curve(
 ) -> Curve:
     """Return the mechanical energy :math:`E = \\frac12 m\\omega^2 A^2` against time.
 
-    Parameters
-    ----------
-    damping : Damping
-    demodulated : Demodulated
-    factor : Estimate
-        The factor :math:`F = \\frac12 m\\omega^2`, including the square of the scale.
-    laws : sequence of Weighted
-        The laws from which the band is calculated.
-    unit : str
-        "J", or "J/kg" if no mass is known.
-
-    Notes
-    -----
     The uncertainty is :math:`u^2(E) = \\sum_i w_i[(2 E_i\\,u(A_i)/A_i)^2 + (E_i - E)^2] + (E\\,u_F/F)^2`, summed over
     ``laws``; E is the energy by the selected law.
     """
@@ -92,17 +71,6 @@ def energy_curve(
 def drag_curve(damping: Damping, demodulated: Demodulated, factor: Estimate, laws: Sequence[Weighted]) -> Curve | None:
     """Return the drag coefficient against amplitude; None if the amplitude does not decrease.
 
-    Parameters
-    ----------
-    damping : Damping
-    demodulated : Demodulated
-    factor : Estimate
-        The factor :math:`F = 3\\pi m/(2\\omega\\rho S)`, m.
-    laws : sequence of Weighted
-        The laws from which the band is calculated.
-
-    Notes
-    -----
     The curve is the coefficient with which purely quadratic drag would dissipate the same energy in one cycle:
     :math:`C(A) = F\\,(-\\dot A - \\mu)/A^2`. Friction is no drag, so the friction of the selected law, if it has any,
     is subtracted. All other losses are included, also those in the spring. The points come from slopes of ln A over

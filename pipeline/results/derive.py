@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.bench.added_mass import ADDED_MASS_SHAPE
-from pipeline.bench.instrument import U_CRYSTAL, Instrument
+from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
@@ -21,8 +21,7 @@ from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Law, free_power
 from pipeline.damping.select import Damping
-from pipeline.motion.phase import PhaseFit
-from pipeline.motion.waveform import Rest
+from pipeline.motion.averaged import Fitted, Phase
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.robust import mad_sigma
 from pipeline.registry.quantities import QUANTITIES
@@ -30,44 +29,30 @@ from pipeline.results.ambient import Ambient
 from pipeline.results.budget import Budget, Inputs, estimate_of, function_of, joint_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
-from pipeline.track import F8, UNUSABLE, Quality
+from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
-# Relative standard uncertainty of a clock from the specification of its crystal: 50 ppm is the half-width of a
-# rectangular distribution. It does not decrease by averaging.
-U_CLOCK_NOMINAL = U_CRYSTAL
 U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
 
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """The results in Table 1; quantities that only curves and comparisons need are calculated on access.
+    """The results in Table 1; quantities that only curves and comparisons need are calculated on access."""
 
-    Parameters
-    ----------
-    estimates : mapping of str to Estimate
-        Estimates with all known contributions to the uncertainty, including clock and scale.
-    coefficients : mapping of str to Estimate
-        Coefficients of the law ``laws[0]``, with all known contributions; coefficients that are not determined are
-        upper limits. The law is a stated one if there is one. Otherwise it is linear and quadratic drag together if the
-        record allows it, or the selected law.
-    budgets : mapping of str to Budget
-        Contributions of the inputs to every estimate and coefficient.
-    laws : tuple of Weighted
-        The laws over which amplitude and damping rate are averaged; the coefficients are those of the first law.
-    parts : mapping of str to (variable, str)
-        Variables with units, from which the properties below are read; those that the scene does not determine are
-        missing.
-    law : str
-        Name of the law by which the results are stated; empty if they are an average over laws. They count as an
-        average also if the record selects one drag and the results use both, of which it is a special case.
-    """
-
+    # Estimates with all known contributions to the uncertainty, including clock and scale.
     estimates: Mapping[str, Estimate]
+    # Coefficients of the law ``laws[0]``, with all known contributions; coefficients that are not determined are upper
+    # limits. The law is a stated one if there is one. Otherwise it is linear and quadratic drag together if the record
+    # allows it, or the selected law.
     coefficients: Mapping[str, Estimate]
-    budgets: Mapping[str, Budget]
+    budgets: Mapping[str, Budget]  # contributions of the inputs to every estimate and coefficient
+    # The laws over which amplitude and damping rate are averaged; the coefficients are those of the first law.
     laws: tuple[Weighted, ...]
+    # Variables with units, from which the properties below are read; those that the scene does not determine are
+    # missing.
     parts: Mapping[str, tuple[Any, str]]
+    # Name of the law by which the results are stated; empty if they are an average over laws. They count as an average
+    # also if the record selects one drag and the results use both, of which it is a special case.
     law: str
 
     @cached_property
@@ -156,12 +141,6 @@ class Derived:
         """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known.
 
         Return None if the record does not determine the displacement.
-
-        Parameters
-        ----------
-        damping : Damping
-        demodulated : Demodulated
-            Demodulation of the same run.
         """
         unit = "J/kg" if self.effective_mass_kg is None else "J"
         if self.half_stiffness is None:
@@ -169,56 +148,23 @@ class Derived:
         return energy_curve(damping, demodulated, self.half_stiffness, self.laws, unit)
 
     def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
-        """Return the drag coefficient against amplitude with its band; None if it is not determined.
-
-        Parameters
-        ----------
-        damping : Damping
-        demodulated : Demodulated
-            Demodulation of the same run.
-        """
+        """Return the drag coefficient against amplitude with its band; None if it is not determined."""
         if self.drag_length is None:
             return None
         return drag_curve(damping, demodulated, self.drag_length, self.laws)
 
 
 def derive(
-    demodulated: Demodulated,
-    damping: Damping,
-    phase: PhaseFit,
-    rest: Rest,
-    scene: Scene,
-    effects: tuple[Effect, ...],
-    *,
-    instrument: Instrument,
-    misfits: tuple[Misfit, ...] = (),
-    smoothing: SensorFilter | None = None,
+    track: Track, fitted: Fitted, scene: Scene, effects: tuple[Effect, ...], misfits: tuple[Misfit, ...] = ()
 ) -> Derived:
     """Calculate all results of a run and propagate their uncertainties.
 
-    Parameters
-    ----------
-    demodulated, damping, phase, rest
-        Outputs of the stages with the same names.
-    scene : Scene
-        The scene; results that depend on values missing in it are left out.
-    effects : tuple of Effect
-        The effects table, which says which masses are included.
-    instrument : Instrument
-        Clock and scale of the sensor.
-    misfits : tuple of Misfit
-        Contradictions between the record and its model; they are inputs of kind B with the mean zero.
-    smoothing : SensorFilter, optional
-        The filter of the sensor in the scene, for which amplitude and phase are corrected.
+    Results that depend on values missing in the scene are left out. The effects table says which masses are included.
+    Misfits are inputs of kind B with the mean zero. Amplitude and phase are corrected for the filter of the sensor that
+    the scene states.
 
-    Returns
-    -------
-    Derived
-
-    Notes
-    -----
-    Uncertainties are propagated to first order [1]_ by the ``uncertainties`` package, with one variable for each input.
-    The clock's rate r and the scale s of the distances are uncertain. The results are:
+    Uncertainties are propagated to first order (JCGM 100:2008) by the ``uncertainties`` package, with one variable for
+    each input. The clock's rate r and the scale s of the distances are uncertain. The results are:
 
     - frequency and period: :math:`\\omega = r\\omega_r`, with :math:`\\omega_r` from the record,
       :math:`f = \\omega/2\\pi` and :math:`T = 2\\pi/\\omega`;
@@ -232,7 +178,7 @@ def derive(
     - Reynolds number: :math:`Re = \\rho v_\\mathrm{rms} D/\\eta` for the whole record, and with
       :math:`\\omega A_0/\\sqrt 2` at its start;
     - Keulegan-Carpenter number: :math:`KC = 2\\pi A_0/D`;
-    - drag coefficient: :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` [2]_.
+    - drag coefficient: :math:`C = 3\\pi m \\beta/(2 \\omega \\rho S)` (K. Lelas, R. Pezer, arXiv:2502.07458).
 
     If an acceleration of amplitude a is recorded, the amplitude of the displacement is
     :math:`a/(\\omega^2 + \\lambda^2)`; for a velocity it is :math:`v/\\sqrt{\\omega^2 + \\lambda^2}`. Results that need
@@ -242,18 +188,11 @@ def derive(
     Results that depend on the damping law are averages over laws
     (:func:`pipeline.damping.average.average_over_laws`): :math:`x = \\sum_i w_i x_i` and
     :math:`u^2 = \\sum_i w_i (u_i^2 + (x_i - x)^2)`.
-
-    References
-    ----------
-    .. [1] JCGM 100:2008, "Guide to the expression of uncertainty in measurement".
-    .. [2] K. Lelas, R. Pezer, arXiv:2502.07458.
     """
     inputs = Inputs()
-    laws = _Laws(damping, inputs, demodulated)
-    unit = rest.mean.unit
-    terms, coefficients = _terms(
-        demodulated, damping, phase, rest, scene, effects, instrument, misfits, smoothing, laws, inputs
-    )
+    laws = _Laws(fitted.damping, inputs, fitted.demodulated)
+    unit = track.unit
+    terms, coefficients = _terms(track, fitted, scene, effects, misfits, laws, inputs)
     found: dict[str, tuple[Any, str]] = {}
     parts: dict[str, tuple[Any, str]] = {}
     for formula in _FORMULAS:
@@ -263,7 +202,7 @@ def derive(
             of_run[formula.name] = x, formula.unit_in(unit)
     parts |= {name: (terms[name], "") for name in ("rates", "lengths")}
     budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
-    law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == damping.selected else ""
+    law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == fitted.damping.selected else ""
     return Derived(
         estimates={name: budgets[name].estimate for name in found},
         coefficients={name: limited(laws.stated.law, name, budgets[name].estimate) for name in coefficients},
@@ -281,22 +220,14 @@ def limited(law: Law, name: str, estimate: Estimate) -> Estimate:
 
 @dataclass(frozen=True)
 class _Formula:
-    """One row of the table: a quantity and its expression.
+    """One row of the table: a quantity and its expression."""
 
-    Parameters
-    ----------
-    name : str
-        Name of an estimate in :data:`pipeline.registry.quantities.QUANTITIES`, or of an entry of
-        :attr:`Derived.parts`.
-    expression : callable
-        Function whose parameters are the names of the terms that it needs, from :func:`_terms` or from rows above. If a
-        term is missing, the quantity is left out.
-    units : mapping of str to str
-        Unit of the quantity for each unit of the record, if it differs from the registry.
-    """
-
+    # Name of an estimate in :data:`pipeline.registry.quantities.QUANTITIES`, or of an entry of :attr:`Derived.parts`.
     name: str
+    # Function whose parameters are the names of the terms that it needs, from :func:`_terms` or from rows above. If a
+    # term is missing, the quantity is left out.
     expression: Callable[..., Any]
+    # Unit of the quantity for each unit of the record, if it differs from the registry.
     units: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
@@ -369,30 +300,27 @@ _FORMULAS = (
 
 
 def _terms(
-    demodulated: Demodulated,
-    damping: Damping,
-    phase: PhaseFit,
-    rest: Rest,
+    track: Track,
+    fitted: Fitted,
     scene: Scene,
     effects: tuple[Effect, ...],
-    instrument: Instrument,
     misfits: tuple[Misfit, ...],
-    smoothing: SensorFilter | None,
     laws: _Laws,
     inputs: Inputs,
 ) -> tuple[dict[str, Any], dict[str, tuple[Any, str]]]:
     """Return the terms of the formulas by name, as far as record and scene give them, and the coefficients."""
+    demodulated, damping, phase, rest = fitted.demodulated, fitted.damping, fitted.phase, fitted.rest
+    instrument, unit = Instrument.of(track), track.unit
     ambient = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
     amiss = _Amiss(misfits, inputs)
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
-    unit = rest.mean.unit
     scale = ambient.scale(instrument) if unit == "m" else 1.0
     windows = phase.residual.size
     # With one or two windows the uncertainty comes from the samples.
     free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
     omega = slope * rate
-    filtered = _Filtered(smoothing, omega, inputs)
+    filtered = _Filtered(SensorFilter.of(scene, track.rate_hz), omega, inputs)
     lengths = scale * amiss.over("amplitude", laws.values[0]) / filtered.gain
     rates = rate * amiss.over("damping_rate", laws.values[1])
     start = laws.start * lengths * _crest(phase, laws, unit, inputs)
@@ -454,7 +382,7 @@ def _terms(
     return {name: x for name, x in terms.items() if x is not None}, coefficients
 
 
-def _small_swings(phase: PhaseFit, laws: _Laws, demodulated: Demodulated) -> Estimate | None:
+def _small_swings(phase: Phase, laws: _Laws, demodulated: Demodulated) -> Estimate | None:
     """Return the angular frequency of very small swings; the next term of the series is part of its uncertainty.
 
     If the frequency of a swing is a share s off, the next term is about :math:`s^2/4`, as for a pendulum. What it adds
@@ -468,7 +396,7 @@ def _small_swings(phase: PhaseFit, laws: _Laws, demodulated: Demodulated) -> Est
     return Estimate(small.value, math.hypot(small.u, next_term), small.unit)
 
 
-def _crest(phase: PhaseFit, laws: _Laws, unit: str, inputs: Inputs) -> Any:
+def _crest(phase: Phase, laws: _Laws, unit: str, inputs: Inputs) -> Any:
     """Return the largest angle of the first swing over the amplitude of its sinusoid.
 
     A stiffness that changes as the square of the amplitude by :math:`\\Delta\\omega/\\omega_0 = \\kappa A^2/\\omega_0`
@@ -576,7 +504,7 @@ def _of_law(fit: LawFit, elapsed: F8) -> tuple[F8, F8]:
     return values, np.stack([by_start, fit.slopes_of_rate(), by_size])
 
 
-def _start_phase(phase: PhaseFit, slope: Any, inputs: Inputs, dof: float) -> Any:
+def _start_phase(phase: Phase, slope: Any, inputs: Inputs, dof: float) -> Any:
     """Return the phase at the start, from the phase in the middle of the fitted line and the error of its slope."""
     omega, at_start = phase.angular_frequency, phase.phase
     way = phase.t0 - phase.middle

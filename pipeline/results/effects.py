@@ -23,10 +23,10 @@ from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.terms import Term, required
-from pipeline.motion.phase import PhaseFit
-from pipeline.motion.waveform import Rest
+from pipeline.motion.averaged import Fitted, Phase, Rest
 from pipeline.numerics.quantity import Unit, amount
 from pipeline.registry.effects import check_effect
+from pipeline.track import Track
 from pipeline.windows.disturbances import Disturbances
 
 SHARE = 0.1  # size from which the model includes an effect, over the uncertainty that the effect would change
@@ -51,18 +51,10 @@ class Effect:
         check_effect(self.name)
 
 
-def tabulate(
-    scene: Scene,
-    damping: Damping,
-    phase: PhaseFit,
-    rest: Rest,
-    *,
-    noise_m: float,
-    instrument: Instrument,
-    disturbances: Disturbances | None = None,
-) -> tuple[Effect, ...]:
-    """Return the effects table of an analysis, from the stages' results; disturbances are None if not sought."""
-    omega, unit = phase.angular_frequency, rest.mean.unit
+def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
+    """Return the effects table of an analysis."""
+    phase, damping, unit, instrument = fitted.phase, fitted.damping, track.unit, Instrument.of(track)
+    omega = phase.angular_frequency
     u_k = 2.0 * math.hypot(omega.u / omega.value, instrument.clock_rate.u)
     if scene.bob_mass_kg is not None:
         u_k = math.hypot(u_k, scene.bob_mass_kg.u / scene.bob_mass_kg.value)
@@ -77,8 +69,8 @@ def tabulate(
         *_masses(scene, counted),
         *_drags(scene, damping, omega.value, unit),
         _backbone(phase, damping),
-        _rest_drift(rest, noise_m),
-        *_modes(disturbances, unit),
+        _rest_drift(fitted.rest, fitted.demodulated.noise_m),
+        *_modes(fitted.disturbances, unit),
         *((_buoyancy(scene, omega.value, 1.0, "m"), _speed_of_sound(scene, instrument)) if unit == "m" else ()),
         _clock_rate(instrument),
     )
@@ -190,7 +182,7 @@ def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[
     yield Effect("friction", None, mu, Unit(1, -1).of(unit), mu is not None, why)
 
 
-def _backbone(phase: PhaseFit, damping: Damping) -> Effect:
+def _backbone(phase: Phase, damping: Damping) -> Effect:
     name = "amplitude_dependent_frequency"
     if phase.backbone is None:
         return Effect(name, None, None, "1", False, "a constant frequency describes the phase: an ideal spring's")
@@ -212,14 +204,14 @@ def _rest_drift(rest: Rest, noise_m: float) -> Effect:
     return Effect("rest_drift", None, rest.drift_m, unit, True, why)
 
 
-def _modes(disturbances: Disturbances | None, unit: str) -> Iterator[Effect]:
+def _modes(disturbances: Disturbances, unit: str) -> Iterator[Effect]:
     """Yield the effects of modes of other frequencies, and of harmonics and products of the main oscillation."""
-    found = () if disturbances is None else disturbances.sideways.modes
+    found = disturbances.sideways.modes
     own = [mode for mode in found if mode.kind == "mode"]
     locked = [mode for mode in found if mode.kind != "mode"]
     names = (("sideways_mode", own, "mode of another frequency"), ("harmonics", locked, "harmonic or product"))
     for name, members, what in names:
-        if disturbances is None or disturbances.sideways.carrier is None:
+        if disturbances.sideways.carrier is None:
             yield Effect(name, None, None, unit, False, "not sought: too few periods, or not at this accuracy")
         elif not members:
             yield Effect(name, None, None, unit, False, f"no {what} stands out of what the main oscillation leaves")

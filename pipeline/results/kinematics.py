@@ -15,8 +15,7 @@ import numpy as np
 
 from pipeline.damping.average import Weighted
 from pipeline.damping.laws.drag import COEFFICIENTS
-from pipeline.motion.fitted import Fitted
-from pipeline.motion.phase import PhaseFit
+from pipeline.motion.averaged import Fitted, Phase
 from pipeline.track import F8, UNUSABLE, Quality, Track
 
 MOST_LEFT = 1.5  # residual over noise above which the fit misses a part as large as the noise, so windows are followed
@@ -24,24 +23,16 @@ MOST_LEFT = 1.5  # residual over noise above which the fit misses a part as larg
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Smoothed:
-    """The bob's motion along the line of sight.
+    """The bob's motion along the line of sight."""
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        The track's times.
-    position, u_position : (n,) float64, m
-        Distance from the sensor without sideways modes.
-    velocity, u_velocity : (n,) float64, m/s
-        Velocity of the oscillation about the rest position.
-    acceleration, u_acceleration : (n,) float64, m/s^2
-    """
-
-    t: F8
+    t: F8  # (n,) s, the track's times
+    # position, u_position: (n,) m, distance from the sensor without sideways modes.
     position: F8
     u_position: F8
+    # velocity, u_velocity: (n,) m/s, velocity of the oscillation about the rest position.
     velocity: F8
     u_velocity: F8
+    # acceleration, u_acceleration: (n,) m/s^2.
     acceleration: F8
     u_acceleration: F8
 
@@ -57,10 +48,10 @@ def kinematics(track: Track, fitted: Fitted, laws: Sequence[Weighted]) -> Smooth
     used = known & ((windows.flags & UNUSABLE) == 0)
     t = np.where(known, track.t, phase.t0)
     elapsed = np.clip(t, phase.t0, float(np.max(track.t[used]))) - phase.t0
-    best = phase.damping.best
+    best = fitted.damping.best
     size, u_size = _averaged(laws, elapsed)
     angle, u_angle = phase.total(t), _u_phase(phase, t)
-    solved = phase.squared_rate is not None  # by the equation of motion
+    solved = fitted.method == "equation"
     if not solved and (best.rejected or fitted.waveform.rms_m > MOST_LEFT * windows.noise_m):
         at = windows.t
         expected, _ = _averaged(laws, at - phase.t0)
@@ -74,7 +65,7 @@ def kinematics(track: Track, fitted: Fitted, laws: Sequence[Weighted]) -> Smooth
     x, v, a = np.real(swing), np.real(turn * swing), np.real(turn**2 * swing)
     if solved:
         x, v = fitted.waveform.position - fitted.rest.at(t), fitted.waveform.velocity
-        a = _by_equation(phase, x, v)
+        a = _by_equation(fitted, x, v)
     # Errors of amplitude and phase turn with the motion, and that of the frequency grows with the order.
     across = np.abs(size) * u_angle
     u = [
@@ -98,16 +89,16 @@ def _averaged(laws: Sequence[Weighted], elapsed: F8) -> tuple[F8, F8]:
     return mean, np.sqrt(weights @ (own**2 + (each - mean) ** 2))
 
 
-def _u_phase(phase: PhaseFit, t: F8) -> F8:
+def _u_phase(phase: Phase, t: F8) -> F8:
     """Return the uncertainty of the phase, rad: that of the line's middle, and that of its slope times the distance."""
     slope, at_start, way = phase.angular_frequency.u, phase.phase.u, phase.t0 - phase.middle
     middle = math.sqrt(max(at_start**2 - (slope * way) ** 2, 0.0))
     return np.hypot(middle, slope * (t - phase.middle))
 
 
-def _by_equation(phase: PhaseFit, x: F8, v: F8) -> F8:
+def _by_equation(fitted: Fitted, x: F8, v: F8) -> F8:
     """Return the acceleration by the fitted equation of motion; 0 where friction holds the bob."""
-    found = phase.damping.best.joint.estimates()
+    found, phase = fitted.damping.best.joint.estimates(), fitted.phase
     mu, gamma, beta = (found[name].value if name in found else 0.0 for name in COEFFICIENTS)
     natural = math.sqrt(phase.angular_frequency.value**2 + (phase.squared_rate or 0.0))
     drag = (2.0 * gamma + 0.75 * math.pi * beta / natural * np.abs(v)) * v + 0.5 * math.pi * natural * mu * np.sign(v)

@@ -33,58 +33,30 @@ GAP = 3.0  # time between two samples, in sample intervals, above which they are
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """One end of the motion at which a fixed object or a lost target cuts it off, as its sinusoid shows.
-
-    Parameters
-    ----------
-    end : {"far", "near"}
-    from_m : float
-        Distance beyond which samples are left out, m.
-    level_m : float
-        Median of the outer half of the distances left out, m.
-    samples : int
-        Number of samples left out.
-    first_s, last_s : float
-        Times of the first and the last sample left out, s.
-    """
+    """One end of the motion at which a fixed object or a lost target cuts it off, as its sinusoid shows."""
 
     end: Literal["far", "near"]
-    from_m: float
-    level_m: float
-    samples: int
+    from_m: float  # distance beyond which samples are left out, m
+    level_m: float  # median of the outer half of the distances left out, m
+    samples: int  # number of samples left out
+    # first_s, last_s: times of the first and the last sample left out, s.
     first_s: float
     last_s: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Conditioned:
-    """A track in which every sample has been judged.
+    """A track in which every sample has been judged."""
 
-    Parameters
-    ----------
-    track : Track
-        The track as it was given.
-    flags : (n,) uint8
-        The track's own flags and those found here.
-    noise_m : float
-        Standard deviation of the white noise from fourth differences, m; independent of any model of the motion.
-    plateaus_m : tuple of float
-        Distances at which the record is clipped, m.
-    quantum_m : float or None
-        Resolution of the distances: the track's, or a coarser one that the distances themselves show.
-    clipped_from_m : tuple of float
-        For each plateau, the distance beyond which samples were flagged, m.
-    cuts : tuple of Cut
-        Cuts found by the sinusoid, which replace the plateaus; see :mod:`pipeline.windows.clipping`.
-    """
-
-    track: Track
-    flags: U8
+    track: Track  # the track as it was given
+    flags: U8  # (n,) the track's own flags and those found here
+    # Standard deviation of the white noise from fourth differences, m; independent of any model of the motion.
     noise_m: float
-    plateaus_m: tuple[float, ...]
+    plateaus_m: tuple[float, ...]  # distances at which the record is clipped
+    # Resolution of the distances: the track's, or a coarser one that the distances themselves show.
     quantum_m: float | None
-    clipped_from_m: tuple[float, ...] = ()
-    cuts: tuple[Cut, ...] = ()
+    clipped_from_m: tuple[float, ...] = ()  # for each plateau, the distance beyond which samples were flagged
+    cuts: tuple[Cut, ...] = ()  # found by the sinusoid, which replace the plateaus; see pipeline.windows.clipping
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -100,11 +72,6 @@ class Conditioned:
         """Return where a model is so close to a plateau that noise decides whether a sample is clipped.
 
         The model selects the samples to leave out there, not their own noise, so the remaining samples are not biased.
-
-        Parameters
-        ----------
-        model_m : (...) float64, m
-        noise_m : float
         """
         near = np.zeros(model_m.shape, np.bool_)
         middle = float(np.median(model_m)) if self.clipped_from_m else 0.0
@@ -117,27 +84,10 @@ class Conditioned:
 def condition(track: Track) -> Conditioned:
     """Flag missing samples, duplicate and backward times, isolated false echoes and clipped plateaus.
 
-    Parameters
-    ----------
-    track : Track
-
-    Returns
-    -------
-    Conditioned
-
-    Raises
-    ------
-    AnalysisError
-        If fewer than eight usable samples are left.
-
-    Notes
-    -----
     Noise is estimated from fourth differences. A motion of amplitude A and angular frequency :math:`\\omega`, sampled
     every :math:`h`, contributes only :math:`A (\\omega h)^4` to them. The median of their absolute values is taken, so
     false echoes have no effect.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> t = np.arange(1000) / 100
     >>> y = 0.2 + 0.05 * np.cos(8.3 * t)
@@ -185,15 +135,7 @@ def condition(track: Track) -> Conditioned:
 
 
 def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
-    """Return the smallest step between values that repeat; files print more digits than sensors resolve.
-
-    Parameters
-    ----------
-    ordered : (n,) float64, m
-        Distances in increasing order.
-    stated_m : float or None
-        Step to return where values do not repeat, or show no coarser step.
-    """
+    """Return the smallest step between values that repeat; files print more digits than sensors resolve."""
     steps = np.diff(ordered)
     apart = steps > ROUNDING * max(-float(ordered[0]), float(ordered[-1]), 0.0)
     if not 0 < np.count_nonzero(apart) <= 0.5 * ordered.size:
@@ -209,13 +151,6 @@ def coarsest_step(ordered: F8, stated_m: float | None) -> float | None:
 def fourth_difference_noise(y: F8) -> float:
     """Return the standard deviation of the white noise on a smooth motion.
 
-    Parameters
-    ----------
-    y : (n,) float64, m
-        Equally spaced samples; fewer than five give 0.
-
-    Notes
-    -----
     :math:`\\hat\\sigma = 1.4826\\,\\mathrm{median}|\\Delta^4 y| / \\sqrt{70}`.
     """
     if y.size < 5:

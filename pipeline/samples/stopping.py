@@ -17,12 +17,6 @@ def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
     """Return the record up to the bob's stop; None if the bob moves for a stated share of the samples, or never.
 
     If friction stops a bob early, the noise of the long rest hides the oscillation in the record's spectrum.
-
-    Parameters
-    ----------
-    conditioned : Conditioned
-    share : float
-        Share of the samples used; a record whose bob moves for at least this share is kept whole.
     """
     if (stop := stop_row(conditioned)) is None:
         return None
@@ -35,12 +29,7 @@ def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:
 
 
 def stop_row(conditioned: Conditioned) -> int | None:
-    """Return the index of the first sample at rest; None if the bob moves to the end, or never.
-
-    Parameters
-    ----------
-    conditioned : Conditioned
-    """
+    """Return the index of the first sample at rest; None if the bob moves to the end, or never."""
     rows = np.flatnonzero(conditioned.used)
     count = rows.size // BLOCK
     noise = max(conditioned.noise_m, conditioned.quantum_m or 0.0)

@@ -28,36 +28,15 @@ APART = 5
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One jump of a series.
+    """One jump of a series."""
 
-    Parameters
-    ----------
-    index : int
-        Index of the first point after the jump.
-    false_alarm : float
-        Probability that a smooth series shows a jump as significant anywhere.
-    """
-
-    index: int
-    false_alarm: float
+    index: int  # index of the first point after the jump
+    false_alarm: float  # probability that a smooth series shows a jump as significant anywhere
 
 
 def find_changes(t: F8, y: F8, u: F8) -> tuple[Change, ...]:
     """Find where a series of several components jumps, in order of time.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        Times in ascending order.
-    y, u : (m, n) float64
-        Components and their standard uncertainties, independent of each other.
-
-    Returns
-    -------
-    tuple of Change
-
-    Notes
-    -----
     In an interval of L points each component is a polynomial with a jump at point k,
     :math:`y_j = p(t_j) + h\\,[j \\ge k]`, where p is a cubic, or a parabola in the shortest intervals. A jump in all m
     components together lowers chi-square by G(k) to X(k), with :math:`\\nu` remaining degrees of freedom:
@@ -73,15 +52,11 @@ def find_changes(t: F8, y: F8, u: F8) -> tuple[Change, ...]:
     the strongest jump of the shortest length that shows any (narrowest over threshold [2]_). A short interval contains
     at most one jump, and the polynomial is nearly exact there. Then the search continues in both parts.
 
-    References
-    ----------
     .. [1] S. Kovacs, P. Buehlmann, H. Li, A. Munk, "Seeded binary segmentation", Biometrika 110 (2023) 249,
        doi:10.1093/biomet/asac052.
     .. [2] R. Baranowski, Y. Chen, P. Fryzlewicz, "Narrowest-over-threshold detection of multiple change points",
        J. R. Statist. Soc. B 81 (2019) 649, doi:10.1111/rssb.12322.
 
-    Examples
-    --------
     >>> t = np.arange(40.0)
     >>> y = 1e-3 * t + np.where(t < 25.0, 0.0, 1.0) + 0.1 * np.random.default_rng(1).standard_normal(40)
     >>> (change,) = find_changes(t, y[None], np.full((1, 40), 0.1))
@@ -113,15 +88,6 @@ def find_changes(t: F8, y: F8, u: F8) -> tuple[Change, ...]:
 def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
     """Return (n,) bool: True for single outliers, caused by clusters of echoes or by a jump within a window.
 
-    Parameters
-    ----------
-    y, u : (m, n) float64
-        Components and their standard uncertainties.
-    false_alarm : float
-        Maximum probability that noise makes any point an outlier.
-
-    Notes
-    -----
     Such a point lies far from interpolations between its neighbours and from extrapolations of the two points before or
     after it. The first and last two points are never outliers. The maximum of n normal deviations in two components
     exceeds :math:`\\sqrt{2 \\ln(n/\\alpha)}` with probability :math:`\\alpha`. A mean of two neighbours adds half the

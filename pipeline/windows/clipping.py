@@ -69,13 +69,6 @@ class _End:
 def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated) -> Conditioned | None:
     """Return the record with every cut crest flagged, or None if no cuts show beyond those flagged already.
 
-    Parameters
-    ----------
-    conditioned, cycles, demodulated
-        Outputs of the stages with these names.
-
-    Notes
-    -----
     Every window's sinusoid is fitted to the middle of its swing. Let :math:`z_j` be the shortfall of the median of
     crest j in standard uncertainties. Crests 1 to n are cut if n maximises :math:`\\sum_{j \\le n} z_j/\\sqrt n` and
     this exceeds what noise reaches at any n with probability ``false_alarm`` (Bonferroni's bound). The first crests are

@@ -29,56 +29,27 @@ FALSE_ALARM = 1e-6  # probability that pure white noise is taken for an oscillat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cycles:
-    """Initial values for the oscillation.
+    """Initial values for the oscillation."""
 
-    Parameters
-    ----------
-    frequency_hz : float
-        Frequency of the spectrum's peak, accurate to a few thousandths.
-    count : float
-        Number of periods in the record.
-    bounds : (w + 1,) int64
-        Sample indices at which the windows begin, and the end of the last window.
-    periods : int
-        Number of periods in a window.
-    """
-
-    frequency_hz: float
-    count: float
-    bounds: NDArray[np.int64]
-    periods: int = 1
+    frequency_hz: float  # frequency of the spectrum's peak, accurate to a few thousandths
+    count: float  # number of periods in the record
+    bounds: NDArray[np.int64]  # (w + 1,), sample indices at which the windows begin, and the end of the last window
+    periods: int = 1  # number of periods in a window
 
 
 @dataclass(frozen=True, slots=True)
 class NoOscillation:
-    """The reason why no oscillation was found in a record.
+    """The reason why no oscillation was found in a record."""
 
-    Parameters
-    ----------
-    why : str
-        Reason, in one sentence.
-    code : str
-        Code of the finding that states it.
-    """
-
-    why: str
-    code: str = "no_oscillation"
+    why: str  # reason, in one sentence
+    code: str = "no_oscillation"  # code of the finding that states it
 
 
 def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
     """Find the oscillation's frequency and cut the record into windows of one period or, with noise, several.
 
-    Parameters
-    ----------
-    conditioned : Conditioned
+    The latter states the reason: nothing moves, no peak exceeds the noise, or the record spans under 1.5 periods.
 
-    Returns
-    -------
-    Cycles or NoOscillation
-        The latter states the reason: nothing moves, no peak exceeds the noise, or the record spans under 1.5 periods.
-
-    Notes
-    -----
     The spectrum is a Hann-windowed, zero-padded periodogram of the detrended record. Straight lines bridge flagged
     samples; where holes make up more than a fifth of the record, the mean fills them. The peak is interpolated by a
     parabola through the logarithms [1]_. For white noise the ratio of a bin to the mean is exponentially distributed,
@@ -89,8 +60,6 @@ def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
     The phase of a window of N samples has the standard uncertainty :math:`\\sqrt{2/N}\\,\\sigma/A`. The window spans as
     many periods as are needed to bring this down to ``u_phase``.
 
-    References
-    ----------
     .. [1] M. Gasior, J. L. Gonzalez, "Improving FFT frequency measurement resolution by parabolic and Gaussian
        spectrum interpolation", AIP Conf. Proc. 732 (2004) 276, doi:10.1063/1.1831158.
     """

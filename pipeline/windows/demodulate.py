@@ -38,43 +38,24 @@ class Demodulated:
 
     In window j the motion is :math:`o_j + A_j e^{-g\\tau}\\cos(\\omega\\tau + \\varphi_j)`, with :math:`\\tau`
     counted from the window's centre.
-
-    Parameters
-    ----------
-    t : (w,) float64, s
-        Centres of the windows.
-    amplitude, phase, offset : (w,) float64, m, rad, m
-        Values at the centre of each window. The phase is unwrapped: the total phase of the oscillation.
-    noise : (w,) float64, m
-        Standard deviation of the samples about the fit, for each window separately.
-    covariance : (w, 3, 3) float64
-        Covariance of (amplitude, phase, offset). Windows share no samples, so they are independent of each other.
-    count : (w,) int64
-        Number of samples used in the fit.
-    angular_frequency : float, rad/s
-        Angular frequency of the basis.
-    decay : (w,) float64, 1/s
-        Decay rate g of the basis.
-    residual : (n,) float64, m
-        Every sample less its window's fit; NaN for samples outside all windows or not measured.
-    flags : (n,) uint8
-        Flags from the conditioning, with the false echoes found here.
-    lost : int
-        Number of windows with too few usable samples, which give no point.
     """
 
-    t: F8
+    t: F8  # (w,) s, centres of the windows
+    # amplitude, phase, offset: (w,) m, rad, m, values at the centre of each window. The phase is unwrapped: the total
+    # phase of the oscillation.
     amplitude: F8
     phase: F8
     offset: F8
-    noise: F8
+    noise: F8  # (w,) m, standard deviation of the samples about the fit, for each window separately
+    # (w, 3, 3) covariance of (amplitude, phase, offset). Windows share no samples, so they are independent of each
+    # other.
     covariance: F8
-    count: NDArray[np.int64]
-    angular_frequency: float
-    decay: F8
-    residual: F8
-    flags: U8
-    lost: int
+    count: NDArray[np.int64]  # (w,) number of samples used in the fit
+    angular_frequency: float  # rad/s, angular frequency of the basis
+    decay: F8  # (w,) 1/s, decay rate g of the basis
+    residual: F8  # (n,) m, every sample less its window's fit; NaN for samples outside all windows or not measured
+    flags: U8  # (n,) flags from the conditioning, with the false echoes found here
+    lost: int  # number of windows with too few usable samples, which give no point
 
     @cached_property
     def noise_m(self) -> float:
@@ -86,22 +67,6 @@ class Demodulated:
 def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
     """Fit rest position, amplitude and phase robustly in every window.
 
-    Parameters
-    ----------
-    conditioned : Conditioned
-    cycles : Cycles
-
-    Returns
-    -------
-    Demodulated
-
-    Raises
-    ------
-    AnalysisError
-        If no window has enough usable samples.
-
-    Notes
-    -----
     Every window is a linear least-squares problem in :math:`(o, a, b)` of
     :math:`o + e^{-g\\tau}(a\\cos\\omega\\tau - b\\sin\\omega\\tau)`; all are solved together. False echoes come in
     clusters that move with the bob and last a fifth of a period or more, so they may bias the first fit of a window.
@@ -267,7 +232,7 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     squares = np.sum(weights * solution.residual**2, axis=1)
     noise = np.sqrt(squares / np.maximum(counts - 3, 1))
     pooled = math.sqrt(np.sum(squares[good]) / max(np.sum(counts[good] - 3), 1))
-    pooled = _with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
+    pooled = with_prior(pooled, float(np.sum(counts[good] - 3)), conditioned.track.sigma_m)
     # A window's own noise is uncertain by about a tenth, so it is shrunk towards the record's.
     prior = 30.0
     shrunk = ((prior * pooled**2 + counts * noise**2) / (prior + counts))[good]
@@ -302,7 +267,7 @@ def _finish(conditioned: Conditioned, windows: Windows, solution: Solution, tuni
     )
 
 
-def _with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
+def with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
     """Return the record's noise, combined with the noise that sensor or scene states if the two agree.
 
     A stated noise counts as much as thirty samples, so it matters only to records of a few periods.
@@ -315,19 +280,6 @@ def _with_prior(noise_m: float, dof: float, stated_m: float | None) -> float:
 def polar(a: F8, b: F8, covariance: F8, smooth_phase: F8, smooth_amplitude: F8 | None) -> tuple[F8, F8, F8]:
     """Return amplitude, total phase and covariance of (amplitude, phase, offset) of windows.
 
-    Parameters
-    ----------
-    a, b : (w,) float64, m
-        Coefficients of :math:`a\\cos\\omega\\tau - b\\sin\\omega\\tau`.
-    covariance : (w, 3, 3) float64
-        Covariance of (offset, a, b).
-    smooth_phase : (w,) float64, rad
-        Total phase from a smooth curve through the record; it gives the number of turns between windows.
-    smooth_amplitude : (w,) float64, m, or None
-        Amplitude from a smooth curve through the record.
-
-    Notes
-    -----
     The amplitude :math:`\\sqrt{a^2+b^2}` is too large by half the variance of the phase, as a fraction; this bias is
     subtracted. Where the smooth amplitude is below seven times the amplitude's uncertainty, amplitude and phase are the
     components along and across the smooth phase instead. These are linear in a and b and therefore unbiased in any

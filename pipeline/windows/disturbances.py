@@ -20,27 +20,14 @@ ROUNDS = 2  # maximum number of searches for modes. Each but the first uses the 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Disturbances:
-    """The effects found beside the main oscillation.
+    """The effects found beside the main oscillation."""
 
-    Parameters
-    ----------
-    conditioned : Conditioned
-        The record without these effects, on which later stages work.
-    sideways : Sideways
-        Modes, harmonics and products of both.
-    modelled : bool
-        Whether ``sideways`` was subtracted, since it would bias the amplitude by over a tenth of its uncertainty.
-    leak_m : float
-        Bias of the amplitude that ``sideways`` would cause, m.
-    position : (n,) float64, m
-        Sum of the subtracted effects at the record's times.
-    """
-
-    conditioned: Conditioned
-    sideways: Sideways
+    conditioned: Conditioned  # the record without these effects, on which later stages work
+    sideways: Sideways  # modes, harmonics and products of both
+    # Whether ``sideways`` was subtracted, since it would bias the amplitude by over a tenth of its uncertainty.
     modelled: bool
-    leak_m: float
-    position: F8
+    leak_m: float  # bias of the amplitude that ``sideways`` would cause, m
+    position: F8  # (n,) m, sum of the subtracted effects at the record's times
 
     @classmethod
     def nothing(cls, conditioned: Conditioned) -> Disturbances:
@@ -64,21 +51,6 @@ def separate(
 ) -> tuple[Demodulated, Disturbances]:
     """Search for modes, and demodulate again without them.
 
-    Parameters
-    ----------
-    conditioned, cycles, demodulated
-        Outputs of the stages with these names.
-    modes : bool
-        Whether to search for modes at all.
-
-    Returns
-    -------
-    demodulated : Demodulated
-        Windows of the record without the subtracted effects; unchanged if nothing was subtracted.
-    disturbances : Disturbances
-
-    Notes
-    -----
     A mode of amplitude B at a distance :math:`\\Delta f` from the main frequency leaves up to
     :math:`B/(\\pi\\,\\Delta f\\,T)` in the amplitude of a record of length T. If this is less than a tenth of the
     amplitude's standard uncertainty for every mode, the modes are reported but not subtracted. If they are subtracted,

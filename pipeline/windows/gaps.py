@@ -25,8 +25,6 @@ FEWEST_WINDOWS = 3  # minimum number of windows whose phases show how well they 
 def longest_part(samples: Conditioned) -> Segments | None:
     """Return the longest part without a gap across which turns cannot be counted; None if it is the whole record.
 
-    Notes
-    -----
     A gap is bridged if it is not longer than the longer of the parts beside it, and if the phase that a straight line
     through the phases of one part predicts for the middle of the gap is known to within 0.3 rad, at three standard
     uncertainties, and agrees with that of the other part. A part of too few periods has no phase; there the other part

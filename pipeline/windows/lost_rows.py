@@ -30,28 +30,16 @@ MOST = 0.2  # maximum share of lost samples
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LostRows:
-    """Samples that are missing in a record.
+    """Samples that are missing in a record."""
 
-    Parameters
-    ----------
-    share : float
-        Share of the samples that are missing.
-    places : int
-        Number of places where some are missing.
-    samples : Conditioned
-        The record with times that count the lost samples.
-    """
-
-    share: float
-    places: int
-    samples: Conditioned
+    share: float  # share of the samples that are missing
+    places: int  # number of places where some are missing
+    samples: Conditioned  # the record with times that count the lost samples
 
 
 def find_lost_rows(samples: Conditioned, windows: Demodulated) -> LostRows | None:
     """Return what shows that samples were lost; None if nothing does.
 
-    Notes
-    -----
     A lost sample advances the phase by :math:`\\omega h` at once. Sinusoids of known frequency are fitted to L samples
     before and after every place, and their phases are compared. The places are believed if the phase only runs ahead,
     and if the phases of the windows scatter far less once the times count the lost samples.

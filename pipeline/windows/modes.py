@@ -21,24 +21,16 @@ C16 = NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carrier:
-    """The main oscillation as smooth curves through the windows' values, independent of any damping law.
+    """The main oscillation as smooth curves through the windows' values, independent of any damping law."""
 
-    Parameters
-    ----------
-    t : (k,) float64, s
-        Nodes: the windows' centres and the record's ends.
-    amplitude, turning, rest : (k,) float64, m, rad, m
-        Values at the nodes; ``turning`` is the phase less ``angular_frequency`` times t - t[0].
-    angular_frequency : float, rad/s
-    degree, rest_degree : int
-        Degrees of the polynomials in time, for amplitude and phase and for the rest position.
-    """
-
-    t: F8
+    t: F8  # (k,) s, nodes: the windows' centres and the record's ends
+    # amplitude, turning, rest: (k,) m, rad, m, values at the nodes; ``turning`` is the phase less ``angular_frequency``
+    # times t - t[0].
     amplitude: F8
     turning: F8
     rest: F8
-    angular_frequency: float
+    angular_frequency: float  # rad/s
+    # degree, rest_degree: degrees of the polynomials in time, for amplitude and phase and for the rest position.
     degree: int
     rest_degree: int
 
@@ -113,32 +105,18 @@ class Mode:
 
     The envelope E is a polynomial in time and the wave w is a complex oscillation. It has the mode's own frequency with
     an exponential decay, or it is the product of the main wave's power :math:`b` and the first mode's power :math:`a`.
-
-    Parameters
-    ----------
-    turns : (int, int)
-        Exponents a of the first mode and b of the main oscillation; (1, 0) is an independent mode.
-    frequency : Estimate
-        Mean frequency, Hz.
-    amplitude : Estimate
-        Root mean square of :math:`|E w|` over the record, m.
-    decay : Estimate
-        Logarithmic decay rate of an independent mode's wave, 1/s; 0 for harmonics and products.
-    false_alarm : float
-        Probability that this mode is found in a record without it.
-    span : (float, float)
-        First and last time used, s. Outside this span, envelope and decay factor keep their values at its ends.
-    coefficients : (degree + 1,) complex128, m
-        Coefficients of the envelope, in Legendre polynomials over ``span``.
     """
 
+    # (int, int), exponents a of the first mode and b of the main oscillation; (1, 0) is an independent mode.
     turns: tuple[int, int]
-    frequency: Estimate
-    amplitude: Estimate
-    decay: Estimate
-    false_alarm: float
+    frequency: Estimate  # mean frequency, Hz
+    amplitude: Estimate  # root mean square of :math:`|E w|` over the record, m
+    decay: Estimate  # logarithmic decay rate of an independent mode's wave, 1/s; 0 for harmonics and products
+    false_alarm: float  # probability that this mode is found in a record without it
+    # (float, float), first and last time used, s. Outside this span, envelope and decay factor keep their values at its
+    # ends.
     span: tuple[float, float]
-    coefficients: C16
+    coefficients: C16  # (degree + 1,) m, coefficients of the envelope, in Legendre polynomials over ``span``
 
     @property
     def kind(self) -> Literal["mode", "harmonic", "product"]:
@@ -194,20 +172,11 @@ class Mode:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sideways:
-    """All modes found, the strongest independent mode first.
-
-    Parameters
-    ----------
-    modes : tuple of Mode
-    carrier : Carrier or None
-        Main oscillation; None if the record is too short, or too long, for a search.
-    first : Mode or None
-        The mode from which products are formed, as it was during the search for them.
-    """
+    """All modes found, the strongest independent mode first."""
 
     modes: tuple[Mode, ...]
-    carrier: Carrier | None
-    first: Mode | None = None
+    carrier: Carrier | None  # main oscillation; None if the record is too short, or too long, for a search
+    first: Mode | None = None  # the mode from which products are formed, as it was during the search for them
 
     def __bool__(self) -> bool:
         return bool(self.modes)

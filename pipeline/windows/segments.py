@@ -63,13 +63,7 @@ class BreakKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A stretch of a record that was left out.
-
-    Parameters
-    ----------
-    kind : SpanKind
-    first_s, last_s : float
-    """
+    """A stretch of a record that was left out."""
 
     kind: SpanKind
     first_s: float
@@ -78,43 +72,24 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Break:
-    """Where one free oscillation ends and another begins.
-
-    Parameters
-    ----------
-    kind : BreakKind
-    time_s, u_s : float
-    amplitude : float
-        Relative change of the amplitude.
-    phase : float
-        Change of the phase, rad.
-    """
+    """Where one free oscillation ends and another begins."""
 
     kind: BreakKind
     time_s: float
     u_s: float
-    amplitude: float
-    phase: float
+    amplitude: float  # relative change of the amplitude
+    phase: float  # change of the phase, rad
 
 
 @dataclass(frozen=True, slots=True)
 class Segments:
-    """The part of a record that is analysed, and the parts that are left out.
+    """The part of a record that is analysed, and the parts that are left out."""
 
-    Parameters
-    ----------
-    first_s, last_s : float
-        Start and end of the analysed part, s.
-    left_out : tuple of Span
-        In order of time.
-    breaks : tuple of Break
-        In order of time.
-    """
-
+    # first_s, last_s: start and end of the analysed part, s.
     first_s: float
     last_s: float
-    left_out: tuple[Span, ...]
-    breaks: tuple[Break, ...] = ()
+    left_out: tuple[Span, ...]  # in order of time
+    breaks: tuple[Break, ...] = ()  # in order of time
 
     def flagged(self, track: Track) -> Track:
         """Return a track with the samples outside the part flagged."""
@@ -163,13 +138,6 @@ def long_after_stop(conditioned: Conditioned, share: float) -> Segments | None:
 def find_free_part(conditioned: Conditioned, windows: Demodulated) -> Segments | None:
     """Return the longest part with one free oscillation; None if this is the whole record.
 
-    Parameters
-    ----------
-    conditioned : Conditioned
-    windows : Demodulated
-
-    Notes
-    -----
     The maximum amplitude of n windows without any motion exceeds :math:`r u = \\sqrt{2 \\ln(n/\\alpha)}\\,u` with
     probability :math:`\\alpha` (Rayleigh distribution). Windows below this are still if a straight line through their
     neighbours' amplitudes extrapolates to more than twice this value. Between still windows the record is split where

@@ -42,18 +42,6 @@ MOST_PERIODS = 4096
 def find_sideways(conditioned: Conditioned, demodulated: Demodulated) -> Sideways:
     """Search for lines beside the main oscillation.
 
-    Parameters
-    ----------
-    conditioned : Conditioned
-    demodulated : Demodulated
-        Its windows give the main oscillation, independent of any damping law; its flags select the samples.
-
-    Returns
-    -------
-    Sideways
-
-    Notes
-    -----
     The main oscillation is first removed as smooth curves through the windows' values. Then it is fitted together with
     each line by least squares, with slowly varying amplitude and phase, to block means over a twelfth of a period.
     A mode within a few reciprocals of the record's length of the main frequency is not searched for. It beats too

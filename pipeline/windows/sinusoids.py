@@ -27,34 +27,17 @@ GREATEST = 0.05  # maximum detuning or decay, as a fraction of the frequency; be
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """Samples laid out as (windows, longest window), padded with unusable ones.
+    """Samples laid out as (windows, longest window), padded with unusable ones."""
 
-    Parameters
-    ----------
-    rows : (w, l) int64
-        Index of each sample in the track.
-    placed : (w, l) bool
-        True for measured samples at a time within reach of the window, usable or not; False for padding.
-    usable : (w, l) float64
-        1 for samples that may be fitted, else 0.
-    y : (w, l) float64, m
-        Distance less ``level``; 0 for samples that are not placed.
-    tau : (w, l) float64, s
-        Time from the window's centre; 0 for samples that are not placed.
-    centre : (w,) float64, s
-    level : float, m
-        Level subtracted from all distances to avoid cancellation in sums.
-    tiny : float, m
-        Length that is negligible beside the motion; it replaces zero in divisions by a spread or an amplitude.
-    """
-
-    rows: NDArray[np.int64]
+    rows: NDArray[np.int64]  # (w, l) index of each sample in the track
+    # (w, l) true for measured samples at a time within reach of the window, usable or not; False for padding.
     placed: NDArray[np.bool_]
-    usable: F8
-    y: F8
-    tau: F8
-    centre: F8
-    level: float
+    usable: F8  # (w, l), 1 for samples that may be fitted, else 0
+    y: F8  # (w, l) m, distance less ``level``; 0 for samples that are not placed
+    tau: F8  # (w, l) s, time from the window's centre; 0 for samples that are not placed
+    centre: F8  # (w,) s
+    level: float  # m, level subtracted from all distances to avoid cancellation in sums
+    # m, length that is negligible beside the motion; it replaces zero in divisions by a spread or an amplitude.
     tiny: float
 
     @classmethod
@@ -88,13 +71,7 @@ class Windows:
         )
 
     def basis(self, angular_frequency: F8, decay: F8) -> F8:
-        """Return (w, 4, l): rest position, decaying cosine, negative decaying sine, and the distances as the last row.
-
-        Parameters
-        ----------
-        angular_frequency, decay : (w,) float64, rad/s, 1/s
-            Values of each window.
-        """
+        """Return (w, 4, l): rest position, decaying cosine, negative decaying sine, and the distances last."""
         rows = np.empty((self.y.shape[0], 4, self.y.shape[1]))
         angle = angular_frequency[:, None] * self.tau
         rows[:, 0] = 1.0
@@ -111,27 +88,13 @@ class Windows:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """The fit of every window.
+    """The fit of every window."""
 
-    Parameters
-    ----------
-    coefficients : (w, 3) float64, m
-        Rest position less level, and the coefficients a and b.
-    normal : (w, 3, 3) float64
-        Normal matrices: weighted sums of products of the basis functions.
-    residual : (w, l) float64, m
-        Residuals of all placed samples, fitted or not.
-    good : (w,) bool
-        True for windows with enough samples, well spread over the period.
-    weights : (w, l) float64
-        Weights of the samples in the fit.
-    """
-
-    coefficients: F8
-    normal: F8
-    residual: F8
-    good: NDArray[np.bool_]
-    weights: F8
+    coefficients: F8  # (w, 3) m, rest position less level, and the coefficients a and b
+    normal: F8  # (w, 3, 3) normal matrices: weighted sums of products of the basis functions
+    residual: F8  # (w, l) m, residuals of all placed samples, fitted or not
+    good: NDArray[np.bool_]  # (w,) true for windows with enough samples, well spread over the period
+    weights: F8  # (w, l) weights of the samples in the fit
 
     @property
     def inverse(self) -> F8:
@@ -166,13 +129,6 @@ def solve(basis: F8, weights: F8) -> Solution:
     """Fit every window by weighted least squares, as a regression on two centred and nearly orthogonal columns.
 
     This takes a third of the time that ``numpy.linalg`` needs for determinants and inverses of 160 normal matrices.
-
-    Parameters
-    ----------
-    basis : (w, 4, l) float64
-        Basis from :meth:`Windows.basis`.
-    weights : (w, l) float64
-        Weights of the samples; the solution refers to this array and does not copy it.
     """
     sums = (basis[:, :3] * weights[:, None, :]) @ basis.transpose(0, 2, 1)
     count = np.maximum(sums[:, 0, 0], 1e-300)
@@ -205,23 +161,13 @@ def quantile(size: F8, usable: F8, share: float) -> F8:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tuning:
-    """Frequency and decay of the basis.
+    """Frequency and decay of the basis."""
 
-    Parameters
-    ----------
-    angular_frequency : float, rad/s
-        Angular frequency of the whole record.
-    turning : (w,) float64, rad/s
-        Angular frequency of each window.
-    decay : (w,) float64, 1/s
-        Logarithmic decay rate in each window.
-    phase, amplitude : (w,) float64, rad, m, or None
-        Values, at every window's centre, of smooth curves through the windows whose phase is significant.
-    """
-
-    angular_frequency: float
-    turning: F8
-    decay: F8
+    angular_frequency: float  # rad/s, angular frequency of the whole record
+    turning: F8  # (w,) rad/s, angular frequency of each window
+    decay: F8  # (w,) 1/s, logarithmic decay rate in each window
+    # phase, amplitude: (w,), values, at every window's centre, of smooth curves through the windows whose phase is
+    # significant.
     phase: F8 | None = None
     amplitude: F8 | None = None
 
@@ -232,18 +178,7 @@ class Tuning:
 
 
 def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 3) -> Tuning:
-    """Return the tuning that follows from the phases and amplitudes of a fit.
-
-    Parameters
-    ----------
-    windows : Windows
-    solution : Solution
-    omega : float, rad/s
-        Angular frequency of the fit.
-    degree : int
-        Degree of the polynomials in time for the phases and the logarithms of the amplitudes; lower for few windows.
-        Drag makes the decay vary along a record, and the amplitude makes the frequency vary.
-    """
+    """Return the tuning that follows from the phases and amplitudes of a fit."""
     if np.count_nonzero(solution.good) < 3:
         return _retune_short(windows, omega)
     z = solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]

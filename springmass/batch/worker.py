@@ -136,7 +136,7 @@ def _fill(row: dict[str, Any], loaded: Loaded, analysis: Analysis) -> None:
     moves = isinstance(motion, (Oscillation, Overdamped))
     row.update(
         status="ok" if moves else "no_oscillation",
-        error="" if moves else f"{row['path']}: no oscillation: {motion.why}",  # type: ignore[union-attr]
+        error="" if moves else f"{row['path']}: no oscillation: {motion.why}",
         format=loaded.format,
         kind=loaded.info.kind,
         channel=loaded.channel or None,

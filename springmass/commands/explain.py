@@ -6,7 +6,8 @@ import json
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 
-from pipeline.findings.finding import Found, Kind, kinds, word
+from pipeline.findings.finding import Kind, kinds, word
+from pipeline.registry.found import Found
 from springmass.errors import OK, USAGE, ProgramError
 from springmass.options import JsonOption
 from springmass.terminal.printing import wrapped

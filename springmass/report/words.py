@@ -73,7 +73,7 @@ def method(analysis: Analysis) -> tuple[str, ...]:
             "A sinusoid was fitted to the samples of every window of one or several periods by robust least squares; "
             "the period follows from the phases of the windows, and the damping from their amplitudes."
         ]
-    if motion.full is not None:
+    if motion.method == "samples":
         sentences.append("Then the whole waveform was fitted to all samples.")
     if not motion.damping.by_statement:
         sentences.append("The damping laws were compared by χ² and by the Bayesian information criterion.")

@@ -10,8 +10,9 @@ from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.damping.joint import JointDamping, JointFit, join
 from pipeline.errors import AnalysisError
-from pipeline.findings.finding import Finding, Found, word
+from pipeline.findings.finding import Finding, word
 from pipeline.numerics.estimate import Estimate
+from pipeline.registry.found import Found
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.derive import limited
 from springmass.errors import USAGE, ProgramError

@@ -12,8 +12,9 @@ from typing import Any
 
 from acquisition.recordings.recording import Trap
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.findings.finding import UNKNOWN_CODE, Finding, Found, by_severity, kinds, word
+from pipeline.findings.finding import UNKNOWN_CODE, Finding, by_severity, kinds, word
 from pipeline.numerics.estimate import Estimate, UpperLimit
+from pipeline.registry.found import Found
 from pipeline.results.budget import Contribution
 from pipeline.results.classic import Classic
 from pipeline.results.derive import Derived

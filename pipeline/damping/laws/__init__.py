@@ -37,13 +37,7 @@ LAWS: dict[str, Law] = {law.name: law for law in _ALL}
 
 
 def find_law(law: str | Law) -> Law:
-    """Return the law with a name; a law is returned unchanged.
-
-    Raises
-    ------
-    AnalysisError
-        If no law has this name, or if a user-defined law has the name of a built-in one.
-    """
+    """Return the law with a name; a law is returned unchanged."""
     name = law if isinstance(law, str) else law.name
     if isinstance(law, str):
         if name not in LAWS:

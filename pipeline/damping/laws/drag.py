@@ -45,18 +45,12 @@ FLOOR = 1e-3  # minimum start value of A0, as a share of the maximum amplitude
 
 @dataclass(frozen=True)
 class Drag:
-    """A law whose rate is a sum of powers of the amplitude: friction mu, linear drag gamma, quadratic drag beta.
+    """A law whose rate is a sum of powers of the amplitude: friction mu, linear drag gamma, quadratic drag beta."""
 
-    Parameters
-    ----------
-    name, words : str
-        Short name, and the name in a sentence.
-    powers : tuple of int
-        Powers of the amplitude in :math:`-dA/dt`: 0 for friction, 1 for linear, 2 for quadratic drag.
-    """
-
+    # name, words: short name, and the name in a sentence.
     name: str
     words: str
+    # Powers of the amplitude in :math:`-dA/dt`: 0 for friction, 1 for linear, 2 for quadratic drag.
     powers: tuple[int, ...]
 
     @functools.cached_property
@@ -83,8 +77,6 @@ class Drag:
     def guess(self, t: F8, amplitude: F8) -> F8:
         """Return start values (p,) for a fit to one or more points in the order of time.
 
-        Notes
-        -----
         The integrated equation, :math:`A = A_0 - \\mu t - \\gamma\\int A - \\beta\\int A^2`, is linear in all
         parameters, and integrals of noisy points are far less noisy than their differences.
         """
@@ -211,16 +203,7 @@ def _integral_of_squares(t: F8, flow: _Flow, elapsed: F8) -> F8:
 def amplitudes(t: F8, theta: F8) -> F8:
     """Return the amplitudes of several motions.
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-    theta : (k, 4) float64
-        A0, mu, gamma and beta of each motion.
-
-    Returns
-    -------
-    (k, n) float64, m
-        Zero after friction has stopped the motion; infinite beyond the pole of an amplitude that grows.
+    Zero after friction has stopped the motion; infinite beyond the pole of an amplitude that grows.
     """
     return np.array([_flow(t, *row).amplitude for row in theta.tolist()])
 

@@ -60,8 +60,6 @@ def free_power(law: Law) -> str | None:
 def in_units(law: Law, theta: F8, *, length_m: float = 1.0, time_s: float = 1.0) -> F8:
     """Return the parameters (p,) of the same decay with other units of length and time than m and s.
 
-    Notes
-    -----
     A parameter of unit :math:`\\mathrm{m}^a\\mathrm{s}^b` is divided by :math:`L^a T^b`.
     """
     values = dict(zip(law.parameters, theta.tolist(), strict=True))

@@ -86,22 +86,14 @@ def make_law(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FunctionLaw:
-    """A damping law from a user-defined function; :func:`make_law` makes one.
+    """A damping law from a user-defined function; :func:`make_law` makes one."""
 
-    Parameters
-    ----------
-    name, parameters, cases
-        As in :class:`pipeline.damping.laws.law.Law`.
-    words : str
-        The name of the law in findings.
-    function, start : callable
-        The parameters ``amplitude`` and ``guess`` of :func:`make_law`.
-    """
-
+    # name, parameters, cases: as in :class:`pipeline.damping.laws.law.Law`.
     name: str
-    words: str
+    words: str  # the name of the law in findings
     parameters: Mapping[str, Unit]
     cases: tuple[str, ...]
+    # function, start: the parameters ``amplitude`` and ``guess`` of :func:`make_law`.
     function: Callable[..., ArrayLike] = field(repr=False)
     start: Callable[[F8, F8], ArrayLike] = field(repr=False)
 
@@ -116,13 +108,7 @@ class FunctionLaw:
         return np.array(each) / (2.0 * STEP_S)
 
     def guess(self, t: F8, amplitude: F8) -> F8:
-        """Return the start values (p,) that ``start`` gives for points.
-
-        Raises
-        ------
-        AnalysisError
-            If they are not one finite number for each parameter.
-        """
+        """Return the start values (p,) that ``start`` gives for points."""
         with np.errstate(all="ignore"):
             found = np.array(self.start(t, amplitude), np.float64)
         if found.shape != (len(self.parameters),) or not np.isfinite(found).all():

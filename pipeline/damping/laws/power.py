@@ -17,8 +17,6 @@ _MIXED = Drag("guess", "", (1, 2))
 class Power:
     """Drag proportional to a power of the amplitude: :math:`dA/dt = -c A^n`.
 
-    Notes
-    -----
     With :math:`m = 1 - n`, the rate at the start :math:`k = c A_0^{-m}` and :math:`x = k t`, the amplitude is
     :math:`A = A_0 (1 - m x)^{1/m}`, which tends to :math:`A_0 e^{-x}` as m tends to 0. n = 0 is friction, which stops
     the motion, n = 1 linear and n = 2 quadratic drag; vortices shed by an edge give n = 5/3.

@@ -105,3 +105,14 @@ def test_a_frequency_that_follows_the_amplitude_is_no_misfit() -> None:
         result = analysed(size * np.cos(OMEGA * T + 60.0 * np.cumsum(size**2) / 100.0), seed)
         assert "amplitude_dependent_frequency" in {finding.code for finding in result.findings}
         assert misfit(result) is None
+
+
+def test_a_smooth_residual_shows_no_filter_of_the_sensor() -> None:
+    """It has no white noise that a filter could have smoothed, so the amplitude is not taken for a filtered one."""
+    t, rng = np.arange(540) / 60, np.random.default_rng(1)
+    lines = np.exp(-((np.fft.rfftfreq(4096, 1 / 60) / 4.0) ** 2))
+    smooth = np.fft.irfft(lines * (rng.standard_normal(2049) + 1j * rng.standard_normal(2049)))[: t.size]
+    y = 0.3 + 0.083 * np.exp(-0.1 * t) * np.cos(5.5 * t) + 1e-3 * smooth / np.std(smooth)
+    result = analyse(Track.from_arrays(t, y))
+    assert "smoothed_sensor" not in {finding.code for finding in result.findings}
+    assert result.estimates["amplitude"].u < 2e-3

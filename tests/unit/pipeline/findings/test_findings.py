@@ -10,7 +10,8 @@ import pytest
 
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
-from pipeline.findings.finding import Found, word
+from pipeline.findings.finding import word
+from pipeline.registry.found import Found
 from pipeline.track import F8, Track
 from tests.synthetic import Truth, noisy, times
 

@@ -1,4 +1,4 @@
-"""Oscillation: whether a motion whose spectrum has a peak really is an oscillation."""
+"""Whether a motion whose spectrum has a peak really is an oscillation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from pipeline.motion.fitted import Fitted
 from pipeline.numerics.quantity import amount, noun
 from pipeline.samples.condition import Conditioned
 from pipeline.track import UNUSABLE
@@ -18,18 +17,12 @@ FOLDED = 32  # phase bins per period
 ALIKE = 0.25  # maximum share of the residual's variance by which similar periods may differ
 WANDERING = 0.3  # maximum residual beyond white noise, over the amplitude
 MANY = 8  # number of windows from which a motion with residuals below MOST_BENT is judged by its coherence instead
-FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
 
 
 def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
     """Return why the motion is no oscillation, although its spectrum has a peak; None if it is one.
 
     A step or a ramp has a peak in its spectrum too.
-
-    Parameters
-    ----------
-    conditioned, demodulated
-        Outputs of the stages with the same names.
     """
     most = demodulated.amplitude.size * 9 // 10
     size = float(np.partition(demodulated.amplitude, most)[most])
@@ -60,32 +53,3 @@ def _repeats(conditioned: Conditioned, demodulated: Demodulated) -> bool:
     bins = ((turns - np.floor(turns)) * FOLDED).astype(np.int64) % FOLDED
     means = np.bincount(bins, left, FOLDED) / np.maximum(np.bincount(bins, minlength=FOLDED), 1)
     return demodulated.t.size >= 4 and float(np.var(left - means[bins])) < ALIKE * float(np.var(left))
-
-
-def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
-    """Return why a motion is no oscillation, although single periods look like one; None if it is one.
-
-    Amplitude and phase of a window form a phasor, which the damping law and the fit of the phase predict. Random
-    phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
-    differ from it by less, ``typical``.
-    """
-    if typical < ASTRAY or fitted.demodulated.t.size < FEWEST:
-        return None
-    return NoOscillation(
-        f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"
-    )
-
-
-def typical_miss(fitted: Fitted) -> float:
-    """Return the weighted median difference of windows from the fitted oscillation, over their amplitudes.
-
-    The weights are the amplitudes of the windows.
-    """
-    demodulated, phase = fitted.demodulated, fitted.phase
-    expected = phase.damping.best.amplitude(demodulated.t - phase.t0) * np.exp(1j * phase.total(demodulated.t))
-    own = demodulated.amplitude * np.exp(1j * demodulated.phase)
-    size = np.abs(own)
-    missed = np.abs(own - expected) / np.maximum(size, 1e-12 * float(size.max()))
-    order = np.argsort(missed)
-    middle = int(np.searchsorted(np.cumsum(size[order]), 0.5 * float(size.sum())))
-    return float(missed[order][middle])

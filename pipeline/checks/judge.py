@@ -1,0 +1,68 @@
+"""The judge: tests of the residual in order, and what they add to the uncertainties.
+
+Each test states the probability of a false alarm, or a size below which no user would act. A test that explains the
+residual takes its part away before the next; what no named cause explains is ``model_misfit``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from pipeline.bench.sensor_filter import SensorFilter
+from pipeline.checks.limits import beyond_limits
+from pipeline.checks.misfit import Misfit
+from pipeline.checks.model import colour, excess, halves, phases
+from pipeline.checks.residual import Outcome, Residual, residual_of
+from pipeline.checks.sensor import held, smoothed
+from pipeline.checks.shape import folded_shape
+from pipeline.motion.averaged import Fitted
+from pipeline.registry.found import Found
+from pipeline.samples.condition import Conditioned
+from pipeline.windows.lost_rows import LostRows
+
+
+class Test(NamedTuple):
+    """A test of the residual, and the probability with which it accuses a run that follows its model."""
+
+    run: Callable[[Residual], Outcome | None]
+    false_alarm: float | None  # None: it fires by size
+
+
+TESTS = (
+    Test(folded_shape, 1e-5),  # seven harmonics of 1e-6 each, and a ratio
+    Test(held, None),
+    Test(smoothed, None),  # at 64 samples a correlation of 0.4 is three standard deviations
+    Test(excess, None),
+    Test(halves, 1e-4),
+    Test(colour, 1e-4),
+    Test(phases, 1e-4),
+)
+
+
+def judge(
+    samples: Conditioned, fitted: Fitted, filter_: SensorFilter | None, lost: LostRows | None = None
+) -> tuple[tuple[Found, ...], tuple[Misfit, ...]]:
+    """Return what the limits and the tests found, and what it adds to the uncertainties.
+
+    A solution of the equation of motion is held against the limits only: strong damping distorts every period, which
+    would look like a shape, and the fit of the equation is accepted only if it describes the samples.
+    """
+    outcomes = list(beyond_limits(samples, fitted))
+    if lost is not None:
+        missing = {"places": lost.places, "share": lost.share}
+        outcomes.append(Outcome("lost_rows", missing, Misfit(name="lost_rows", clock=lost.share)))
+    if fitted.method != "equation":
+        residual = residual_of(samples, fitted, filter_)
+        for test in TESTS:
+            if (outcome := test.run(residual)) is not None:
+                outcomes.append(outcome)
+                residual = residual.less(outcome)
+    numbers: dict[str, dict[str, float | str | None]] = {}
+    for one in outcomes:
+        if one.numbers is not None:
+            numbers.setdefault(one.code, {}).update(one.numbers)
+    if "model_misfit" in numbers:
+        numbers["model_misfit"]["scatter_excess_m"] = fitted.damping.scatter.excess or None
+    found = tuple(Found(code, each) for code, each in numbers.items())
+    return found, tuple(one.misfit for one in outcomes if one.misfit is not None)

@@ -1,0 +1,106 @@
+"""The residual of a run: what the fit of every window leaves of the samples, as input of the tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.bench.sensor_filter import SensorFilter
+from pipeline.checks.misfit import Misfit
+from pipeline.motion.averaged import Fitted
+from pipeline.numerics.robust import median
+from pipeline.samples.condition import Conditioned
+from pipeline.track import F8, UNUSABLE
+from pipeline.windows.demodulate import model_error
+
+FEWEST = 64  # minimum number of samples: four in each of the sixteen parts in which the shape is compared
+COARSE = 2.6  # ratio of step to noise above which the step is coarse: for rounding noise alone it is sqrt(12) = 3.5
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a test found: numbers of its finding, what it adds to the uncertainties, and what it explains.
+
+    ``explains`` (k,) is subtracted from the residual, and ``lags`` is the number of samples up to which correlations
+    are explained. A test explains only what it models.
+    """
+
+    code: str
+    numbers: Mapping[str, float | None] | None = None  # None: too small to be told
+    misfit: Misfit | None = None
+    explains: F8 | float = 0.0
+    lags: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Residual:
+    """The residual at the samples used (k,), and the fit that left it."""
+
+    samples: Conditioned
+    fitted: Fitted
+    filter: SensorFilter | None  # of the sensor, as the scene states it
+    values: F8  # still with the harmonics that were subtracted as modes
+    phase: F8  # of the oscillation, rad
+    relative: F8 | None  # amplitude over that at the first sample; None if it cannot be calculated
+    rows: NDArray[np.int64]  # indices of the samples
+    noise_m: float  # standard deviation of one sample
+    rounding_m: float  # error of the sinusoid of a window, which is larger than the noise of computed records
+    amplitude_m: float  # mean amplitude
+    seconds: float
+    step_s: float  # mean time between samples
+    turn: float  # increase of the phase from sample to sample, rad
+    per_window: int  # number of samples in a window
+    lags: float = 1.0  # number of samples up to which correlations are explained
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are enough samples for tests of them."""
+        return self.values.size >= FEWEST and self.seconds > 0.0
+
+    @property
+    def noisy(self) -> bool:
+        """Whether there is noise, and not only rounding or coarse steps, which the finding "quantised" reports."""
+        return self.noise_m > max(self.rounding_m, (self.samples.quantum_m or 0.0) / COARSE)
+
+    def on_grid(self) -> tuple[F8, F8]:
+        """Return the residual of all samples (n,), 0 where none was used, and 1 where one was used."""
+        whole, used = np.zeros((2, len(self.samples.track)))
+        whole[self.rows], used[self.rows] = self.values, 1.0
+        return whole, used
+
+    def less(self, outcome: Outcome) -> Residual:
+        """Return what an outcome does not explain."""
+        return replace(self, values=self.values - outcome.explains, lags=max(self.lags, outcome.lags))
+
+
+def residual_of(samples: Conditioned, fitted: Fitted, filter_: SensorFilter | None) -> Residual:
+    """Return the residual of a run that was fitted by its windows."""
+    windows, disturbances, t = fitted.demodulated, fitted.disturbances, samples.track.t
+    rows = np.flatnonzero(((windows.flags & UNUSABLE) == 0) & np.isfinite(windows.residual))
+    values = windows.residual[rows]
+    locked = tuple(mode for mode in disturbances.sideways.modes if mode.kind == "harmonic")
+    if disturbances.modelled and locked:
+        values = values + replace(disturbances.sideways, modes=locked).position(t[rows])
+    size = np.abs(fitted.damping.best.amplitude(np.maximum(t[rows] - fitted.damping.t0, 0.0)))
+    falls = bool(size.size and np.isfinite(size).all() and size[0] > 0.0)
+    seconds = float(t[rows[-1]] - t[rows[0]]) if rows.size else 0.0
+    step_s = seconds / max(int(rows[-1] - rows[0]), 1) if rows.size else 0.0
+    return Residual(
+        samples,
+        fitted,
+        filter_,
+        values,
+        fitted.phase.total(t[rows]),
+        size / size[0] if falls else None,
+        rows,
+        windows.noise_m,
+        median(model_error(windows.amplitude, windows.decay, windows.angular_frequency)),
+        float(np.mean(np.abs(windows.amplitude))),
+        seconds,
+        step_s,
+        fitted.phase.angular_frequency.value * step_s,
+        rows.size // windows.t.size,
+    )

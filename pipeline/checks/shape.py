@@ -1,0 +1,116 @@
+"""The shape of a period: whether all periods differ from a sinusoid in the same way."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.checks.misfit import Misfit
+from pipeline.checks.residual import Outcome, Residual
+from pipeline.track import F8
+
+BINS = 64  # phase bins per period; the eighth harmonic keeps sin(pi 8/64)/(pi 8/64) = 0.97 of its amplitude
+FALSE_ALARM = 1e-6  # probability that white noise shows a given harmonic
+HIGHEST = 8  # highest order of harmonics that are sought
+PARTS = 16  # number of parts of the run that must agree on a harmonic
+TOLD = 0.002  # minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones
+CENTRES = 2.0 * math.pi * (np.arange(BINS) + 0.5) / BINS
+
+
+def folded_shape(residual: Residual) -> Outcome | None:
+    """Test for a wave that has the same shape in every period.
+
+    The fit of every window removes the constant and the first harmonic. So the residuals contain the harmonics from the
+    second on: :math:`c_k = 2\\overline{r e^{-ik\\varphi}}`. The harmonics of a nonlinear scale or spring are
+    proportional to the power :math:`A^k` of the amplitude A. They are fitted with the weights :math:`A^k`, and are used
+    instead if they are less likely by chance. Harmonics are fitted in S = 16 parts of the run. Let F be the squared
+    mean of the parts over its variance from their scatter. The probability of such a harmonic by chance is
+    :math:`(1 + F/(S - 1))^{-(S - 1)}`, the F distribution with 2 and 2(S - 1) degrees of freedom.
+
+    The contribution of the wave to the constant and the first harmonic is about as large as the part that remains. So
+    the largest value of the wave is the uncertainty of amplitude and rest position. A third harmonic makes the
+    uncertainty of the amplitude three times as large, because
+    :math:`\\cos^3\\varphi = (3\\cos\\varphi + \\cos 3\\varphi)/4`. If this contribution decays as the square of the
+    amplitude, the relative error of the damping rate is twice that of the amplitude.
+    """
+    if not residual.enough:
+        return None
+    turns, relative = residual.phase * (1.0 / (2.0 * math.pi)), residual.relative
+    bins = ((turns - np.floor(turns)) * BINS).astype(np.int64)
+    np.minimum(bins, BINS - 1, out=bins)
+    orders = np.arange(2, min(HIGHEST, int(math.pi / residual.turn) - 1) + 1)
+    if not orders.size:
+        return None
+    mean, chance = _folded(residual, bins, orders, None)
+    falls = False
+    if relative is not None:
+        falling = _folded(residual, bins, orders, relative)
+        if falls := float(np.min(falling[1])) < float(np.min(chance)):
+            mean, chance = falling
+    stands = np.flatnonzero(chance < FALSE_ALARM)
+    each = np.real(mean[stands, None] * np.exp(1j * orders[stands, None] * CENTRES))
+    wave = each.sum(axis=0)
+    peak_m = float(np.max(np.abs(wave)))
+    if not peak_m > max(0.5 * (residual.samples.quantum_m or 0.0), residual.rounding_m):
+        return None
+    amplitude_m, fall = residual.amplitude_m, 1.0
+    if falls and relative is not None:
+        amplitude_m /= float(np.mean(relative))
+        fall = max(1.0, -math.log(max(float(relative[-1]), 1e-3)))
+    power, order = np.abs(mean[stands]) ** 2, orders[stands]
+    moved_m = peak_m + 2.0 * float(np.sum(np.sqrt(power[order == 3])))
+    misfit = Misfit(
+        name="model_misfit",
+        amplitude_m=moved_m,
+        offset_m=peak_m,
+        phase_rad=peak_m / amplitude_m,
+        damping_rate=2.0 * moved_m / amplitude_m * fall / residual.seconds,
+    )
+    share, total = peak_m / amplitude_m, float(power.sum())
+    even, second = float(power[order % 2 == 0].sum()) / total, float(power[order == 2].sum()) / total
+    if even > 0.9 and second > 0.95:
+        way = {"even": even}
+    elif even < 0.1:
+        way = {"odd": 1.0 - even}
+    else:
+        way = {"near_peak_m" if abs(wave[BINS // 2]) > abs(wave[0]) else "far_peak_m": peak_m}
+    numbers = None if share < TOLD else {"peak_m": peak_m, "share": share, **way}
+    explained = np.zeros(bins.size)
+    for one, k in zip(each, order.tolist(), strict=True):
+        explained += one[bins] if not falls or relative is None else one[bins] * relative**k
+    return Outcome("not_sinusoidal", numbers, misfit, explained)
+
+
+def _folded(
+    residual: Residual, bins: NDArray[np.int64], orders: NDArray[np.int64], relative: F8 | None
+) -> tuple[NDArray[np.complex128], F8]:
+    """Return harmonics (o,), m, steady or proportional to a power of the amplitude, and the chance of each.
+
+    Each harmonic is the weighted mean of least-squares fits to the parts of the run.
+    """
+    waves = np.exp(-1j * orders[:, None] * CENTRES)
+    each, own = np.zeros((PARTS, orders.size), np.complex128), np.zeros((PARTS, orders.size))
+    edges = -(-np.arange(PARTS + 1) * bins.size // PARTS)
+    for part, (first, stop) in enumerate(itertools.pairwise(edges.tolist())):
+        rows = slice(first, stop)
+        weight = np.ones(stop - first) if relative is None else relative[rows]
+        for i in range(orders.size):
+            if relative is not None:  # the first order is 2
+                weight = weight * relative[rows]
+            if relative is not None or i == 0:
+                sums = np.bincount(bins[rows], residual.values[rows] * weight, BINS)
+            own[part, i] = weight @ weight
+            each[part, i] = 2.0 * (waves[i] @ sums) / max(own[part, i], 1e-300)
+    share = own / own.sum(axis=0)
+    mean = np.sum(share * each, axis=0)
+    # Parts in which the harmonic is weak contain little information and have little weight.
+    known = 1.0 / np.sum(share**2, axis=0)
+    scatter = np.sum(share**2 * np.abs(each - mean) ** 2, axis=0) * known / np.maximum(known - 1.0, 1e-9)
+    variance = np.maximum(scatter, 4.0 * residual.noise_m**2 / own.sum(axis=0))
+    judged = (known > 2.0) & (variance > 0.0)
+    f = np.abs(mean) ** 2 / np.where(judged, variance, 1.0)
+    chance = np.where(judged, (1.0 + f / np.where(judged, known - 1.0, 1.0)) ** (1.0 - known), 1.0)
+    return mean, np.asarray(chance)

@@ -1,0 +1,390 @@
+"""The motion averaged over cycles: rest position, amplitude by a law, and phase, fitted to windows or to samples.
+
+The motion is :math:`y = r(t) + A(t; \\theta)\\cos\\bigl(\\varphi + \\omega\\tau + \\kappa\\int A^2 - \\ell(t)\\bigr)`,
+with :math:`\\tau` from the middle of the record, where frequency and phase are uncorrelated. The windows give points of
+amplitude, phase and rest position, which determine the three parts independently of each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from pipeline.damping.law_fit import LawFit
+from pipeline.damping.laws import Law
+from pipeline.damping.select import Damping
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.quantity import Unit
+from pipeline.numerics.regression import (
+    Line,
+    Scatter,
+    chi2_quantile,
+    correlation_length,
+    scatter,
+    smooth_curve,
+    solve_weighted,
+)
+from pipeline.track import F8, UNUSABLE
+from pipeline.windows.cycles import NoOscillation
+from pipeline.windows.demodulate import ROUNDING, Demodulated
+from pipeline.windows.disturbances import Disturbances
+
+Table = tuple[F8, F8]  # values at ascending times, s
+
+BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency depends on the squared amplitude
+POINTS = 2049  # number of points in the tables of the lag and of the integral of the amplitude
+MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
+NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
+DEGREE = 6  # maximum degree of the polynomial of a drifting rest position
+# Minimum decrease of the BIC for a bent phase or a drifting rest position; 10 is "very strong" evidence.
+EVIDENCE = 10.0
+FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
+REJECTION = 1e-3  # probability that the chi-square test rejects residuals that are only noise
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Phase:
+    """Total phase against time: a straight line, a backbone if one shows, less the lag of a period's sinusoid."""
+
+    t0: float  # time of the start, s
+    angular_frequency: Estimate  # mean over the record: the slope of a straight line through the phases
+    phase: Estimate  # at t0, wrapped into (-pi, pi]
+    backbone: Estimate | None  # kappa of omega(A) = omega + kappa A^2; None if it is not significant
+    reduced_chi2: float
+    correlation: float  # of the straight line's residuals, as a number of windows
+    residual: F8  # (w,) phases minus the straight line, rad
+    coefficients: F8  # of 1, of t - middle and, with a backbone, of the integral of A^2
+    middle: float  # weighted mean time, s
+    area: Table | None = None  # integral of A^2 from the middle; with a backbone
+    lag: Table | None = None  # delay of a period's sinusoid, rad; None if it is constant
+    small_swings: Estimate | None = None  # angular frequency of very small swings; with a backbone
+    squared_rate: float | None = None  # decrease of the squared frequency by drag, 1/s^2; None: that of the windows
+
+    def total(self, t: F8) -> F8:
+        """Return the total phase in rad at times t (n,)."""
+        level, slope, *bend = self.coefficients.tolist()
+        total = level + slope * (t - self.middle)
+        if self.area is not None:
+            total += bend[0] * np.interp(t, *self.area)
+        return np.asarray(total - _delay(t, self.lag))
+
+    def rate(self, amplitude: F8) -> F8:
+        """Return the angular frequency in rad/s at amplitudes (n,)."""
+        bend = self.coefficients[2] if self.area is not None else 0.0
+        return np.asarray(self.coefficients[1] + bend * amplitude**2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest:
+    """The rest position: its mean, and a smooth curve through the windows that counts if it ``drifts``."""
+
+    mean: Estimate
+    drift_m: float  # peak-to-peak range of the curve
+    drifts: bool  # whether the curve fits much better than a constant
+    t: F8  # (w,) centres of the windows, s
+    curve: F8  # (w,) m
+
+    def at(self, t: F8) -> F8:
+        """Return the rest position in m at times t (n,)."""
+        return np.interp(t, self.t, self.curve) if self.drifts else np.full(t.size, self.mean.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Waveform:
+    """The fitted motion at every sample; its residual contains everything that the model does not describe."""
+
+    position: F8  # (n,) m
+    moving: Callable[[], F8]
+    residual: F8  # (n,) distance minus position, NaN where none was measured
+    rms_m: float  # root mean square of the residual over the samples used
+
+    @cached_property
+    def velocity(self) -> F8:
+        """Velocity of the oscillation (n,) in m/s, calculated on first use, as only figures need it."""
+        return self.moving()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """An oscillation in the form that the stages after the fit use."""
+
+    demodulated: Demodulated  # the windows, with the final flags
+    disturbances: Disturbances  # what was subtracted from the record before the fit
+    damping: Damping
+    phase: Phase
+    rest: Rest
+    waveform: Waveform  # including the disturbances
+    method: str  # "windows", "samples" or "equation"
+    why: str  # what a method that failed, or the equation of motion, came to
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Averaged:
+    """The model of samples: parameters of the law, of the phase, and coefficients of the rest position."""
+
+    law: Law
+    t0: float  # the law's amplitude is constant before this time, s
+    last: float  # and after this
+    middle: float
+    reach: float  # largest distance of a sample from the middle, s
+    degree: int  # of the polynomial of the rest position
+    area: Table | None
+    lag: Table | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each parameter."""
+        turning = ("phase", "angular_frequency", "backbone")[: 2 if self.area is None else 3]
+        return (*self.law.parameters, *turning, *(f"rest{k}" for k in range(self.degree + 1)))
+
+    def split(self, values: F8) -> tuple[F8, F8, F8]:
+        """Return the parameters of law, phase and rest position."""
+        first = len(self.law.parameters)
+        second = first + (2 if self.area is None else 3)
+        return values[:first], values[first:second], values[second:]
+
+    def rest(self, t: F8) -> F8:
+        """Return the columns (n, degree + 1) of the rest position."""
+        return np.asarray(np.polynomial.legendre.legvander((t - self.middle) / self.reach, self.degree))
+
+    def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
+        """Return the positions (n,) at t, and a function that gives their derivatives (n, p)."""
+        theta, turning, still = self.split(values)
+        amplitude, by_theta = self.law.curve(np.clip(t, self.t0, self.last) - self.t0, theta)
+        turns, rest = _turns(t, self.middle, self.area), self.rest(t)
+        angle = turns @ turning - _delay(t, self.lag)
+        cosine = np.cos(angle)
+
+        def slopes() -> F8:
+            rows = np.empty((values.size, t.size))
+            first, second = theta.size, theta.size + turning.size
+            np.multiply(by_theta.T, cosine, out=rows[:first])
+            np.multiply(turns.T, -amplitude * np.sin(angle), out=rows[first:second])
+            rows[second:] = rest.T
+            return rows.T
+
+        return amplitude * cosine + rest @ still, slopes
+
+
+def fit_windows(windows: Demodulated, disturbances: Disturbances, damping: Damping) -> Fitted:
+    """Fit phase and rest position to the windows, whose amplitudes gave the laws."""
+    samples = disturbances.conditioned
+    track, flags = samples.track, windows.flags
+    last = float(np.max(track.t, where=(flags & UNUSABLE) == 0, initial=-np.inf))
+    phase = fit_phase(windows, damping, last)
+    rest = fit_rest(windows, track.unit)
+    return assembled(windows, disturbances, damping, phase, rest, "windows")
+
+
+def assembled(
+    windows: Demodulated, disturbances: Disturbances, damping: Damping, phase: Phase, rest: Rest, method: str
+) -> Fitted:
+    """Return the fitted oscillation with its waveform: rest position, amplitude and phase at every sample."""
+    track = disturbances.conditioned.track
+    used = (windows.flags & UNUSABLE) == 0
+    # A law is valid only where it was fitted: before the first and after the last sample used it is held constant.
+    last = float(np.max(track.t, where=used, initial=-np.inf))
+    best = damping.best
+    amplitude = best.amplitude(np.clip(track.t, damping.t0, last) - damping.t0)
+    angle = phase.total(track.t)
+    position = rest.at(track.t) + amplitude * np.cos(angle)
+    residual = track.y - position
+    left = residual if used.all() else residual[used]
+
+    rms_m = math.sqrt(float(left @ left) / left.size)
+    whole = position + disturbances.position if disturbances else position
+    waveform = Waveform(whole, partial(_velocity, best, phase, amplitude, angle), residual, rms_m)
+    return Fitted(windows, disturbances, damping, phase, rest, waveform, method, "")
+
+
+def _velocity(best: LawFit, phase: Phase, amplitude: F8, angle: F8) -> F8:
+    growth = best.law.rate(amplitude, best.joint.values)
+    return np.asarray(growth * np.cos(angle) - amplitude * phase.rate(amplitude) * np.sin(angle))
+
+
+def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
+    """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
+
+    The reported frequency is the record's mean, whether or not the frequency varies. If the residuals of the straight
+    line are not white, its uncertainty is multiplied by the square root of the correlation length and, if chi-square
+    is too large, of the reduced chi-square. The interval then covers a curvature of the phase.
+
+    The frequency of an ideal spring is constant. A nonlinear spring shifts it in proportion to the square of the
+    amplitude. The delay of a period's fitted sinusoid (:func:`lag_of`) follows from the damping law and is removed
+    first.
+    """
+    t, t0 = windows.t, damping.t0
+    noise = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
+    if t.size < 2:
+        return _single(windows, t0, float(noise[0]))
+    lag = lag_of(damping.best, t0, windows)
+    phase = windows.phase + _delay(t, lag)
+    spread = scatter(t, phase - windows.angular_frequency * (t - t[0]), noise)
+    kept = spread.kept
+    u = spread.u[kept]
+    middle = float(np.average(t[kept], weights=1.0 / u**2))
+    line = _turns(t, middle, None)
+    model = straight = solve_weighted(line[kept], phase[kept], u)
+    area = None
+    if u.size >= 8 and len(damping.best.law.parameters) > 1:
+        table = area_of(damping.best.law, damping.best.joint.values, t0, middle, last)
+        bent = solve_weighted(_turns(t, middle, table)[kept], phase[kept], u)
+        if (straight.chi2 - bent.chi2) / spread.correlation - math.log(u.size / spread.correlation) > EVIDENCE:
+            model, area = bent, table
+    widened, length = _widening(straight, u, spread)
+    covariance = straight.covariance * widened
+    first = np.array([t0])
+    at_start = float((_turns(first, middle, area) @ model.values - _delay(first, lag))[0])
+    start, free = _turns(first, middle, None)[0], max(u.size - model.values.size, 1)
+    backbone = small = None
+    if area is not None:
+        u_bent = np.sqrt(np.diag(model.covariance) * spread.correlation * max(1.0, model.chi2 / free))
+        small = Estimate(float(model.values[1]), float(u_bent[1]), "rad/s")
+        backbone = Estimate(float(model.values[2]), float(u_bent[2]), BACKBONE.of(damping.best.joint.units[0]))
+    return Phase(
+        t0,
+        Estimate(float(straight.values[1]), math.sqrt(covariance[1, 1]), "rad/s"),
+        Estimate(wrapped(at_start), math.sqrt(float(start @ covariance @ start)), "rad"),
+        backbone,
+        model.chi2 / free,
+        length,
+        phase - line @ straight.values,
+        model.values,
+        middle,
+        area,
+        lag,
+        small,
+    )
+
+
+def _single(windows: Demodulated, t0: float, noise: float) -> Phase:
+    """Return the phase of a single window: its frequency is that of the spectrum, uncertain by half a line width."""
+    t, omega, own = float(windows.t[0]), windows.angular_frequency, float(windows.phase[0])
+    return Phase(
+        t0,
+        Estimate(omega, math.pi / max(2.0 * (t - t0), 1e-9), "rad/s"),
+        Estimate(wrapped(own + omega * (t0 - t)), math.hypot(noise, 0.5 * math.pi), "rad"),
+        None,
+        math.nan,
+        1.0,
+        np.zeros(1),
+        np.array([own, omega]),
+        t,
+    )
+
+
+def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
+    """Return the factor that widens the straight line's covariance, and the correlation length used for it."""
+    free = line.residual.size - 2
+    if free < 1:
+        return 1.0, 1.0
+    length = max(correlation_length(line.residual / u), spread.correlation)
+    too_large = line.chi2 > chi2_quantile(1.0 - REJECTION, free)
+    return length * (line.chi2 / free if too_large else 1.0), length
+
+
+def _turns(t: F8, middle: float, area: Table | None) -> F8:
+    """Return the columns of the phase: 1, the time from the middle and, with a backbone, the integral of A^2."""
+    columns = [np.ones(t.size), t - middle]
+    if area is not None:
+        columns.append(np.interp(t, *area))
+    return np.stack(columns, axis=1)
+
+
+def _delay(t: F8, lag: Table | None) -> F8 | float:
+    return 0.0 if lag is None else np.interp(t, *lag)
+
+
+def lag_of(fit: LawFit, t0: float, windows: Demodulated) -> Table | None:
+    """Return the delays in rad that drag causes in a period's fitted sinusoid; None if they are constant.
+
+    Drag acts mainly while the bob is fast. A period is therefore not exactly sinusoidal, and the first harmonic of its
+    exact waveform lags behind a phase that advances at a constant rate. To first order, averaging gives the lag
+    :math:`\\frac{n + 3}{2(n + 1)}\\frac{r}{\\omega A} = (\\frac12 + \\frac1{n + 1})\\frac{r}{\\omega A}` for a force
+    :math:`\\propto v^n`. For any sum of powers it is therefore
+
+    .. math:: \\frac{1}{\\omega A}\\Bigl(\\frac{r(A)}{2} + \\frac1A\\int_0^A r(a)\\,da\\Bigr).
+
+    For friction the lag is :math:`3\\delta/\\pi A`, where :math:`2\\delta` is the loss of amplitude per half-cycle.
+    Near the stop the formula fails; the lag is limited to its value where half of the amplitude is lost per radian.
+    """
+    t = np.linspace(t0, max(float(np.max(windows.t)), t0 + 1e-9), POINTS)
+    amplitude = np.abs(fit.amplitude(t - t0))
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    below = amplitude[:, None] * 0.5 * (nodes + 1.0)
+    theta = fit.joint.values
+    with np.errstate(all="ignore"):
+        rate = -fit.law.rate(amplitude, theta)
+        mean = -0.5 * fit.law.rate(below.ravel(), theta).reshape(below.shape) @ weights
+        lag = (0.5 * rate + mean) / (windows.angular_frequency * amplitude)
+    lag = np.clip(np.where(np.isfinite(lag), lag, 0.0), -MOST_LAG, MOST_LAG)
+    return (t, lag) if float(np.ptp(lag)) > 1e-12 else None
+
+
+def area_of(law: Law, theta: F8, t0: float, middle: float, last: float) -> Table:
+    """Return the integral of A^2 from the middle, from t0 to the last time.
+
+    The trapezoidal rule and linear interpolation between its points have a relative error below 1e-5 if A^2 decays
+    by a factor of e^10 within the table.
+    """
+    from scipy.integrate import cumulative_trapezoid
+
+    grid = np.linspace(t0, max(last, t0 + 1e-9), POINTS)
+    power = law.curve(grid - t0, theta)[0] ** 2
+    power[~np.isfinite(power)] = 0.0
+    integral = cumulative_trapezoid(power, grid, initial=0.0)
+    return grid, np.asarray(integral - np.interp(middle, grid, integral))
+
+
+def fit_rest(windows: Demodulated, unit: str) -> Rest:
+    """Fit a constant and a polynomial to the windows' rest positions, and decide by BIC whether they drift."""
+    t, offset = windows.t, windows.offset
+    u = np.maximum(np.sqrt(windows.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
+    spread = scatter(t, offset, u, degree=DEGREE)
+    polynomial, gain = smooth_curve(t, offset, spread, degree=DEGREE)
+    weight = 1.0 / spread.u[spread.kept]
+    mean = float(np.average(offset[spread.kept], weights=weight**2))
+    left = (offset[spread.kept] - mean) * weight
+    widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
+    estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), unit)
+    curve = np.asarray(polynomial(t), np.float64)
+    return Rest(estimate, float(np.ptp(curve)), gain > EVIDENCE, t, curve)
+
+
+def wrapped(angle: float) -> float:
+    """Return the angle in rad wrapped into (-pi, pi]."""
+    turned = math.remainder(angle, 2.0 * math.pi)
+    return math.pi if turned == -math.pi else turned
+
+
+def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
+    """Return why a motion is no oscillation, although single periods look like one; None if it is one.
+
+    Amplitude and phase of a window form a phasor, which the damping law and the fit of the phase predict. Random
+    phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
+    differ from it by less, ``typical``.
+    """
+    if typical < ASTRAY or fitted.demodulated.t.size < FEWEST:
+        return None
+    return NoOscillation(
+        f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"
+    )
+
+
+def typical_miss(fitted: Fitted) -> float:
+    """Return the weighted median difference of windows from the fitted oscillation, over their amplitudes.
+
+    The weights are the amplitudes of the windows.
+    """
+    windows, phase = fitted.demodulated, fitted.phase
+    expected = fitted.damping.best.amplitude(windows.t - phase.t0) * np.exp(1j * phase.total(windows.t))
+    own = windows.amplitude * np.exp(1j * windows.phase)
+    size = np.abs(own)
+    missed = np.abs(own - expected) / np.maximum(size, 1e-12 * float(size.max()))
+    order = np.argsort(missed)
+    middle = int(np.searchsorted(np.cumsum(size[order]), 0.5 * float(size.sum())))
+    return float(missed[order][middle])

@@ -1,0 +1,295 @@
+"""Fits of the equation of motion with every drag law to all samples of a strongly damped oscillation.
+
+Amplitude laws are averages over a cycle and correct to first order in the damping ratio. If drag or friction takes a
+hundredth of the amplitude per radian, or friction ends the motion within the record, an average over a cycle is no
+longer sufficient, and the equation itself is fitted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from pipeline.damping.evidence import NEGATIVE, least_chi2, weigh
+from pipeline.damping.law_fit import mean_squared_rate
+from pipeline.damping.laws.drag import DRAGS, Drag
+from pipeline.damping.select import Damping, select_law
+from pipeline.motion.averaged import Fitted, Phase, Rest, Waveform, wrapped
+from pipeline.motion.fit import Rows, clipped, fit
+from pipeline.motion.solved import STATE, FreeMotion, Solved, envelope
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.least_squares import Fit, central_differences
+from pipeline.numerics.quantity import amount
+from pipeline.numerics.regression import correlation_length
+from pipeline.samples.condition import Conditioned
+from pipeline.samples.stopping import stop_row
+from pipeline.track import F8, UNUSABLE
+from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.disturbances import Disturbances
+
+MOST_PERIODS = 250  # maximum number of periods for the fit of a weakly damped motion that stops within the record
+# Damping ratio :math:`-\\dot A/A\\omega` at the first sample above which the equation of motion is fitted.
+LEAST_DAMPING = 0.01
+# Damping ratio above which it is fitted even if the windows, which are then few, show linear drag or none.
+ALWAYS = 0.05
+# Maximum root mean square of the residual of the law with most parameters, in units of the record's noise.
+MISFIT = 1.25
+
+
+def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *, stopped: bool) -> Fitted | str | None:
+    """Fit the equation of motion if the damping requires it; return the reason if that fails.
+
+    ``damping`` has the fits of the amplitude laws, from which the fits here start, and ``stopped`` says whether the bob
+    stops within the record. The result is None if damping is weak, if no law with damping can be fitted, or if linear
+    drag or no damping is selected, for which the amplitude law is exact.
+
+    The equation of motion is
+    :math:`\\ddot y = -\\omega_0^2 y - 2\\gamma\\dot y - b|\\dot y|\\dot y - f\\,\\mathrm{sign}(\\dot y)`.
+    The parameters are the rest position, displacement and velocity at the first sample, :math:`\\omega_0`, and the
+    coefficients as defined for the amplitude laws, :math:`\\gamma`, :math:`\\beta = 4\\omega_0 b/3\\pi` and
+    :math:`\\mu = 2f/\\pi\\omega_0`. The equation is solved by Strang splitting with located turning points
+    (:mod:`pipeline.dynamics.strang`).
+
+    The law with most parameters is fitted first: its residual shows the false echoes and the noise. The other laws are
+    compared with this noise and selected by the same rules as the amplitude laws.
+    """
+    ratio = damping.best.rate_at_start() / windows.angular_frequency
+    laws, unit = _fittable(damping), samples.track.unit
+    if not laws or not _required(damping, windows, ratio, stopped=stopped):
+        return None
+    periods = windows.angular_frequency / (2.0 * math.pi) * float(np.ptp(windows.t))
+    if ratio <= LEAST_DAMPING and periods > MOST_PERIODS:
+        return (
+            f"the bob stops within the record, and whether friction stopped it was not settled: over {periods:.0f} "
+            f"periods the equation of motion takes too long to solve (at most {MOST_PERIODS}); the averaged "
+            "law stands"
+        )
+    words = f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err"
+    rows, size_m = _rows(samples, windows, damping), abs(float(damping.best.joint.values[0]))
+    motion, expected_m = FreeMotion(float(np.max(rows.t)), windows.angular_frequency, size_m), rows.u
+    models = [Solved(law, motion) for law in laws]
+    start = _first_solution(models, rows, windows, damping)
+    found, rows = clipped(models[-1], rows, start, least_m=expected_m, rounds=3)
+    left, count = rows.left(models[-1], found.values)[rows.used], models[-1].full(found.values).size
+    if left.size <= count:
+        return f"{words}, and no motion with {laws[-1].words} comes near the samples: the averaged law stands"
+    noise_m = max(math.sqrt(float(left @ left) / (left.size - count)), 0.01 * expected_m)
+    if not noise_m <= MISFIT * expected_m:
+        return (
+            f"{words}, and the equation of motion with {laws[-1].words} leaves {amount(noise_m, unit)} where samples "
+            f"scatter by {amount(expected_m, unit)}: the averaged law stands"
+        )
+    correlation, rows = correlation_length(left), replace(rows, u=noise_m)
+    chosen = _chosen(models, rows, found.values, correlation, damping, unit)
+    if chosen is None:
+        return f"the damping ratio is {ratio:.2g} at the start, and no fit of the equation converged"
+    damping, model, own = chosen
+    fitted = _described(samples, windows, damping, model, rows, own)
+    if damping.best.rate_at_start() < 0.0:
+        return (
+            f"the bob stops within the record, but the equation of motion with {model.law.words} "
+            "would let it swing up: no damping ended this motion, and the averaged law stands"
+        )
+    if isinstance(fitted, str):
+        return f"{fitted}; so strong a damping leaves no oscillation whose frequency could be given"
+    return fitted
+
+
+def _fittable(damping: Damping) -> list[Drag]:
+    """Return the laws to be fitted that have an equation of motion with damping, in order of parameter count."""
+    wanted = [law for law in DRAGS if law.powers and (law.name in damping.fits or law.name in damping.unfitted)]
+    return sorted(wanted, key=lambda law: len(law.powers))
+
+
+def _required(damping: Damping, windows: Demodulated, ratio: float, *, stopped: bool) -> bool:
+    if stopped or ratio > ALWAYS:
+        return True
+    best = damping.best.law
+    if isinstance(best, Drag) and set(best.powers) <= {1}:
+        return False  # for these laws the amplitude law is exact
+    last = damping.best.amplitude(np.array([float(np.max(windows.t)) - damping.t0]))
+    return ratio > LEAST_DAMPING or bool(last[0] <= 0.0)
+
+
+def _rows(samples: Conditioned, windows: Demodulated, damping: Damping) -> Rows:
+    """Return the samples of the moving bob, with times since the first of them.
+
+    Samples at rest show only noise, and many of them would hide a misfit of the moving samples.
+    """
+    track, stop, used = samples.track, stop_row(samples), samples.used
+    within = used & (np.arange(track.t.size) < (track.t.size if stop is None else stop))
+    last, first = float(np.max(track.t[used])), damping.t0
+    t = np.clip(np.where(np.isfinite(track.t), track.t, first), first, last) - first
+    quantum = (samples.quantum_m or 0.0) / math.sqrt(12.0)
+    expected_m = max(samples.noise_m, quantum, 1e-9 * abs(float(damping.best.joint.values[0])))
+    # False echoes of the windows that the solution explains return later.
+    used_first = within & ((windows.flags & UNUSABLE) == 0)
+    return Rows(t, track.y, within, used_first, expected_m, None, partial(samples.near_plateau, noise_m=expected_m))
+
+
+def _first_solution(models: Sequence[Solved], rows: Rows, windows: Demodulated, damping: Damping) -> F8:
+    """Return the solution of the law with most parameters: the first acceptable one, or else the best.
+
+    If friction ends the motion, chi-square has a separate minimum for each whole number of swings. A solution is
+    unacceptable if its residual exceeds the noise or if a coefficient is negative. The first start is the best of
+    those from the amplitude laws. Each further start is the fit of one kind of damping alone, itself started from the
+    best point of a grid.
+    """
+    richest, ends = models[-1], []
+    for alone in (None, *(model for model in models if len(model.law.powers) == 1)):
+        if alone is None:
+            start = _nearest(richest, rows, _by_amplitude(models, windows, damping))
+        else:
+            first = _nearest(richest, rows, _by_first_samples(alone, rows, windows.angular_frequency))
+            start = alone.full(fit(alone, rows, first[alone.slots]).values)
+        ends.append(end := fit(richest, rows, start[richest.slots]))
+        u = np.sqrt(np.diag(end.covariance))
+        if end.cost <= MISFIT**2 * end.residual.size and np.all((end.values >= -NEGATIVE * u)[len(STATE) :]):
+            break
+    return min(ends, key=lambda end: end.cost).values
+
+
+def _nearest(model: Solved, rows: Rows, starts: Iterator[F8]) -> F8:
+    """Return the start values (7,) whose motion comes nearest to the samples."""
+    t, y = rows.t[rows.used], rows.y[rows.used]
+
+    def cost(theta: F8) -> float:
+        squares = float(np.sum((model.motion.position(t, theta) - y) ** 2))
+        return squares if math.isfinite(squares) else math.inf
+
+    return min(starts, key=cost)
+
+
+def _by_amplitude(models: Sequence[Solved], windows: Demodulated, damping: Damping) -> Iterator[F8]:
+    """Yield start values without damping and with the coefficients of the amplitude laws."""
+    omega, first = windows.angular_frequency, damping.best.joint.values[0]
+    angle = float(windows.phase[0]) - omega * (float(windows.t[0]) - damping.t0)
+    rest = float(np.average(windows.offset, weights=np.maximum(windows.amplitude, 0.0) ** 2))
+    state = [rest, first * math.cos(angle), -first * omega * math.sin(angle), omega]
+    yield np.array([*state, 0.0, 0.0, 0.0])
+    for model in models:
+        own = damping.fits.get(model.law.name)
+        if own is not None:
+            values = own.joint.values
+        elif windows.t.size >= len(model.law.parameters):
+            values = model.law.guess(windows.t - damping.t0, windows.amplitude)
+        else:
+            continue
+        yield model.full(np.array([*state, *np.maximum(values[1:], 0.0)]))
+
+
+def _by_first_samples(model: Solved, rows: Rows, omega: float) -> Iterator[F8]:
+    """Yield start values from a parabola through the first samples, with a range of strengths of one damping term."""
+    y, t = rows.y[rows.used], rows.t[rows.used]
+    rest = float(np.median(y[-max(y.size // 10, 5) :]))
+    # The parabola is fitted to the samples of the first 0.8 rad, but to at least five.
+    early = slice(max(int(np.count_nonzero(t < 0.8 / omega)), 5))
+    speed, level = np.polynomial.polynomial.polyfit(t[early], y[early] - rest, 2)[1::-1]
+    size, (power,) = np.hypot(level, speed / omega), model.law.powers
+    for near in (0.9, 1.0, 1.1):
+        for ratio in (0.03, 0.06, 0.1, 0.15, 0.25):
+            yield model.full(np.array([rest, level, speed, near * omega, ratio * omega * size ** (1 - power)]))
+
+
+def _chosen(
+    models: Sequence[Solved], rows: Rows, start: F8, correlation: float, damping: Damping, unit: str
+) -> tuple[Damping, Solved, Fit] | None:
+    """Fit every law, from the solution of the last, and select one; None if no fit has a finite covariance."""
+    richest = models[-1]
+    by_name = {model.law.name: model for model in reversed(models)}
+    unfitted = {name: "it has no equation of motion" for name in damping.fits if name not in by_name}
+    whole = fit(richest, rows, start)
+    fits: dict[str, Fit] = {}
+    for name, model in by_name.items():
+        own = whole if model is richest else fit(model, rows, richest.full(whole.values)[model.slots])
+        if np.isfinite(own.covariance).all():
+            fits[name] = own
+        else:
+            unfitted[name] = f"its equation of motion was not solved for its coefficients: {own.tried}"
+    if not fits:
+        return None
+    # The start amplitude replaces displacement and velocity as a parameter.
+    minima = {name: _by_envelope(by_name[name], own) for name, own in fits.items()}
+    laws = {name: by_name[name].law for name in fits}
+    least, points = least_chi2(minima, laws), int(np.count_nonzero(rows.used)) - len(STATE) + 1
+    weighed = {n: weigh(laws[n], minima[n], least[n], points, correlation, unit) for n in fits}
+    selected, admissible = select_law(weighed, damping.stated, float(np.max(rows.t)))
+    scatter = replace(damping.scatter, correlation=correlation)
+    every = Damping(damping.t0, weighed, selected, admissible, scatter, unfitted, damping.stated)
+    own = fits[selected]
+    return every, by_name[selected], replace(own, covariance=own.covariance * correlation)
+
+
+def _by_envelope(model: Solved, own: Fit) -> Fit:
+    """Return a fit with the parameters of the amplitude law."""
+
+    def start(values: F8) -> F8:
+        return np.array([envelope(*model.full(values)[1:].tolist())[0]])
+
+    count = len(STATE)
+    *_, u_envelope = envelope(*model.full(own.values)[1:].tolist())
+    turn = np.zeros((own.values.size - count + 1, own.values.size))
+    turn[0] = central_differences(start, own.values)[0]
+    turn[1:, count:] = np.eye(own.values.size - count)
+    covariance = turn @ own.covariance @ turn.T
+    covariance[0, 0] += u_envelope**2
+    return replace(own, values=np.concatenate([start(own.values), own.values[count:]]), covariance=covariance)
+
+
+def _described(
+    samples: Conditioned, windows: Demodulated, damping: Damping, model: Solved, rows: Rows, own: Fit
+) -> Fitted | str:
+    """Return the oscillation by the solution, or what was fitted if no oscillation is left.
+
+    The squared frequency is that of the undamped :math:`\\omega_0` minus the mean decrease by drag over the whole time
+    (:func:`pipeline.damping.law_fit.mean_squared_rate`). To second order it is the frequency that a line through the
+    turning points gives.
+    """
+    theta, best, unit = model.full(own.values), damping.best, samples.track.unit
+    still, y, v, natural = theta[: len(STATE)].tolist()
+    position = model.motion.position(rows.t, theta)
+    residual = samples.track.y - position
+    rms_m = math.sqrt(float(np.mean(residual[rows.used] ** 2)))
+    flags = rows.marked(samples.flags, rows.candidates, position)
+    stops = best.amplitude(np.array([np.max(rows.t)]))[0] <= 0.0
+    why = (
+        f"the damping ratio is {best.rate_at_start() / natural:.2g} at the first sample"
+        + (" and friction ends the motion within the record" if stops else "")
+        + f": the equation of motion with {model.law.words} was fitted to the samples; it leaves "
+        + amount(rms_m, unit)
+    )
+    t, t0, u = windows.t, damping.t0, np.sqrt(np.diag(own.covariance))
+    squared_rate = mean_squared_rate(best, best.amplitude(t - t0), np.ones(t.size))
+    if not squared_rate < natural**2:
+        return why
+    omega = math.sqrt(natural**2 - squared_rate)
+    slope = np.array([0.0, v * natural, -y * natural, y * v]) / (v**2 + (y * natural) ** 2)
+    u_phase = math.sqrt(float(slope @ own.covariance[: len(STATE), : len(STATE)] @ slope))
+    _, start, _ = envelope(*theta[1:].tolist())
+    middle = float(np.mean(t))
+    # The total phase continues the windows' count of whole turns.
+    turns = round((float(windows.phase[0]) - start - omega * float(t[0] - t0)) / (2.0 * math.pi))
+    centre = start + 2.0 * math.pi * turns + omega * (middle - t0)
+    phase = Phase(
+        t0,
+        Estimate(omega, float(u[3]) * natural / omega, "rad/s"),
+        Estimate(wrapped(start), u_phase, "rad"),
+        None,
+        best.reduced_chi2,
+        damping.scatter.correlation,
+        windows.phase - centre - omega * (t - middle),
+        np.array([centre, omega]),
+        middle,
+        squared_rate=squared_rate,
+    )
+    # The residuals of the windows become those of the solution, as sinusoids fail where the bob stops.
+    noise = np.full(windows.noise.shape, rms_m)
+    windows = replace(windows, flags=flags, residual=residual, noise=noise)
+    # The rest position is the constant one of the record; the place where friction holds the bob may differ.
+    rest = Rest(Estimate(still, float(u[0]), unit), 0.0, False, t, np.full(t.size, still))
+    waveform = Waveform(position, partial(np.asarray, model.motion.velocity(rows.t, theta)), residual, rms_m)
+    return Fitted(windows, Disturbances.nothing(samples), damping, phase, rest, waveform, "equation", why)

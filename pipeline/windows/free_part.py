@@ -1,0 +1,120 @@
+"""The part of a recording that oscillates freely, and the time from which its amplitude and phase count."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.samples.condition import Conditioned, condition
+from pipeline.samples.stopping import moving_part
+from pipeline.track import Quality
+from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
+from pipeline.windows.demodulate import Demodulated, demodulate, follow
+from pipeline.windows.gaps import longest_part
+from pipeline.windows.lost_rows import LostRows, find_lost_rows
+from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part, long_after_stop
+from pipeline.windows.sinusoid import check_sinusoid
+
+MOST_PARTS = 4  # maximum number of times that a freely moving part is sought within the part found before
+LEAST_HALVED = 128  # minimum number of samples of which the later half may show a motion
+CLEAR = 0.1  # maximum noise over the largest amplitude of a motion that only the later half shows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreePart:
+    """The part of a recording that oscillates freely.
+
+    ``samples`` contains the whole recording, in which samples outside the part are flagged. ``segments`` describes the
+    part (None for the whole recording), and ``stopped`` says whether friction stopped the bob in it. The times of the
+    samples count rows that were ``lost``.
+    """
+
+    samples: Conditioned
+    segments: Segments | None
+    cycles: Cycles
+    windows: Demodulated
+    stopped: bool
+    lost: LostRows | None = None
+
+
+def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoOscillation:
+    """Find the part that oscillates freely.
+
+    The time before the trigger, the time long after the stop and all but one free part are left out. The samples are
+    conditioned again after each step, because the part left out may have hidden the noise of the rest.
+    """
+    segments: Segments | None = None
+    for outside in (before_trigger(samples), long_after_stop(samples, early)):
+        if outside is not None:
+            samples, segments = condition(outside.flagged(samples.track)), outside.within(segments)
+    if (part := longest_part(samples)) is not None:
+        samples, segments = condition(part.flagged(samples.track)), part.within(segments)
+    cycles, stopped = _cycles(samples, early, late)
+    if isinstance(cycles, NoOscillation):
+        # A long time in the hand hides the motion after it, which the later half may show.
+        t = samples.track.t[samples.used]
+        if t.size < LEAST_HALVED:
+            return cycles
+        half_s = float(np.median(t))
+        later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
+        trial = condition(later.flagged(samples.track))
+        trimmed, stopped = _cycles(trial, late, late)
+        if isinstance(trimmed, NoOscillation):
+            return cycles
+        windows = demodulate(trial, trimmed)
+        if windows.noise_m > CLEAR * float(np.max(windows.amplitude)) or check_sinusoid(trial, windows) is not None:
+            return cycles
+        samples, segments = trial, later.within(segments)
+        cycles = trimmed
+    windows = demodulate(samples, cycles)
+    if (lost := find_lost_rows(samples, windows)) is not None:
+        samples = lost.samples
+        cycles, stopped = _cycles(samples, early, late)
+        if isinstance(cycles, NoOscillation):
+            return cycles
+        windows = demodulate(samples, cycles)
+    for _ in range(MOST_PARTS):
+        outside = find_free_part(samples, windows)
+        if outside is None:
+            break
+        # Windows of equal length are no whole periods of a wide pendulum, which would look like handling.
+        if (followed := follow(cycles, windows, samples.track.t)) is not cycles:
+            along = demodulate(samples, followed)
+            if find_free_part(samples, along) is None:
+                cycles, windows = followed, along
+                break
+        shorter = condition(outside.flagged(samples.track))
+        trimmed, stops = _cycles(shorter, early, late)
+        if isinstance(trimmed, NoOscillation):
+            break
+        samples, segments, cycles, stopped = shorter, outside.within(segments), trimmed, stops
+        windows = demodulate(samples, cycles)
+    if (followed := follow(cycles, windows, samples.track.t)) is not cycles:
+        cycles, windows = followed, demodulate(samples, followed)
+    return FreePart(samples, segments, cycles, windows, stopped, lost)
+
+
+def _cycles(samples: Conditioned, early: float, late: float) -> tuple[Cycles | NoOscillation, bool]:
+    """Return the cycles and whether the bob stops before a share of the samples; if so, those of the moving part."""
+    cycles = find_cycles(samples)
+    moving = moving_part(samples, late if isinstance(cycles, NoOscillation) else early)
+    if moving is None or isinstance(trimmed := find_cycles(moving), NoOscillation):
+        return cycles, False
+    return trimmed, True
+
+
+def start_of(samples: Conditioned, omega: float) -> float:
+    """Return the time at which amplitude and phase are stated, s: that of the first row, even if it is a false echo.
+
+    If at least one period is missing at the start, it is the time of the first sample used. A single false echo at the
+    start must not change the time.
+    """
+    track = samples.track
+    first = float(track.t[np.argmax(samples.used)])
+    # A row with a wrong time cannot be the start.
+    out = Quality.OUTSIDE | Quality.DUPLICATE_TIME | Quality.NON_MONOTONIC_TIME | Quality.MALFORMED
+    rows = ((samples.flags & np.uint8(out)) == 0) & (track.t <= first)
+    begin = float(np.min(track.t[rows], initial=first))
+    return begin if first - begin < 2.0 * math.pi / omega else first
