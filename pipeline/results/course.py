@@ -17,6 +17,7 @@ from pipeline.results.compare import Comparison, SpringRun, compare_springs
 FAR = 5.0  # distance from the median, in standard deviations, above which a run is suspect: none of 200 good runs
 FEW = 4  # minimum number of runs in a group for a median
 LARGEST_BENCH = 50  # maximum number of runs compared as those of one bench; of a larger group only far runs are named
+LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
 MATES = 6  # good runs against which two far runs are exchanged
 ALIKE = 0.1  # maximum relative difference of two constants after an exchange that is worth a comparison
 
@@ -158,17 +159,20 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
         if comparison.exchanged:
             a, b = comparison.exchanged
             exchange(a, b, "the runs of their bench" if len(every) > 2 else "each other")
-        elif (odd := _odd_one(rest)) is not None:
+            continue
+        constants = [k.value for k in comparison.each]
+        low, high = min(constants), max(constants)
+        spread = high / low - 1.0
+        if spread > LITTLE and (odd := _odd_one(rest)) is not None:
             others = f"without it, the other {len(rest) - 1} runs of its bench and spring agree"
             found[odd.name] = Suspect(odd.name, f"{others}: look at its mass and its spring")
         else:
-            constants = [k.value for k in comparison.each]
-            low, high = min(constants), max(constants)
             message = (
-                f"the {len(constants)} runs of its bench and spring disagree: {low:.5g} to {high:.5g} N/m, "
-                f"{comparison.largest_deviation:.3g} standard uncertainties: check masses and spring"
+                f"the {len(constants)} runs of its bench and spring disagree by {100.0 * spread:.2g} %, "
+                f"{comparison.largest_deviation:.3g} standard uncertainties ({low:.5g} to {high:.5g} N/m): "
+                "check masses and spring"
             )
-            disagreements.append(Disagreement(bench, spring, comparison.names, high / low - 1.0, message))
+            disagreements.append(Disagreement(bench, spring, comparison.names, spread, message))
     good = [run for run in plausible if run.on_spring is not None and run.name not in found]
     far = [run for run in plausible if run.on_spring is not None and run.name in found.keys() - exchanged]
     for one, two in itertools.combinations(far, 2):
