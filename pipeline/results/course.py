@@ -18,7 +18,7 @@ FAR = 5.0  # distance from the median, in standard deviations, above which a run
 FEW = 4  # minimum number of runs in a group for a median
 LARGEST_BENCH = 50  # maximum number of runs compared as those of one bench; of a larger group only far runs are named
 LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
-MATES = 6  # good runs against which two far runs are exchanged
+MATES = 4  # good runs against which two far runs are exchanged
 ALIKE = 0.1  # maximum relative difference of two constants after an exchange that is worth a comparison
 
 
