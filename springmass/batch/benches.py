@@ -176,9 +176,8 @@ def compared_text(comparison: CourseComparison) -> str:
         within = "one run a bench" if math.isnan(group.within) else f"{group.within:.2g} within a bench"
         benches = f"{group.between:.2g} between {group.benches} benches"
         between = "one bench" if math.isnan(group.between) else benches
-        lines.append(
-            f"  {group.runs} run{'s' if group.runs > 1 else ''}; scatter {within} (stated {group.stated:.2g}), {between}"
-        )
+        runs = f"{group.runs} run{'s' if group.runs > 1 else ''}"
+        lines.append(f"  {runs}; scatter {within} (stated {group.stated:.2g}), {between}")
     if any(group.quantity == "drag_coefficient" for group in comparison.agreements):
         lines.append("a drag coefficient counts all damping as drag of the disc, that of spring and hook too")
     laws = ", ".join(f"{law} {count}" for law, count in comparison.laws.items())
