@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import csv
+import math
 import os
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["bad_files", "contents", "damped", "short_course", "write_recording"]
+__all__ = ["bad_files", "contents", "damped", "faulty_course", "short_course", "write_recording"]
 
 HEAD = "Motion Sensor Data File Mar 12, 2024 2:05 PM\r\nTime (s)\tDistance (cm)\tDist Error (cm)\r\n"
 
@@ -34,6 +36,30 @@ def short_course(folder: Path, runs: int) -> Path:
     for i in range(runs):
         write_recording(folder / f"run{i:03d}.txt", damped(i, omega=8.0 + 0.01 * i))
     return folder
+
+
+def faulty_course(folder: Path) -> list[str]:
+    """Make 24 runs of one spring of 14 N/m at six benches with planted faults; return what ``batch`` is given.
+
+    A1 and A3 have each other's mass, B2 and C3 too; D2 is in grams; E1 in centimetres as metres; E3 is clipped; F2 is
+    no recording, F4 is empty.
+    """
+    said = {f"{bench}{i}": mass for bench in "ABCDEF" for i, mass in enumerate((0.15, 0.2, 0.25, 0.3), 1)}
+    (folder / "runs").mkdir(parents=True)
+    for seed, (name, mass) in enumerate(said.items()):
+        y = 0.1 + damped(seed, seconds=20.0, omega=math.sqrt(14.0 / (mass + 0.010 / 3.0)))
+        y = 100.0 * y if name == "E1" else np.maximum(y, 0.27) if name == "E3" else y
+        write_recording(folder / "runs" / f"{name}.txt", y)
+    (folder / "runs" / "F2.txt").write_text("Dear all,\nthe recordings are attached.\n")
+    (folder / "runs" / "F4.txt").write_bytes(b"")
+    for one, other in (("A1", "A3"), ("B2", "C3")):
+        said[one], said[other] = said[other], said[one]
+    said["D2"] *= 1000.0
+    with (folder / "runs.csv").open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(("path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "group"))
+        table.writerows((f"runs/{name}.txt", mass, 5e-5, 0.010, 1e-4, name[0]) for name, mass in said.items())
+    return [str(folder / "runs"), "--runs", str(folder / "runs.csv"), "--jobs", "1", "--accuracy", "fast"]
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,9 +12,14 @@ import numpy as np
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.robust import mad_sigma
+from pipeline.results.compare import Comparison, SpringRun, compare_springs
 
 FAR = 5.0  # distance from the median, in standard deviations, above which a run is suspect: none of 200 good runs
 FEW = 4  # minimum number of runs in a group for a median
+LARGEST_BENCH = 50  # maximum number of runs compared as those of one bench; of a larger group only far runs are named
+LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
+MATES = 4  # good runs against which two far runs are exchanged
+ALIKE = 0.1  # maximum relative difference of two constants after an exchange that is worth a comparison
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +27,8 @@ class CourseRun:
     """One run: runs with the same spring, disc or bench have the same label.
 
     The uncertainty of the spring constant includes only errors that the run does not share with others. The drag
-    coefficient is that in the middle of the amplitudes of the run.
+    coefficient is that in the middle of the amplitudes of the run, ``on_spring`` is the run as file mode compares it,
+    and ``implausible`` says what cannot be true of its mass.
     """
 
     name: str
@@ -30,13 +37,29 @@ class CourseRun:
     bench: str = ""
     spring_constant: Estimate | None = None
     drag: Estimate | None = None
+    amplitude: Estimate | None = None
+    unit: str = ""
+    on_spring: SpringRun | None = None
+    spring_mass_kg: Estimate | None = None
+    implausible: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Suspect:
-    """A run that is far from the others with the same spring or disc."""
+    """A run with an implausible mass, or one that does not fit the others with its spring or disc."""
 
     name: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """Runs of one spring at one bench that disagree; ``spread`` is their largest constant over the least, less 1."""
+
+    bench: str
+    spring: str
+    names: tuple[str, ...]
+    spread: float
     message: str
 
 
@@ -47,7 +70,7 @@ class Agreement:
     # quantity, group: names of the quantity and of the group of runs.
     quantity: str
     group: str
-    mean: Estimate  # mean over benches; its uncertainty includes the scatter between them
+    mean: Estimate | None  # over benches, with the scatter between them in its uncertainty; None: no common value
     # within, between: standard deviation of runs at one bench, and additional standard deviation between benches.
     # ``within`` is NaN if no bench has two runs, and ``between`` is NaN if there is only one bench.
     within: float
@@ -59,6 +82,7 @@ class Agreement:
     # chi2, dof: chi-square and degrees of freedom of the means of the benches, with the scatter within benches.
     chi2: float = math.nan
     dof: int = 0
+    why: str = ""  # why there is no mean
 
 
 def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Sequence[str]) -> Agreement:
@@ -100,22 +124,116 @@ def agreement(quantity: str, group: str, values: Sequence[Estimate], benches: Se
     return Agreement(quantity, group, mean, within, between, stated, x.size, len(parts), chi2, dof)
 
 
-def suspects(runs: Sequence[CourseRun]) -> tuple[Suspect, ...]:
-    """Return the runs whose spring constant or drag coefficient is far from those of the same spring or disc.
+def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagreement, ...]]:
+    """Return the runs that are suspect, and the benches whose other runs disagree on their spring.
+
+    A run with an implausible mass takes no part in the rest. Runs far from the median of their spring or disc are
+    suspect. The runs of one spring at one bench are compared as in file mode, which names two that were exchanged; a
+    run without which the others agree is suspect too. Then far runs of different benches are exchanged in pairs, next
+    to good runs of their spring.
+    """
+    found = {run.name: Suspect(run.name, run.implausible) for run in runs if run.implausible}
+    plausible = [run for run in runs if not run.implausible]
+    found |= _far(plausible)
+    exchanged: set[str] = set()
+
+    def exchange(a: str, b: str, others: str) -> None:
+        exchanged.update((a, b))
+        message = (
+            f"with the masses (or the periods) of {a} and {b} exchanged, they come together with {others}: "
+            "check which record belongs to which bob"
+        )
+        found.update({name: Suspect(name, message) for name in (a, b)})
+
+    benches: dict[tuple[str, str], list[CourseRun]] = {}
+    for run in plausible:
+        if run.on_spring is not None:
+            benches.setdefault((run.bench, run.spring), []).append(run)
+    disagreements = []
+    for (bench, spring), every in benches.items():
+        comparison, rest = _compared(every), [run for run in every if run.name not in found]
+        if comparison is not None and not comparison.agree and not comparison.exchanged:
+            comparison = _compared(rest)
+        if comparison is None or comparison.agree:
+            continue
+        if comparison.exchanged:
+            a, b = comparison.exchanged
+            exchange(a, b, "the runs of their bench" if len(every) > 2 else "each other")
+            continue
+        constants = [k.value for k in comparison.each]
+        low, high = min(constants), max(constants)
+        spread = high / low - 1.0
+        if spread > LITTLE and (odd := _odd_one(rest)) is not None:
+            others = f"without it, the other {len(rest) - 1} runs of its bench and spring agree"
+            found[odd.name] = Suspect(odd.name, f"{others}: look at its mass and its spring")
+        else:
+            message = (
+                f"the {len(constants)} runs of its bench and spring disagree by {100.0 * spread:.2g} %, "
+                f"{comparison.largest_deviation:.3g} standard uncertainties ({low:.5g} to {high:.5g} N/m): "
+                "check masses and spring"
+            )
+            disagreements.append(Disagreement(bench, spring, comparison.names, spread, message))
+    good = [run for run in plausible if run.on_spring is not None and run.name not in found]
+    far = [run for run in plausible if run.on_spring is not None and run.name in found.keys() - exchanged]
+    for one, two in itertools.combinations(far, 2):
+        if (
+            one.spring == two.spring
+            and not exchanged & {one.name, two.name}
+            and _alike_exchanged(one.on_spring, two.on_spring)
+        ):
+            # Runs of the two benches come first.
+            mates = sorted(
+                (run for run in good if run.spring == one.spring),
+                key=lambda run: run.bench not in (one.bench, two.bench),
+            )
+            comparison = _compared([one, two, *mates[:MATES]])
+            if comparison is not None and set(comparison.exchanged) == {one.name, two.name}:
+                exchange(one.name, two.name, "the others")
+    return tuple(found[run.name] for run in runs if run.name in found), tuple(disagreements)
+
+
+def _compared(runs: Sequence[CourseRun]) -> Comparison | None:
+    """Compare runs of one spring as file mode does; None if there are too few or too many."""
+    on_spring = [run.on_spring for run in runs if run.on_spring is not None]
+    if not 2 <= len(on_spring) <= LARGEST_BENCH:
+        return None
+    stated = next((run.spring_mass_kg for run in runs if run.spring_mass_kg is not None), None)
+    return compare_springs(on_spring, spring_mass_kg=stated)
+
+
+def _odd_one(runs: Sequence[CourseRun]) -> CourseRun | None:
+    """Return the only run without which the others, three or more, agree."""
+    without = [_compared([other for other in runs if other is not run]) for run in runs] if len(runs) >= FEW else []
+    odd = [run for run, others in zip(runs, without, strict=False) if others is not None and others.agree]
+    return odd[0] if len(odd) == 1 else None
+
+
+def _alike_exchanged(a: SpringRun | None, b: SpringRun | None) -> bool:
+    """Return whether two runs give nearly one constant if each has the other's mass: a quick look before the test."""
+    if a is None or b is None:
+        return False
+    k_a, k_b = (x.angular_frequency.value**2 * y.mass_kg.value for x, y in ((a, b), (b, a)))
+    return abs(math.log(k_a / k_b)) < ALIKE
+
+
+def _far(runs: Sequence[CourseRun]) -> dict[str, Suspect]:
+    """Return the runs whose spring constant, drag coefficient or amplitude is far from those of their group.
 
     A value is compared with the median of its group, in units of the scatter from the median absolute deviation and of
-    its own uncertainty, both of the logarithms.
+    its own uncertainty, both of the logarithms. Amplitudes differ by a factor of twenty only with a wrong unit.
     """
     found: dict[str, Suspect] = {}
-    for quantity, label, least, words, advice in (
-        ("spring_constant", "spring", 2e-4, "spring constant", "look at its mass and its spring"),
-        ("drag", "disc", 0.02, "drag coefficient", "look at its disc and its mass"),
+    for quantity, label, least, others, advice in (
+        ("spring_constant", "spring", 2e-4, "the others of its spring", "look at its mass and its spring"),
+        ("drag", "disc", 0.02, "the others of its disc", "look at its disc and its mass"),
+        ("amplitude", "unit", 0.6, "the others", "look at the unit of its distances"),
     ):
         groups: dict[str, list[tuple[str, Estimate]]] = {}
         for run in runs:
             value: Estimate | None = getattr(run, quantity)
             if value is not None and value.value > 0.0:
                 groups.setdefault(getattr(run, label), []).append((run.name, value))
+        words = {"spring_constant": "spring constant", "drag": "drag coefficient"}.get(quantity, quantity)
         for group in groups.values():
             logs = np.log([value.value for _, value in group])
             middle = float(np.median(logs))
@@ -123,7 +241,7 @@ def suspects(runs: Sequence[CourseRun]) -> tuple[Suspect, ...]:
             for (name, value), log in zip(group, logs.tolist(), strict=True):
                 away = (log - middle) / math.hypot(scatter, value.u / value.value)
                 if len(group) >= FEW and abs(away) > FAR:
-                    off = 100.0 * math.expm1(log - middle)
-                    message = f"its {words} is {off:+.3g} % off that of the others of its {label}: {advice}"
-                    found.setdefault(name, Suspect(name, message))
-    return tuple(found[run.name] for run in runs if run.name in found)
+                    ratio = math.exp(log - middle)
+                    off = f"{ratio:.3g} times" if abs(log - middle) > 1.0 else f"{100.0 * (ratio - 1.0):+.3g} % off"
+                    found.setdefault(name, Suspect(name, f"its {words} is {off} that of {others}: {advice}"))
+    return found

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate, format_value
-from pipeline.results.course import Agreement, CourseRun, Suspect, agreement, suspects
+from pipeline.results.compare import SpringRun
+from pipeline.results.course import Agreement, CourseRun, Disagreement, Suspect, agreement, judged
 from springmass.batch.rows import COURSE
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 
@@ -19,6 +21,13 @@ __all__ = ["CourseComparison", "compare_rows", "compared_json", "compared_text"]
 
 BENCHES = ("bench", "group", "section", COURSE)
 """Candidate columns that distinguish benches; the first one that the course has is used."""
+NEEDED = (
+    "run", COURSE, "status", "law", "unit", "clock", "u_clock", "drag_points",
+    *(name for x in ("spring_constant", "natural_angular_frequency", "own_mass_kg", "bob_mass_kg", "spring_mass_kg",
+                     "disc_diameter_m", "amplitude") for name in (x, f"{x}_u")),
+)  # fmt: skip
+"""Columns that a comparison reads, next to the course's own."""
+SCATTERED = 0.1  # maximum scatter of a spring's constants, over their mean: beyond it they have no common value
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +43,9 @@ class CourseComparison:
     agreements : tuple of Agreement
         Agreement of spring constants for each spring and of drag coefficients for each disc, without the suspects.
     suspects : tuple of Suspect
-        Runs that differ from their course.
+        Runs with an implausible mass, and runs that differ from their course.
+    disagreements : tuple of Disagreement
+        Benches whose other runs of one spring disagree.
     laws : mapping of str to int
         Number of runs for which each damping law was selected.
     """
@@ -43,6 +54,7 @@ class CourseComparison:
     bench: str
     agreements: tuple[Agreement, ...]
     suspects: tuple[Suspect, ...]
+    disagreements: tuple[Disagreement, ...]
     laws: Mapping[str, int]
 
 
@@ -70,41 +82,65 @@ def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None)
     by = bench or next(name for name in BENCHES if name in moving[0])
     courses = {row[COURSE] for row in moving}
     runs = [_run(row, by, alone=len(courses) == 1) for row in moving]
-    differing = suspects(runs)
+    differing, disagreements = judged(runs)
     named = {suspect.name for suspect in differing}
-    good = [run for run in runs if run.name not in named]
     agreements = []
     for quantity, label in (("spring_constant", "spring"), ("drag", "disc")):
         groups: dict[str, list[CourseRun]] = {}
-        for run in good:
+        for run in runs:
             if getattr(run, quantity) is not None:
                 groups.setdefault(getattr(run, label), []).append(run)
         for name, group in sorted(groups.items()):
-            values = [getattr(run, quantity) for run in group]
-            agreements.append(agreement(_NAMES[quantity], name, values, [run.bench for run in group]))
+            agreements.append(_agreement(quantity, name, [run for run in group if run.name not in named]))
     counts: dict[str, int] = {}
     for row in moving:
         if row["law"]:
             counts[row["law"]] = counts.get(row["law"], 0) + 1
     laws = dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
-    return CourseComparison(len(runs), by, tuple(agreements), differing, laws)
+    return CourseComparison(len(runs), by, tuple(agreements), differing, disagreements, laws)
 
 
 _NAMES = {"spring_constant": "spring_constant", "drag": "drag_coefficient"}
 
 
+def _agreement(quantity: str, name: str, group: Sequence[CourseRun]) -> Agreement:
+    """Return the agreement of a group's good runs, without a mean if they have no common value."""
+    called = _NAMES[quantity]
+    if not group:
+        why = "all its runs are among those that differ"
+        return Agreement(called, name, None, math.nan, math.nan, math.nan, 0, 0, why=why)
+    values = [getattr(run, quantity) for run in group]
+    found = agreement(called, name, values, [run.bench for run in group])
+    scatter = max(x for x in (found.within, found.between, 0.0) if not math.isnan(x))
+    if quantity == "spring_constant" and found.mean is not None and scatter > SCATTERED * found.mean.value:
+        low, high = (f"{end.value:.4g}" for end in (min(values, key=float), max(values, key=float)))
+        why = f"from {low} to {high} N/m: no one spring; a column spring in runs.csv tells springs apart"
+        return replace(found, mean=None, why=why)
+    return found
+
+
 def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
-    k, omega, mass = (_number(row, name) for name in ("spring_constant", "natural_angular_frequency", "own_mass_kg"))
-    own = math.hypot(2.0 * _number(row, "natural_angular_frequency_u") / omega, _number(row, "own_mass_kg_u") / mass)
+    name = row["run"] if alone else f"{row[COURSE]}: {row['run']}"
+    k, omega, mass = (_estimate(row, x) for x in ("spring_constant", "natural_angular_frequency", "own_mass_kg"))
+    bob, spring = _estimate(row, "bob_mass_kg"), _estimate(row, "spring_mass_kg")
     points = np.array(json.loads(row["drag_points"] or "[]"))
     middle = points[len(points) // 2] if len(points) else None
+    on_spring = own = None
+    if k is not None and omega is not None and mass is not None:
+        on_spring = SpringRun(name, omega, mass, row["u_clock"] or 0.0, row["clock"] or "")
+        own = Estimate(k.value, k.value * math.hypot(2.0 * omega.u / omega.value, mass.u / mass.value), "N/m")
     return CourseRun(
-        name=row["run"] if alone else f"{row[COURSE]}: {row['run']}",
+        name=name,
         spring=_label(row, "spring", "spring_mass_kg"),
         disc=_label(row, "disc", "disc_diameter_m"),
         bench=str(row[bench] or ""),
-        spring_constant=Estimate(k, k * own, "N/m") if math.isfinite(k * own) else None,
+        spring_constant=own,
         drag=None if middle is None else Estimate(float(middle[2]), float(middle[3])),
+        amplitude=_estimate(row, "amplitude"),
+        unit=row["unit"] or "",
+        on_spring=on_spring,
+        spring_mass_kg=spring,
+        implausible="; ".join(Scene(bob_mass_kg=bob).unusual()),
     )
 
 
@@ -115,9 +151,9 @@ def _label(row: Mapping[str, Any], tag: str, scene: str) -> str:
     return "" if label is None else str(label)
 
 
-def _number(row: Mapping[str, Any], name: str) -> float:
-    value = row[name]
-    return math.nan if value is None else float(value)
+def _estimate(row: Mapping[str, Any], name: str) -> Estimate | None:
+    value, u = row[name], row[f"{name}_u"]
+    return None if value is None or u is None else Estimate(float(value), float(u))
 
 
 def compared_json(comparison: CourseComparison) -> dict[str, Any]:
@@ -133,11 +169,15 @@ def compared_text(comparison: CourseComparison) -> str:
     lines = [f"{comparison.runs} runs; benches distinguished by {comparison.bench}", ""]
     for group in comparison.agreements:
         of = f" of {group.group}" if group.group else ""
+        if group.mean is None:
+            lines.append(f"{group.quantity}{of}: no mean; {group.why}")
+            continue
         lines.append(f"{group.quantity}{of}: {format_value(group.mean.value, group.mean.u, group.mean.unit)}")
         within = "one run a bench" if math.isnan(group.within) else f"{group.within:.2g} within a bench"
         benches = f"{group.between:.2g} between {group.benches} benches"
         between = "one bench" if math.isnan(group.between) else benches
-        lines.append(f"  {group.runs} runs; scatter {within} (stated {group.stated:.2g}), {between}")
+        runs = f"{group.runs} run{'s' if group.runs > 1 else ''}"
+        lines.append(f"  {runs}; scatter {within} (stated {group.stated:.2g}), {between}")
     if any(group.quantity == "drag_coefficient" for group in comparison.agreements):
         lines.append("a drag coefficient counts all damping as drag of the disc, that of spring and hook too")
     laws = ", ".join(f"{law} {count}" for law, count in comparison.laws.items())
@@ -145,4 +185,7 @@ def compared_text(comparison: CourseComparison) -> str:
     differing = comparison.suspects
     lines += ["", f"runs that differ from their course: {len(differing)}"] if differing else []
     lines += [f"  {suspect.name}: {suspect.message}" for suspect in differing]
+    apart = comparison.disagreements
+    lines += ["", f"benches whose runs disagree: {len(apart)}"] if apart else []
+    lines += [f"  {one.bench or ', '.join(one.names)}: {one.message}" for one in apart]
     return "\n".join(lines)

@@ -8,11 +8,15 @@ from urllib.parse import quote
 
 from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
+from pipeline.results.course import LITTLE
+from springmass.batch.benches import BENCHES, CourseComparison
 from springmass.batch.reports import REPORTS, need_of, report_name
-from springmass.batch.rows import FAILED
-from springmass.batch.store import PAGE, Store
+from springmass.batch.rows import COURSE, FAILED
+from springmass.batch.store import GROUPS, PAGE, Store
 from springmass.charts.chart import Chart
 from springmass.charts.several import course
+from springmass.report.advice import sentence
+from springmass.terminal.printing import visible_lines
 from storage.atomic import writing
 
 SHOWN = (
@@ -23,6 +27,8 @@ SHOWN = (
     ("drag_coefficient", "C_d", ""),
 )
 """Estimates with a column: name, symbol and unit; an empty unit means none, or that of the run."""
+
+LOOKS = ("failed", "error", "warning", "fine")
 
 
 def write_page(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[str], reports: set[str]) -> None:
@@ -38,7 +44,7 @@ def write_page(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[
     figures = Figures()
     chart = _chart(lines)
     figure = None if chart is None else figures.add(chart)
-    counts = {kind: sum(line["look"] == kind for line in shown) for kind in ("failed", "error", "warning", "fine")}
+    counts = {kind: sum(line["look"] == kind for line in shown) for kind in LOOKS}
     page = template("course.html.j2").render(
         title=store.folder.resolve().name,
         lines=shown,
@@ -70,12 +76,13 @@ def _link(name: str, reports: set[str]) -> str:
 def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
     """Return the line that the page shows for a run, from its row and the course's own columns."""
     failed = row["status"] in FAILED
-    look = "failed" if failed else "error" if row["errors"] else "warning" if row["warnings"] else "fine"
+    look = "failed" if failed else "error" if row["errors"] else "warning" if row["tell"] else "fine"
     return {
         "name": row["run"],
         "look": look,
         "need": need_of(row),
-        "why": row["error"] if failed else "; ".join(message for _, message in row["messages"][:2]),
+        "tell": [row["error"]] if failed else row["tell"],
+        "notes": [message for _, message in row["messages"]],
         "codes": "" if failed else ", ".join(row["findings"]),
         "tags": [row["job"]["tags"].get(tag, "") for tag in tags],
         "cells": [_cell(row, quantity, unit) for quantity, _, unit in SHOWN],
@@ -83,6 +90,43 @@ def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
         "estimates": row["estimates"],
         "thumbnail": row["thumbnail"],
     }
+
+
+def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
+    """Put what the comparison says about a run first in what its group is told, and let it count for the look."""
+    by_name = {line["name"]: line for line in lines}
+    said = [(one.name, one.message, "error") for one in comparison.suspects]
+    if comparison.bench != COURSE:  # without a column of benches, nobody says that runs belong together
+        apart = [one for one in comparison.disagreements if one.spread > LITTLE]
+        said += [(name, one.message, "warning") for one in apart for name in one.names]
+    for name, message, look in said:
+        line = by_name[name]
+        if not any(message in text for text in line["tell"]):
+            line["tell"] = [sentence(message), *line["tell"]]
+        if LOOKS.index(look) < LOOKS.index(line["look"]):
+            line["look"] = look
+        status, errors, told, misfit = line["need"]
+        line["need"] = (status, errors + (look == "error"), told + (look == "warning"), misfit)
+
+
+def write_groups(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[str]) -> None:
+    """Write ``groups.txt``: a paragraph for each group, with what to tell it."""
+    column = next((tags.index(name) for name in BENCHES if name in tags), None)
+    groups: dict[str, list[Mapping[str, Any]]] = {}
+    for line in lines:
+        groups.setdefault("" if column is None else line["tags"][column], []).append(line)
+    paragraphs = []
+    for name, group in sorted(groups.items()):
+        told: dict[str, list[str]] = {}
+        for line in group:
+            for text in line["tell"]:
+                told.setdefault(text, []).append(line["name"])
+        runs = f"{len(group)} run{'s' if len(group) > 1 else ''}"
+        title = "All runs" if column is None else f"{tags[column]} {name}" if name else f"without {tags[column]}"
+        texts = [f"  {', '.join(names)}: {text}" for text, names in told.items()] or ["  nothing to mend"]
+        paragraphs.append("\n".join([f"{title}: {runs}", *texts]))
+    with store.output(GROUPS) as temporary, writing(store.folder / GROUPS):
+        temporary.write_bytes(visible_lines("\n\n".join(paragraphs)).encode("utf-8", "backslashreplace") + b"\n")
 
 
 def _cell(row: Mapping[str, Any], quantity: str, unit: str) -> tuple[str, str, str]:

@@ -147,7 +147,9 @@ def plan(
     course = None if runs_csv is None else read_course(runs_csv)
     out = {*but, *(() if runs_csv is None else (os.path.abspath(runs_csv),))}
     texts = list(_expanded(inputs)) if inputs or course is None else course.files()
-    recordings, notes = files_of(texts, deep=True, known=known, but=out)
+    # A file that the table names is a run even if it cannot be read.
+    named = {os.path.abspath(path) for path in (*known, *(() if course is None else course.files()))}
+    recordings, notes = files_of(texts, deep=True, known=named, but=out)
     first: dict[str, InputFile] = {}
     for recording in recordings:  # a file named by several inputs is one run
         first.setdefault(os.path.abspath(recording.path), recording)

@@ -27,10 +27,10 @@ TIME = "in batch.log"  # fixed text in place of a time, so that a pass at any ti
 
 
 def need_of(row: Mapping[str, Any]) -> tuple[int, int, int, float]:
-    """Return a run's sort key for inspection, larger if more urgent: failure, errors, warnings, misfit of its law."""
+    """Return a run's sort key for inspection, larger if more urgent: failure, errors, harmful findings, misfit."""
     status = {"ok": 0, "no_oscillation": 1}.get(row["status"], 2)
     misfit = row.get("reduced_chi2") or 0.0
-    return status, row.get("errors") or 0, row.get("warnings") or 0, misfit
+    return status, row.get("errors") or 0, len(row.get("tell") or ()), misfit
 
 
 def worst(runs: Iterable[tuple[tuple[int, int, int, float], str, str]], count: int) -> set[str]:

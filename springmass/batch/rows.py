@@ -165,6 +165,8 @@ class _Row(Struct, forbid_unknown_fields=True, kw_only=True):
     quality: dict[str, Count]
     findings: list[str]
     messages: list[tuple[Literal["error", "warning"], str]]
+    # What the group should know: each harmful finding with its advice, the worst first.
+    tell: list[str] = field(default_factory=list)
     correlations: _Correlations
     drag_points: list[tuple[_Size, _Size, _Number, _Size]]
     # The page inserts this text unchanged as an SVG path.

@@ -13,13 +13,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from springmass.batch.benches import NEEDED, compare_rows
 from springmass.batch.executors import Lost, dask_workers, local_workers, outcomes
-from springmass.batch.page import line_of, write_page
+from springmass.batch.page import line_of, mark, write_groups, write_page
 from springmass.batch.plan import Job, Plan, code_sha256, names_of, plan
-from springmass.batch.reports import linked, need_of, worst, write_reports
+from springmass.batch.reports import linked, worst, write_reports
 from springmass.batch.results_table import write_tables
-from springmass.batch.rows import FAILED, dumped, flat
-from springmass.batch.store import CSV, PAGE, PARQUET, Store
+from springmass.batch.rows import COURSE, FAILED, dumped, flat
+from springmass.batch.store import CSV, GROUPS, PAGE, PARQUET, Store
 from springmass.batch.worker import analyse_many, blank_row, unchanged
 from springmass.errors import USAGE, ProgramError
 from springmass.report.script import SHARED
@@ -208,7 +209,7 @@ def _make(
             }
         ).encode("utf-8", "backslashreplace")
     ).hexdigest()
-    outputs = (CSV, PAGE, *((PARQUET,) if find_spec("pyarrow") is not None else ()))
+    outputs = (CSV, GROUPS, PAGE, *((PARQUET,) if find_spec("pyarrow") is not None else ()))
     if store.is_complete(made_of) and all(map(store.is_intact, outputs)) and (store.folder / SHARED).exists():
         return False
     store.begin()
@@ -219,15 +220,22 @@ def _make(
             # Without an up-to-date row, a file changed during the analysis or a worker died; the next pass repeats it.
             yield {**(row or next(store.rows(job.key))), "job": job.to_mapping(), "run": name}
 
-    needs, lines = [], []
+    statuses, lines, compared = [], [], []
+    columns = (*(name for name in NEEDED if name != COURSE), *course.tags)
 
     def rows() -> Iterator[dict[str, Any]]:
         for row in store.put_together(kept(), course.tags):
-            needs.append((need_of(row), row["run"], row["status"]))
+            statuses.append(row["status"])
             lines.append(line_of(row, course.tags))
-            yield flat(row, row["run"], course.tags)
+            cells = flat(row, row["run"], course.tags)
+            compared.append({**{name: cells[name] for name in columns}, COURSE: "", "run": row["run"]})
+            yield cells
 
     write_tables(store, rows(), course.tags)
+    if statuses.count("ok") > 1:
+        mark(lines, compare_rows(compared))
+    write_groups(store, lines, course.tags)
+    needs = [(line["need"], line["name"], status) for line, status in zip(lines, statuses, strict=True)]
     chosen = worst(needs, reports)
     drawn = [(name, job) for name, job in zip(names, course.jobs, strict=True) if name in chosen]
     failed = write_reports(store.folder, drawn, jobs, reported)

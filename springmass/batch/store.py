@@ -35,9 +35,9 @@ from storage.schema import ValueRefused, decoded, parsed
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["CSV", "PAGE", "PARQUET", "PART", "Store", "is_course", "open_course", "sha256_of", "table_rows"]
+__all__ = ["CSV", "GROUPS", "PAGE", "PARQUET", "PART", "Store", "is_course", "open_course", "sha256_of", "table_rows"]
 
-CSV, PARQUET, PAGE = "results.csv", "results.parquet", "index.html"
+CSV, PARQUET, PAGE, GROUPS = "results.csv", "results.parquet", "index.html", "groups.txt"
 PARTS = "parts"
 PART = 100  # rows per part, which limits the loss by damage and the memory used at a time
 _LISTING = "course.json"

@@ -23,6 +23,7 @@ from springmass.batch.plan import Job, code_sha256
 from springmass.batch.rows import ESTIMATES, LARGEST
 from springmass.batch.store import sha256_of
 from springmass.errors import NO_MEMORY, ProgramError, internal_error, quietly
+from springmass.report.advice import Harm, harm_of, sentence
 from springmass.runs.about import about_path
 from springmass.runs.analysing import AnalysedRun, load_and_analyse
 from springmass.runs.loading import Loaded
@@ -84,6 +85,7 @@ def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, An
         "quality": {},
         "findings": [],
         "messages": [],
+        "tell": [],
         "correlations": {},
         "drag_points": [],
         "thumbnail": "",
@@ -134,6 +136,7 @@ def unchanged(job: Job, row: Mapping[str, Any], *, rehash: bool) -> list[list[An
 def _fill(row: dict[str, Any], loaded: Loaded, analysis: Analysis) -> None:
     track, motion, findings = analysis.track, analysis.motion, analysis.findings
     moves = isinstance(motion, (Oscillation, Overdamped))
+    by_harm = sorted(((harm_of(f.code, f.severity), f) for f in findings), key=lambda pair: pair[0])
     row.update(
         status="ok" if moves else "no_oscillation",
         error="" if moves else f"{row['path']}: no oscillation: {motion.why}",
@@ -153,6 +156,7 @@ def _fill(row: dict[str, Any], loaded: Loaded, analysis: Analysis) -> None:
         warnings=sum(f.severity == "warning" for f in findings),
         findings=[f.code for f in findings],
         messages=[[f.severity, f.message] for f in findings if f.severity != "info"],
+        tell=[f"{sentence(f.message)} {f.advice}".rstrip() for harm, f in by_harm if harm <= Harm.PART],
         thumbnail=_thumbnail(track.t, track.y, _period_s(analysis)),
     )
     if isinstance(motion, Oscillation):

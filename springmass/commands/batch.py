@@ -12,7 +12,7 @@ from springmass.batch.course import template
 from springmass.batch.plan import plan
 from springmass.batch.rows import FAILED
 from springmass.batch.running import run_course
-from springmass.batch.store import CSV, PAGE
+from springmass.batch.store import CSV, GROUPS, PAGE
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, manner, suggest, tell
 from springmass.options import BatchOptions
 from springmass.runs.options import ReadOptions
@@ -76,7 +76,7 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
         complain(line)
     failed = len(outcome.failures)
     tell(f"{outcome.runs} runs: {outcome.unchanged} unchanged, {outcome.analysed} analysed, {failed} failed")
-    tell(f"written: {folder / CSV}, {folder / PAGE}")
+    tell(f"written: {folder / CSV}, {folder / PAGE}, {folder / GROUPS}")
     suggest(f"open {folder / PAGE} in a browser")
     if failed and failed == outcome.runs:
         return UNREADABLE

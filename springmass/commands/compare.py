@@ -84,8 +84,9 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
         raise ProgramError("-o and --scene go with single runs; a course has its page and its scenes", USAGE)
     found = compare_rows(search(inputs, where=options.where).rows, bench=options.bench)
     print(json.dumps(compared_json(found), allow_nan=False) if options.json else visible_lines(compared_text(found)))
-    if options.strict and found.suspects:
-        complain(f"rejected under --strict: {len(found.suspects)} runs differ from their course")
+    wrong = {one.name for one in found.suspects}.union(*(one.names for one in found.disagreements))
+    if options.strict and wrong:
+        complain(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
         return REJECTED
     for suspect in found.suspects[:1]:
         suggest(f"springmass report {shlex.join([*inputs[:1], suspect.name])}")

@@ -49,7 +49,7 @@ def files_of(
     deep : bool
         Whether subfolders are searched too.
     known : collection of str
-        Paths of files already identified as recordings; they are not opened again for this check.
+        Absolute paths of files that count as recordings; they are not opened for this check.
     but : collection of str
         Absolute paths of files and subfolders to leave out when a folder is searched.
 
@@ -117,7 +117,11 @@ def _in_folder(
     names = {path.name for path in files}
     pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}
     parts = set(_parts(files)) | set(pairs.values())
-    taken = [path for path in files if path.name not in parts and (str(path) in known or _is_recording(path))]
+    taken = [
+        path
+        for path in files
+        if path.name not in parts and ((known and os.path.abspath(path) in known) or _is_recording(path))
+    ]
     kept = {path.name for path in taken} | parts
     return (
         [

@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from springmass.cli import main
-from tests.courses import write_recording
+from tests.courses import faulty_course, write_recording
 
 K, SPRING_KG, DIAMETER_M, RHO = 14.0, 0.010, 0.102, 1.199  # N/m, kg, m, kg/m3
 DRAG = {"thin": 5.0, "thick": 3.0}
@@ -61,3 +62,65 @@ def test_a_course_is_compared_by_spring_and_disc(course, cli):
         assert found["drag_coefficient", disc]["runs"] == 4
         assert found["drag_coefficient", disc]["mean"]["value"] == pytest.approx(drag, rel=0.03)
     assert compared["suspects"] == []
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a course with planted faults."""
+    top = tmp_path_factory.mktemp("faulty")
+    assert main(["batch", *faulty_course(top), "-o", str(top / "out"), "--reports", "0"]) == 1
+    return top / "out"
+
+
+def test_planted_faults_are_named_and_the_mean_is_of_the_others(faulty, cli):
+    """Exchanged masses are named as pairs, within a bench and between two; a mass in grams by itself."""
+    compared = json.loads(cli("compare", faulty, "--json").out)
+    said = {one["name"]: one["message"] for one in compared["suspects"]}
+    assert said.keys() == {"A1", "A3", "B2", "C3", "D2"}
+    assert said["A1"] == said["A3"]
+    assert "A1 and A3 exchanged" in said["A1"]
+    assert "B2 and C3 exchanged" in said["B2"]
+    assert "grams" in said["D2"]
+    (spring,) = compared["agreements"]
+    assert spring["mean"]["value"] == pytest.approx(14.0, rel=1e-3)
+    assert compared["disagreements"] == []
+    assert cli("compare", faulty, "--strict").code == 5
+
+
+def test_every_group_is_told_of_its_faults(faulty):
+    """One paragraph a group; the page has a row a file, those with faults before the others and in the same words."""
+    told = {text[6]: text for text in (faulty / "groups.txt").read_text().split("\n\n")}
+    assert list(told) == list("ABCDEF")
+    for run in ("A1", "A3", "B2", "C3", "D2", "E1", "E3", "F2", "F4"):
+        assert re.search(rf"^  .*\b{run}\b.*: ", told[run[0]], re.MULTILINE)
+    for run in ("A2", "B1", "C1", "D1", "E2", "F1"):
+        assert run not in told[run[0]]
+    page = (faulty / "index.html").read_text()
+    looks = re.findall(r'<tr class="(\w+)">.*?<th[^>]*>(\w+)<', page)
+    assert len(looks) == 24
+    assert {run for look, run in looks if look != "fine"} == {"A1", "A3", "B2", "C3", "D2", "E1", "E3", "F2", "F4"}
+    assert [look for look, _ in looks[9:]] == ["fine"] * 15
+    assert "A1 and A3 exchanged" in page
+
+
+def test_two_runs_of_one_spring_are_judged_without_a_median(tmp_path, cli):
+    """At one bench of two, exchanged masses, grams and a disagreement are said, and no mean is made of them."""
+    faulty_course(tmp_path)
+    with (tmp_path / "runs.csv").open(newline="") as file:
+        rows = {Path(row["path"]).stem: row for row in csv.DictReader(file)}
+    rows["E2"]["bob_mass_kg"] = "0.21"
+    pairs = ("A1", "A3", "D1", "D2", "E2", "E4", "F1", "F3")
+    with (tmp_path / "two.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, [*rows["A1"], "spring"])
+        table.writeheader()
+        table.writerows({**rows[name], "spring": name[0]} for name in pairs)
+    assert cli("batch", "--runs", tmp_path / "two.csv", "-o", tmp_path / "out", "--accuracy", "fast").code == 0
+    compared = json.loads(cli("compare", tmp_path / "out", "--json").out)
+    assert [one["name"] for one in compared["suspects"]] == ["A1", "A3", "D2"]
+    assert [one["names"] for one in compared["disagreements"]] == [["E2", "E4"]]
+    means = {one["group"]: one["mean"] for one in compared["agreements"]}
+    assert means["A"] is None
+    assert means["D"]["value"] == pytest.approx(14.0, rel=1e-3)
+    text = cli("compare", tmp_path / "out").out
+    assert "spring_constant of A: no mean" in text
+    assert "E: the 2 runs of its bench and spring disagree" in text

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.course import CourseRun, agreement, suspects
+from pipeline.results.course import CourseRun, agreement, judged
 
 
 def course(runs: int = 40, seed: int = 0) -> list[CourseRun]:
@@ -35,7 +35,7 @@ def course(runs: int = 40, seed: int = 0) -> list[CourseRun]:
 
 def test_good_runs_are_not_named():
     """None of 400 in ten courses."""
-    assert [suspects(course(seed=seed)) for seed in range(10)] == [()] * 10
+    assert [judged(course(seed=seed))[0] for seed in range(10)] == [()] * 10
 
 
 def test_far_runs_are_named():
@@ -44,7 +44,7 @@ def test_far_runs_are_named():
     runs[5] = replace(runs[5], spring_constant=Estimate(14000.0, 1.0, "N/m"))
     runs[16] = replace(runs[16], spring="B")
     runs[21] = replace(runs[21], drag=Estimate(3.0, 0.05))
-    assert {one.name for one in suspects(runs)} == {"run5", "run16", "run21"}
+    assert {one.name for one in judged(runs)[0]} == {"run5", "run16", "run21"}
 
 
 def test_scatter_within_and_between_is_what_was_put_in():
