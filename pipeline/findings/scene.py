@@ -25,8 +25,8 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...]) -> Iterator[Found]
     }
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]
     if unusual := scene.unusual():
-        more = len(unusual) - 1
-        yield Found("scene_implausible", {"first": unusual[0], "more": more or None, "all": "; ".join(unusual)})
+        said = [clause if clause.endswith("?") else f"{clause}." for clause in unusual]
+        yield Found("scene_implausible", {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)})
     if scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
         yield Found("spring_mass_missing", {"heaviest": HEAVIEST_SHARE})
     if exact:
