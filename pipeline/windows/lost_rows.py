@@ -21,9 +21,13 @@ LENGTHS: tuple[int, ...] = (*range(8, 32), 40, 56, 80, 112)
 U_STEP = 0.1
 FEWEST = 4  # minimum number of places; the phase jumps of fewer are found in the windows
 BETTER = 4.0  # factor by which the scatter of the windows' phases must shrink once the times are put right
+STEP = 0.6  # least step of the phase, in steps of one lost sample, at which lost samples are sought
+COUNTS = (0, 1, 2, 3, 4, -1)  # numbers of samples lost at one place; a step back shows that something else goes on
 BACK = 0.1  # maximum share of the steps that go back
+CLEARER = 0.6  # factor by which lost samples must lower the residual about their place
 WEAKEST = 0.05  # quantile of the amplitudes from which the noise of the steps follows
-ROUNDS = 3  # searches, each with the frequency that follows from the lost samples found so far
+REACHES = (1.0, 1.5, 2.0)  # samples about a step in which it is placed, over those on one side of it
+ROUNDS = 2  # searches, each with the frequency that follows from the lost samples found so far
 USED = 0.9  # minimum share of samples that are used
 MOST = 0.2  # maximum share of lost samples
 
@@ -41,8 +45,9 @@ def find_lost_rows(samples: Conditioned, windows: Demodulated) -> LostRows | Non
     """Return what shows that samples were lost; None if nothing does.
 
     A lost sample advances the phase by :math:`\\omega h` at once. Sinusoids of known frequency are fitted to L samples
-    before and after every place, and their phases are compared. The places are believed if the phase only runs ahead,
-    and if the phases of the windows scatter far less once the times count the lost samples.
+    before and after every place, and their phases are compared. About a step, one sinusoid with lost samples at any
+    place must leave far less than one without. The places are believed if the phases of the windows scatter far less
+    once the times count the lost samples.
     """
     track, step_s = samples.track, _even_step(samples)
     if step_s is None or windows.t.size < 8:
@@ -56,24 +61,26 @@ def find_lost_rows(samples: Conditioned, windows: Demodulated) -> LostRows | Non
     length = _samples_needed(ratio, omega * step_s)
     if length is None:
         return None
-    for _ in range(ROUNDS):
-        turn = omega * step_s
-        for _ in range(ROUNDS):  # at most places no sample is lost, so the typical advance shows the true frequency
-            turn *= 1.0 + (median(_ahead(y, turn, length)) - 1.0) / length
-        lost = _steps(_ahead(y, turn, length) - 1.0, length)
-        back = int(-lost[lost < 0].sum())
-        lost = np.maximum(lost, 0)
-        if np.count_nonzero(lost) < FEWEST or lost.sum() > MOST * len(track) or back > BACK * lost.sum():
-            return None
-        trial = _counted(samples, lost)
-        cycles = find_cycles(trial)
-        if isinstance(cycles, NoOscillation):
-            return None
-        windows = demodulate(trial, cycles)
-        omega = windows.angular_frequency
-    if not _scatter(windows) * BETTER < before:
-        return None
-    return LostRows(float(lost.sum()) / len(track), int(np.count_nonzero(lost)), trial)
+    best, found = before / BETTER, None
+    for reach in REACHES:
+        turn, lost = omega * step_s, np.zeros(len(track), np.int64)
+        for _ in range(ROUNDS):
+            for _ in range(ROUNDS):  # at most places no sample is lost, so the typical advance shows the true frequency
+                turn *= 1.0 + (median(_ahead(y, turn, length)) - 1.0) / length
+            lost = _steps(y, turn, length, int(reach * length))
+            back = np.count_nonzero(lost < 0)
+            lost = np.maximum(lost, 0)
+            places = np.count_nonzero(lost)
+            if places < FEWEST or lost.sum() > MOST * len(track) or back > BACK * places:
+                break
+            trial = _counted(samples, lost)
+            if isinstance(cycles := find_cycles(trial), NoOscillation):
+                break
+            windows = demodulate(trial, cycles)
+            turn = windows.angular_frequency * step_s
+            if (scatter := _scatter(windows)) < best:
+                best, found = scatter, LostRows(float(lost.sum()) / len(track), int(places), trial)
+    return found
 
 
 def _even_step(samples: Conditioned) -> float | None:
@@ -123,15 +130,44 @@ def _ahead(y: F8, turn: float, length: int) -> F8:
     return np.asarray(np.angle(second[length:] * np.conj(first[:-length])) / turn)
 
 
-def _steps(ahead: F8, length: int) -> NDArray[np.int64]:
-    """Return (n,) the whole numbers of lost samples before each sample that the phases show."""
-    lost = np.zeros(ahead.size + 2 * length - 1, np.int64)
+def _steps(y: F8, turn: float, length: int, reach: int) -> NDArray[np.int64]:
+    """Return (n,) the numbers of lost samples before each sample, from the strongest step of the phase on."""
+    ahead = _ahead(y, turn, length) - 1.0
+    lost = np.zeros(y.size, np.int64)
     size = np.abs(ahead)
-    while size.size and size.max() > 0.6:
+    while size.size and size.max() > STEP:
         k = int(np.argmax(size))
-        lost[k + length] = round(float(ahead[k]))
-        size[max(k - length + 1, 0) : k + length] = 0.0
+        place, count = _place(y, turn, k + length, reach)
+        if count:
+            lost[place] = count
+        near = place if count else k + length
+        size[max(min(k, near - length) - length + 1, 0) : max(k, near - length) + length] = 0.0
     return lost
+
+
+def _place(y: F8, turn: float, about: int, reach: int) -> tuple[int, int]:
+    """Return where and how many samples were lost, from one sinusoid through the samples about a place; 0 if none.
+
+    A count below 0 is a step back. The sums of the normal equations before and after every place are cumulative sums.
+    """
+    first = max(about - reach, 0)
+    part = y[first : about + reach]
+    places = np.arange(max(about - reach // 2 - first, 1), min(about + reach // 2 - first, part.size - 1))
+    angle, power = turn * np.arange(part.size), float(part @ part)
+    sums = np.array([_sums(np.cos(angle + turn * count), np.sin(angle + turn * count), part) for count in COUNTS])
+    both = sums[:1, :, places] + sums[:, :, -1:] - sums[:, :, places]
+    cc, cs, ss, cy, sy = both.transpose(1, 0, 2)
+    left = power - (cy**2 * ss - 2.0 * cy * sy * cs + sy**2 * cc) / (cc * ss - cs**2)
+    best = np.unravel_index(int(np.argmin(left)), left.shape)
+    if not left[best] < CLEARER * left[0, 0]:
+        return about, 0
+    return first + int(places[best[1]]), COUNTS[best[0]]
+
+
+def _sums(cosine: F8, sine: F8, y: F8) -> F8:
+    """Return (5, n + 1): sums of the products in the normal equations over the samples before each place."""
+    products = np.array([cosine * cosine, cosine * sine, sine * sine, cosine * y, sine * y])
+    return np.concatenate([np.zeros((5, 1)), np.cumsum(products, axis=1)], axis=1)
 
 
 def _scatter(windows: Demodulated) -> float:
