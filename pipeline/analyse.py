@@ -110,6 +110,8 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     windows, swing_m = fitted.demodulated, (derived.estimates["offset"].value, fitted.damping.best.joint.values[0])
     findings = worded(
         track.unit,
+        # A missing or wrong mass changes the spring constant more than anything that the recording shows.
+        scene_findings(scene, effects),
         part_findings(part.segments, float(track.t[0]), float(track.t[-1])),
         motion_findings(part.cycles, fitted),
         damping_findings(fitted.damping),
@@ -122,7 +124,6 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
             swing_m,
             by_chance=echoes_by_chance(samples.flags, windows, CLIP_SIGMAS),
         ),
-        scene_findings(scene, effects),
         fit_findings(fitted, solved if isinstance(solved, str) else ""),
         clock_findings(track),
     )
