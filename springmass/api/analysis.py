@@ -65,6 +65,8 @@ class Analysis(Found):
             parameters = self.motion.derived.parameters_of(self.motion.damping.fits[law])
             if parameter in parameters:
                 return Value.of(parameters[parameter])
+        if name in ("spring_constant", "k") and self.scene.bob_mass_kg is None and "period" in everything:
+            raise _NoEstimate(f"{name} needs the mass of the bob: pass scene=Scene(bob_mass_kg=(KG, U_KG))")
         errors = [finding.message for finding in self.findings if finding.severity == "error"]
         why = f": {errors[0]}" if errors else ""
         raise _NoEstimate(

@@ -20,7 +20,7 @@ from pipeline.registry.quantities import QUANTITIES
 
 _PAGE_UNITS = {"1": "", "degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
 _SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
-_POWER = re.compile(r"\^\(?([\dn-]+)\)?")
+_POWER = re.compile(r"\^(?:\(([\dn-]+)\)|([\dn-]+))")
 NOTHING = "-"
 
 
@@ -249,12 +249,12 @@ def page_unit(unit: str) -> str:
 
     Examples
     --------
-    >>> page_unit("1/(m s)"), page_unit("rad/s^2"), page_unit("m^(1-n)/s")
-    ('m⁻¹ s⁻¹', 'rad/s²', 'm¹⁻ⁿ/s')
+    >>> page_unit("1/(m s)"), page_unit("rad/s^2"), page_unit("m^(1-n)/s"), page_unit("(m/s^2)^(1-n)/s")
+    ('m⁻¹ s⁻¹', 'rad/s²', 'm¹⁻ⁿ/s', '(m/s²)¹⁻ⁿ/s')
     """
     if unit in _PAGE_UNITS:
         return _PAGE_UNITS[unit]
-    return _POWER.sub(lambda power: power[1].translate(_SUPERSCRIPT), unit)
+    return _POWER.sub(lambda power: (power[1] or power[2]).translate(_SUPERSCRIPT), unit)
 
 
 def law_status(damping: Damping, name: str) -> str:
