@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -18,29 +18,36 @@ from pipeline.track import UNUSABLE
 
 
 class Limit(NamedTuple):
-    """Range of a number of the motion, and the numbers that its finding shows."""
+    """Range of a number of the motion, the numbers that its finding shows, and what it adds to the uncertainties."""
 
     code: str
     number: str
     shown: tuple[str, ...]
     least: float = -math.inf
     most: float = math.inf
+    misfit: Callable[[Mapping[str, float]], Misfit] | None = None
+
+
+def _too_fast(numbers: Mapping[str, float]) -> Misfit:
+    return Misfit(name="implausible_motion", amplitude_m=numbers["amplitude_m"] * (1.0 - 1.0 / numbers["gravities"]))
+
+
+def _no_distance(numbers: Mapping[str, float]) -> Misfit:
+    return Misfit(name="implausible_distance", offset_m=max(numbers["amplitude_m"], numbers["rest_m"]))
 
 
 LIMITS = (
     # Below two samples per period the frequency is aliased, and below four noise decides.
     Limit("undersampled", "samples_per_period", ("samples_per_period",), least=4.0),
     # A bob on a spring that can only pull reaches 1, and little more if the spring goes slack.
-    Limit("implausible_motion", "gravities", ("gravities", "amplitude_m", "frequency_hz"), most=1.2),
+    Limit("implausible_motion", "gravities", ("gravities", "amplitude_m", "frequency_hz"), most=1.2, misfit=_too_fast),
     # Extension of the spring by the bob at rest: 25 m correspond to a period of 10 s.
     Limit("implausible_sag", "sag_metres", ("period_s", "sag_metres"), most=25.0),
     # The longest range of an ultrasonic rangefinder is 10 m (MaxBotix XL-MaxSonar), and a tenth is added.
-    Limit("implausible_distance", "farthest_m", ("low_m", "high_m"), most=11.0),
-    Limit("implausible_distance", "nearest_m", ("low_m", "high_m"), least=math.ulp(0.0)),
-    Limit("implausible_distance", "share_of_distance", ("low_m", "high_m"), most=1.0),
+    Limit("implausible_distance", "farthest_m", ("low_m", "high_m"), most=11.0, misfit=_no_distance),
+    Limit("implausible_distance", "nearest_m", ("low_m", "high_m"), least=math.ulp(0.0), misfit=_no_distance),
+    Limit("implausible_distance", "share_of_distance", ("low_m", "high_m"), most=1.0, misfit=_no_distance),
 )
-
-
 COUNTED = 0.02  # minimum share of negative values in positions counted from a place in the midst of the motion
 
 
@@ -53,38 +60,34 @@ def beyond_limits(samples: Conditioned, fitted: Fitted) -> Iterator[Outcome]:
     uncertainty is :math:`1 - 1/n`. If a distance is impossible, the uncertainty of the rest position is as large as the
     rest position. The bob at rest extends its spring by :math:`g/\\omega^2`.
     """
-    numbers, rest_m = _numbers(samples, fitted)
-    told = set()
+    numbers = _numbers(samples, fitted)
+    reported = set()
     for limit in LIMITS:
-        if limit.code in told or not (numbers[limit.number] < limit.least or numbers[limit.number] > limit.most):
+        if limit.code in reported or not (numbers[limit.number] < limit.least or numbers[limit.number] > limit.most):
             continue
-        told.add(limit.code)
-        misfit, amplitude_m = None, numbers["amplitude_m"]
-        if limit.code == "implausible_motion":
-            misfit = Misfit(name=limit.code, amplitude_m=amplitude_m * (1.0 - 1.0 / numbers["gravities"]))
-        elif limit.code == "implausible_distance":
-            misfit = Misfit(name=limit.code, offset_m=max(amplitude_m, rest_m))
+        reported.add(limit.code)
+        misfit = None if limit.misfit is None else limit.misfit(numbers)
         yield Outcome(limit.code, {name: numbers[name] for name in limit.shown}, misfit)
 
 
-def _numbers(samples: Conditioned, fitted: Fitted) -> tuple[dict[str, float], float]:
-    """Return the numbers by name, NaN where they have no meaning for the record's quantity, and the mean distance."""
+def _numbers(samples: Conditioned, fitted: Fitted) -> dict[str, float]:
+    """Return the numbers by name, NaN where they have no meaning for the record's quantity."""
     track, windows = samples.track, fitted.demodulated
     used = (windows.flags & UNUSABLE) == 0
     t, y = track.t[used], track.y[used]
     omega, amplitude_m = fitted.phase.angular_frequency.value, float(np.max(np.abs(windows.amplitude)))
-    f = omega / (2.0 * math.pi)
+    f, rest_m = omega / (2.0 * math.pi), abs(float(np.mean(windows.offset)))
     per_value = {"m": omega**2, "m/s": omega, "m/s^2": 1.0}.get(track.unit, math.nan)
     numbers = {
         "samples_per_period": 1.0 / (median(np.diff(t)) * f) if t.size > 1 else math.nan,
         "frequency_hz": f,
         "period_s": 1.0 / f,
         "amplitude_m": amplitude_m,
+        "rest_m": rest_m,
         "gravities": amplitude_m * per_value / GRAVITY_M_PER_S2,
         "sag_metres": GRAVITY_M_PER_S2 / omega**2 if math.isfinite(per_value) else math.nan,
         **dict.fromkeys(("low_m", "high_m", "farthest_m", "nearest_m", "share_of_distance"), math.nan),
     }
-    rest_m = abs(float(np.mean(windows.offset)))
     # If distances start from zero at the first sample, as after integration of a velocity, their zero has no meaning.
     if track.unit == "m" and y.size and track.y[0] != 0.0:
         low_m, high_m = float(np.min(y)), float(np.max(y))
@@ -92,4 +95,4 @@ def _numbers(samples: Conditioned, fitted: Fitted) -> tuple[dict[str, float], fl
         # Positions counted from rest have both signs; no sensor of distances gives many negative ones.
         if float(np.mean(y < 0.0)) < COUNTED:
             numbers |= {"nearest_m": low_m, "share_of_distance": amplitude_m / rest_m if rest_m else math.inf}
-    return numbers, rest_m
+    return numbers

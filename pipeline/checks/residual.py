@@ -29,7 +29,7 @@ class Outcome:
     """
 
     code: str
-    numbers: Mapping[str, float | None] | None = None  # None: too small to be told
+    numbers: Mapping[str, float | None] | None = None  # None: too small to be reported
     misfit: Misfit | None = None
     explains: F8 | float = 0.0
     lags: float = 1.0

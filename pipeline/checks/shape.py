@@ -16,7 +16,7 @@ BINS = 64  # phase bins per period; the eighth harmonic keeps sin(pi 8/64)/(pi 8
 FALSE_ALARM = 1e-6  # probability that white noise shows a given harmonic
 HIGHEST = 8  # highest order of harmonics that are sought
 PARTS = 16  # number of parts of the run that must agree on a harmonic
-TOLD = 0.002  # minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones
+REPORTED = 0.002  # minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones
 CENTRES = 2.0 * math.pi * (np.arange(BINS) + 0.5) / BINS
 
 
@@ -77,7 +77,7 @@ def folded_shape(residual: Residual) -> Outcome | None:
         way = {"odd": 1.0 - even}
     else:
         way = {"near_peak_m" if abs(wave[BINS // 2]) > abs(wave[0]) else "far_peak_m": peak_m}
-    numbers = None if share < TOLD else {"peak_m": peak_m, "share": share, **way}
+    numbers = None if share < REPORTED else {"peak_m": peak_m, "share": share, **way}
     explained = np.zeros(bins.size)
     for one, k in zip(each, order.tolist(), strict=True):
         explained += one[bins] if not falls or relative is None else one[bins] * relative**k

@@ -13,12 +13,13 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.regression import correlation_length, solve_weighted
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, Quality
-from pipeline.windows.cycles import HOLE, NoOscillation, find_cycles
+from pipeline.windows.cycles import HOLE, Cycles, NoOscillation, find_cycles
 from pipeline.windows.demodulate import ROUNDING, demodulate
 from pipeline.windows.segments import Segments, Span, SpanKind
 
 SHORT = 0.05  # length of a gap over that of the part beside it up to which it needs no check
 MOST_PHASE = 0.3  # maximum of three standard uncertainties of the phase predicted across a gap, and of its error, rad
+FEWEST_SAMPLES = 8  # minimum number of samples of a part whose oscillation is sought, as of a whole record
 FEWEST_WINDOWS = 3  # minimum number of windows whose phases show how well they follow a straight line
 
 
@@ -36,25 +37,25 @@ def longest_part(samples: Conditioned) -> Segments | None:
         return None
     # A bob that has come to rest during the gap leaves a longer part with nothing but noise.
     order = sorted(stretches, key=lambda each: int(np.searchsorted(t, each[0]) - np.searchsorted(t, each[1])))
-    part = next((each for each in order if _oscillates(samples, *each)), order[0])
+    every = samples.track.t
+    oscillating = (each for each in order if _oscillation(samples, (every >= each[0]) & (every <= each[1])))
+    part = next(oscillating, order[0])
     chosen = stretches.index(part)
     spans = [Span(SpanKind.FREE, *each) for k, each in enumerate(stretches) if k != chosen]
     spans += [Span(SpanKind.GAP, a[1], b[0]) for a, b in itertools.pairwise(stretches)]
     return Segments(*stretches[chosen], tuple(sorted(spans, key=lambda span: span.first_s)))
 
 
-def _oscillates(samples: Conditioned, first_s: float, last_s: float) -> bool:
-    part = _within(samples, (samples.track.t >= first_s) & (samples.track.t <= last_s))
-    return bool(np.count_nonzero(part.used) >= 8) and not isinstance(find_cycles(part), NoOscillation)
-
-
-def _within(samples: Conditioned, rows: NDArray[np.bool_]) -> Conditioned:
-    """Return the record with all but some samples flagged."""
-    return replace(samples, flags=samples.flags | np.where(rows, np.uint8(0), np.uint8(Quality.OUTSIDE)))
+def _oscillation(samples: Conditioned, rows: NDArray[np.bool_]) -> tuple[Conditioned, Cycles] | None:
+    """Return the record with all but some samples flagged, and its cycles; None if they show no oscillation."""
+    part = replace(samples, flags=samples.flags | np.where(rows, np.uint8(0), np.uint8(Quality.OUTSIDE)))
+    if np.count_nonzero(part.used) < FEWEST_SAMPLES or isinstance(cycles := find_cycles(part), NoOscillation):
+        return None
+    return part, cycles
 
 
 def _stretches(samples: Conditioned, t: F8) -> list[tuple[float, float]]:
-    """Split the times of the samples used at every gap that is not bridged, the longest first."""
+    """Split the times of the samples used at every gap that is not bridged, beginning with the longest gap."""
     whole = [(float(t[0]), float(t[-1]))]
     steps = np.diff(t)
     if not steps.size:
@@ -79,11 +80,10 @@ class _Side:
     @classmethod
     def of(cls, samples: Conditioned, rows: NDArray[np.bool_]) -> _Side | None:
         """Fit the phases of some samples; None if they do not show enough periods."""
-        part = _within(samples, rows)
-        if np.count_nonzero(part.used) < 8 or isinstance(cycles := find_cycles(part), NoOscillation):
+        if (found := _oscillation(samples, rows)) is None:
             return None
         try:
-            windows = demodulate(part, cycles)
+            windows = demodulate(*found)
         except AnalysisError:
             return None
         if windows.t.size < FEWEST_WINDOWS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,27 +49,27 @@ def track_of(source: Any, *, unit: str | None = None, time_unit: str | None = No
     return replace(track, clock=getattr(t.values, "attrs", {}).get("clock", track.clock))
 
 
-class _Column:
+class _Column(NamedTuple):
     """Values, and the unit that their heading states."""
 
-    def __init__(self, values: Any, unit: str = "") -> None:
-        self.values, self.unit = values, unit
+    values: Any
+    unit: str = ""
 
 
 def _columns(source: Any) -> tuple[_Column, _Column, Any]:
     """Return the times, the values and the flags of a container."""
     if hasattr(source, "keys") and "distance" in source:
-        t = source["time"] if "time" in source else getattr(source, "index", None)
+        t = source["time"] if "time" in source else _index_of(source)
         # The "in" of a frame and of a dataset is that of their columns.
         flags = source["quality"] if "quality" in source else None  # noqa: SIM401
         if t is not None:
-            return _Column(_counted(t)), _Column(source["distance"]), flags
+            return _Column(t), _Column(source["distance"]), flags
     elif hasattr(source, "columns"):
         return *_by_headings(source), None
     elif getattr(source, "ndim", None) == 1 and "time" in getattr(source, "coords", ()):
         return _Column(source.coords["time"]), _Column(source), None
     elif getattr(source, "ndim", None) == 1 and hasattr(source, "index"):
-        return _Column(_counted(source.index)), _Column(source), None
+        return _Column(_index_of(source)), _Column(source), None
     elif isinstance(source, list | tuple) and len(source) == 2:
         return _Column(source[0]), _Column(source[1]), None
     raise TrackError(f"{EXPECTED}, got a {type(source).__name__}")
@@ -86,11 +86,15 @@ def _by_headings(frame: Any) -> tuple[_Column, _Column]:
     return _Column(frame[times[0][0]], times[0][1]), _Column(frame[others[0][0]], others[0][1])
 
 
-def _counted(index: Any) -> Any:
-    """Return an index of times; refuse one that only counts rows."""
-    if type(index).__name__ == "RangeIndex":
+def _index_of(source: Any) -> Any:
+    """Return the index of a frame or series, None without one; refuse one that only counts rows."""
+    if not hasattr(source, "index"):
+        return None
+    import pandas as pd
+
+    if isinstance(source.index, pd.RangeIndex):
         raise TrackError('its index counts rows and is no time: give times as its index, or as a column "time"')
-    return index
+    return source.index
 
 
 def _unit_of(values: Any) -> str:

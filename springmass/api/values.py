@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import re
 from collections.abc import Callable
 from typing import Any
@@ -146,7 +145,7 @@ def _power(left: Any, right: Any) -> str | None:
     return _NAMES.get(tuple(one * float(right) for one in exponents))
 
 
-def _none(_: Any) -> str:
+def _dimensionless(_: Any) -> str:
     return ""
 
 
@@ -177,30 +176,16 @@ for _name, _of_units in _UNITS.items():
 
 def _unary(function: Callable[[Any], Any], unit: Callable[[Any], str | None]) -> Callable[[Value], Any]:
     def apply(self: Value) -> Any:
-        return Value(function(UFloat(self.nominal_value, self._linear_part)), unit(self))
+        return Value(function(self), unit(self))
 
     return apply
 
 
 for _name in ("__neg__", "__pos__"):
-    setattr(Value, _name, _unary(getattr(operator, _name), _unit_of))
+    setattr(Value, _name, _unary(getattr(UFloat, _name), _unit_of))
 Value.sqrt = _unary(umath.sqrt, lambda x: _power(x, 0.5))
-# numpy calls the method of this name of an object; functions of a number with a unit have none.
-for _name in (
-    "exp",
-    "expm1",
-    "log",
-    "log10",
-    "log1p",
-    "sin",
-    "cos",
-    "tan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "degrees",
-    "radians",
-):
-    setattr(Value, _name, _unary(getattr(umath, _name), _none))
-for _name, _in_umath in {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}.items():
-    setattr(Value, _name, _unary(getattr(umath, _in_umath), _none))
+# numpy calls the method of this name of an object; the result is a number without unit.
+_OTHERWISE_IN_UMATH = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
+_SAME = ["exp", "expm1", "log", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "degrees", "radians"]
+for _name in (*_SAME, *_OTHERWISE_IN_UMATH):
+    setattr(Value, _name, _unary(getattr(umath, _OTHERWISE_IN_UMATH.get(_name, _name)), _dimensionless))

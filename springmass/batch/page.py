@@ -10,7 +10,7 @@ from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.course import LITTLE
 from springmass.batch.benches import BENCHES, CourseComparison
-from springmass.batch.reports import REPORTS, need_of, report_name
+from springmass.batch.reports import REPORTS, Need, need_of, report_name
 from springmass.batch.rows import COURSE, FAILED
 from springmass.batch.store import GROUPS, PAGE, Store
 from springmass.charts.chart import Chart
@@ -93,7 +93,7 @@ def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
 
 
 def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
-    """Put what the comparison says about a run first in what its group is told, and let it count for the look."""
+    """Put what the comparison says about a run first among the sentences for its group, and let it count."""
     by_name = {line["name"]: line for line in lines}
     said = [(one.name, one.message, "error") for one in comparison.suspects]
     if comparison.bench != COURSE:  # without a column of benches, nobody says that runs belong together
@@ -105,8 +105,9 @@ def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
             line["tell"] = [sentence(message), *line["tell"]]
         if LOOKS.index(look) < LOOKS.index(line["look"]):
             line["look"] = look
-        status, errors, told, misfit = line["need"]
-        line["need"] = (status, errors + (look == "error"), told + (look == "warning"), misfit)
+        need: Need = line["need"]
+        counted = {"errors": need.errors + 1} if look == "error" else {"harmful": need.harmful + 1}
+        line["need"] = need._replace(**counted)
 
 
 def write_groups(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[str]) -> None:
@@ -117,13 +118,13 @@ def write_groups(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequenc
         groups.setdefault("" if column is None else line["tags"][column], []).append(line)
     paragraphs = []
     for name, group in sorted(groups.items()):
-        told: dict[str, list[str]] = {}
+        runs_of: dict[str, list[str]] = {}
         for line in group:
             for text in line["tell"]:
-                told.setdefault(text, []).append(line["name"])
+                runs_of.setdefault(text, []).append(line["name"])
         runs = f"{len(group)} run{'s' if len(group) > 1 else ''}"
         title = "All runs" if column is None else f"{tags[column]} {name}" if name else f"without {tags[column]}"
-        texts = [f"  {', '.join(names)}: {text}" for text, names in told.items()] or ["  nothing to mend"]
+        texts = [f"  {', '.join(names)}: {text}" for text, names in runs_of.items()] or ["  nothing to mend"]
         paragraphs.append("\n".join([f"{title}: {runs}", *texts]))
     with store.output(GROUPS) as temporary, writing(store.folder / GROUPS):
         temporary.write_bytes(visible_lines("\n\n".join(paragraphs)).encode("utf-8", "backslashreplace") + b"\n")

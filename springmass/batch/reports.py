@@ -10,7 +10,7 @@ import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from acquisition.errors import visible
 from springmass.batch.executors import Lost, local_workers, outcomes
@@ -26,14 +26,22 @@ REPORTS = "reports"
 TIME = "in batch.log"  # fixed text in place of a time, so that a pass at any time gives the same bytes
 
 
-def need_of(row: Mapping[str, Any]) -> tuple[int, int, int, float]:
-    """Return a run's sort key for inspection, larger if more urgent: failure, errors, harmful findings, misfit."""
+class Need(NamedTuple):
+    """How much a run needs inspection; it sorts by its fields, and larger is more urgent."""
+
+    status: int  # 0 with an oscillation, 1 without, 2 for a file that failed
+    errors: int
+    harmful: int  # findings that change a result
+    misfit: float
+
+
+def need_of(row: Mapping[str, Any]) -> Need:
+    """Return how much a run needs inspection."""
     status = {"ok": 0, "no_oscillation": 1}.get(row["status"], 2)
-    misfit = row.get("reduced_chi2") or 0.0
-    return status, row.get("errors") or 0, len(row.get("tell") or ()), misfit
+    return Need(status, row.get("errors") or 0, len(row.get("tell") or ()), row.get("reduced_chi2") or 0.0)
 
 
-def worst(runs: Iterable[tuple[tuple[int, int, int, float], str, str]], count: int) -> set[str]:
+def worst(runs: Iterable[tuple[Need, str, str]], count: int) -> set[str]:
     """Return the names of the runs that most need inspection, among those that can be drawn.
 
     Each run consists of its need from :func:`need_of`, its name and its status.

@@ -89,12 +89,12 @@ def test_planted_faults_are_named_and_the_mean_is_of_the_others(faulty, cli):
 
 def test_every_group_is_told_of_its_faults(faulty):
     """One paragraph a group; the page has a row a file, those with faults before the others and in the same words."""
-    told = {text[6]: text for text in (faulty / "groups.txt").read_text().split("\n\n")}
-    assert list(told) == list("ABCDEF")
+    paragraphs = {text[6]: text for text in (faulty / "groups.txt").read_text().split("\n\n")}
+    assert list(paragraphs) == list("ABCDEF")
     for run in ("A1", "A3", "B2", "C3", "D2", "E1", "E3", "F2", "F4"):
-        assert re.search(rf"^  .*\b{run}\b.*: ", told[run[0]], re.MULTILINE)
+        assert re.search(rf"^  .*\b{run}\b.*: ", paragraphs[run[0]], re.MULTILINE)
     for run in ("A2", "B1", "C1", "D1", "E2", "F1"):
-        assert run not in told[run[0]]
+        assert run not in paragraphs[run[0]]
     page = (faulty / "index.html").read_text()
     looks = re.findall(r'<tr class="(\w+)">.*?<th[^>]*>(\w+)<', page)
     assert len(looks) == 24
