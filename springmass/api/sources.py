@@ -1,97 +1,86 @@
-"""Analysis of every kind of input: paths, open runs, datasets, frames, arrays."""
+"""What scripts call: load, analyse and compare runs of every kind of source."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from types import EllipsisType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 from acquisition.errors import NeedsAnswer
-from pipeline.analyse import Analysis as Found
 from pipeline.bench.scene import Scene
-from pipeline.damping.laws import LAWS, Law, find_law
-from pipeline.errors import AnalysisError, TrackError
-from pipeline.options import Options, options_for
-from springmass.api.analysis import Analysis
-from springmass.api.arrays import track_of
-from springmass.api.frames import comparison_frame
-from springmass.runs.analysing import Analysed, analyse_loaded, analyse_track, distinct_names, with_law
-from springmass.runs.comparing import Compared, compare_analysed, demand_one_spring
-from springmass.runs.loading import Loaded, cut
-from springmass.runs.loading import load as read
-from springmass.runs.options import ReadOptions
+from pipeline.damping.laws import Law
+from pipeline.errors import AnalysisError
+from springmass.runs.comparing import Compared, compare_runs
+from springmass.runs.how import Accuracy, How
+from springmass.runs.outputs import distinct_names
 from springmass.runs.questions import for_python
-from springmass.runs.scenes import read_scene
-from springmass.values import ANY_LAW
-from storage.run_file.reading import Run
+from springmass.runs.run import Run
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
+    from numpy.typing import ArrayLike
 
-__all__ = ["Comparison", "analyse", "compare", "load"]
+    Path = str | os.PathLike[str]
+    Arrays = tuple[ArrayLike, ArrayLike] | Mapping[str, ArrayLike] | xr.Dataset | xr.DataArray | pd.DataFrame | pd.Series
+    AnySource = Path | Run | Arrays
+    AnyScene = Scene | Path | Mapping[str, Any]
 
 
-def analyse(
-    source: Any,
-    scene: Scene | str | os.PathLike[str] | Mapping[str, Any] | None = None,
-    options: Options | None = None,
-    *,
-    accuracy: str | None = None,
-    law: str | Law | None = None,
-    laws: Sequence[str | Law | EllipsisType] | None = None,
-    from_s: float | None = None,
-    to_s: float | None = None,
-    **completions: Any,
-) -> Analysis:
+class Reading(TypedDict, total=False):
+    """How a recording is read: what its file leaves out, and which part of it is used."""
+
+    velocity: str | os.PathLike[str] | None
+    channel: str | None
+    run: str | None
+    rate_hz: float | None
+    unit: str | None
+    time: str | None
+    time_unit: str | None
+    delimiter: str | None
+    decimal: str | None
+    from_s: float | None
+    to_s: float | None
+    clock_ppm: float | None
+    unverified: bool
+
+
+class Analysing(Reading, total=False):
+    """How a recording is read and analysed."""
+
+    accuracy: Accuracy
+    law: str | Law | None
+    laws: Sequence[str | Law | EllipsisType] | None
+    method: Literal["classic"] | None
+
+
+def analyse(source: AnySource, scene: AnyScene | None = None, **how: Unpack[Analysing]) -> Run:
     """Analyse a run.
 
     Parameters
     ----------
-    source : path, Run, Loaded, Track, Dataset, DataArray, DataFrame, Series, mapping or pair of arrays
-        The path of a recording, run file or wire log, or a result of :func:`springmass.open_run` or
-        :func:`springmass.load`; these include clock, calibration and scene. A dataset, a frame or a mapping has
-        ``"time"`` (s), ``"distance"`` (m) and optionally ``"quality"``. The values of a data array or a series are
-        distances, and its ``time`` or its index gives the times. A pair is ``(t, y)``. NaN marks missing values. Units
-        that a coordinate, a heading such as "Distance (cm)" or a quantity of pint states are converted.
+    source : path, Run, Dataset, DataArray, DataFrame, Series, mapping or pair of arrays
+        The path of a recording, run file or wire log, a run of :func:`springmass.load`, or arrays. A dataset, a frame
+        or a mapping has ``"time"`` (s), ``"distance"`` (m) and optionally ``"quality"``; one that xarray read from a
+        run file is taken with all that the file states. The values of a data array or a series are distances, and its
+        ``time`` or its index gives the times. A pair is ``(t, y)``. NaN marks missing values. Units that a coordinate,
+        a heading such as "Distance (cm)" or a quantity of pint states are converted.
     scene : Scene, path or mapping, optional
         Known values of the bench. Default for ``NAME.h5``: the ``[scene]`` of ``NAME.about.toml`` beside it, else the
         scene inside the run file, else nothing.
-    options : springmass.Options, optional
-        Options of the analysis, instead of those of a tier.
-    accuracy : {"fast", "standard", "best"}, optional
-        Tier; default: "standard". It cannot be combined with ``options``.
-    law : str or Law, optional
-        The damping law, if it is known: a name of :data:`springmass.LAWS` or a law of :func:`springmass.make_law`. The
-        results are based on it alone, and findings report whether the run contradicts it. "any" lets the run choose,
-        regardless of the scene. Default: the law of the scene.
-    laws : sequence of str or Law, optional
-        The damping laws to try: names of :data:`springmass.LAWS`, laws of :func:`springmass.make_law`, and ``...`` for
-        all built-in laws.
-    from_s, to_s : float, optional
-        Limits of the time range to use, s; default: the whole run.
-    **completions
-        ``unit`` and ``time_unit`` of arrays, or options for reading a recording, as :func:`springmass.load` takes
-        them: velocity, channel, rate_hz, unit, run,
-        time, time_unit, delimiter, decimal, clock_ppm, unverified.
-
-    Returns
-    -------
-    Analysis
+    **how
+        ``accuracy``: "fast", "standard" (default) or "best". ``law``: the damping law, if it is known, a name of
+        :data:`springmass.LAWS` or a law of :func:`springmass.make_law`; "any" lets the run choose, regardless of the
+        scene. ``laws``: the laws to try, with ``...`` for all built-in ones. ``from_s`` and ``to_s``: limits of the
+        part to use, s. ``unit`` and ``time_unit``: those of arrays or of a file that states none. Further options of
+        reading a file: velocity, channel, rate_hz, run, time, delimiter, decimal, clock_ppm, unverified.
 
     Raises
     ------
-    AnalysisError
-        If fewer than eight samples are usable, or a law or an option is unknown.
-    TrackError
-        If the arrays do not form a track.
-    acquisition.errors.NeedsAnswer
-        If the file lacks information that was not given. The error's ``question`` lists what is missing and every
-        answer.
-    acquisition.errors.FormatError, storage.errors.StorageError, springmass.errors.ProgramError
-        If a file or a scene cannot be read.
+    springmass.Error
+        If the source or the scene cannot be read, something that it leaves out was not given, or fewer than eight
+        samples are usable; ``remedy`` says what to do.
 
     Examples
     --------
@@ -101,104 +90,51 @@ def analyse(
     >>> analyse((t, y), laws=["none", "linear"])["period"]
     0.757010(22) s
     """
-    if options is not None and accuracy is not None:
-        raise AnalysisError("options replace those of an accuracy: give one of the two")
-    chosen = options or options_for(accuracy or "standard")
-    if laws is not None:
-        chosen = replace(chosen, laws=_laws(laws))
-    if law is not None:
-        chosen = with_law(chosen, law if law == ANY_LAW else find_law(law))
-    if isinstance(source, Run):
-        source = source.path
-    if isinstance(source, str | os.PathLike):
-        source = load_file(source, "springmass.analyse", {**completions, "from_s": from_s, "to_s": to_s})
-    elif others := completions.keys() - {"unit", "time_unit"} or (completions if isinstance(source, Loaded) else ()):
-        raise TrackError(f"{', '.join(others)} complete recordings named by a path, got a {type(source).__name__}")
-    elif isinstance(source, Loaded):
-        source = replace(source, track=cut(source.track, from_s, to_s, where=source.path))
-    if isinstance(source, Loaded):
-        found, name = analyse_loaded(source, _scene(scene), options=chosen).analysis, source.path.name
-    else:
-        track = cut(track_of(source, **completions), from_s, to_s, where="the record")
-        found, name = analyse_track(track, _scene(scene) or Scene(), chosen), ""
-    return Analysis(**{each.name: getattr(found, each.name) for each in fields(Found)}, name=name)
+    run = _run(source, scene, "springmass.analyse", how)
+    _ = run.analysis  # here, and not where a result is first asked for
+    return run
 
 
-def load(path: str | os.PathLike[str], **options: Any) -> Loaded:
-    """Read a recording, a run file or a wire log.
+def load(source: AnySource, scene: AnyScene | None = None, **how: Unpack[Analysing]) -> Run:
+    """Read a recording, a run file or a wire log; it is analysed when a result is asked for.
 
     All digests of a run file are checked before a sample is used.
 
     Parameters
     ----------
-    path : path
-    **options
-        The fields of :class:`springmass.runs.options.ReadOptions`: information that the file may lack (velocity,
-        channel, run, rate_hz, unit, time, time_unit, delimiter, decimal), and from_s, to_s, clock_ppm, unverified.
+    source, scene, **how
+        As for :func:`springmass.analyse`.
 
     Raises
     ------
-    acquisition.errors.NeedsAnswer
-        If the file lacks information that was not given. The error's ``question`` lists what is missing and every
-        answer.
-    acquisition.errors.FormatError, storage.errors.StorageError
-        If the file cannot be read; the message is one line.
-    ProgramError
-        If no sample lies between ``from_s`` and ``to_s``.
-    TypeError
-        If an option is unknown.
+    springmass.Error
+        If the source cannot be read, or something that it leaves out was not given; ``remedy`` says what to do.
     """
-    return load_file(path, "springmass.load", options)
+    return _run(source, scene, "springmass.load", how)
 
 
-def load_file(path: str | os.PathLike[str], function: str, options: Mapping[str, Any]) -> Loaded:
-    """Load a file; an error about missing information names the arguments of the called function."""
-    given = ReadOptions.of(options)
+def _run(source: Any, scene: Any, function: str, options: Mapping[str, Any]) -> Run:
+    """Return the run of a source; an error about something missing names the arguments of the called function."""
+    how = How.of(options)
     try:
-        return read(Path(path), given)
+        return Run.of(source, scene, how)
     except NeedsAnswer as error:
-        raise error.with_remedy(for_python(error.question, function, given.given())) from None
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Comparison(Compared):
-    """The joint result of several runs of one spring, as :func:`springmass.compare` returns it.
-
-    Parameters
-    ----------
-    runs : mapping of str to Analysis
-    """
-
-    runs: Mapping[str, Analysis]
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return one row per run, and a row "together" for their mean.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A frame with the columns period and u_period (s), spring_constant, u and u_own (N/m), pull and agree; the
-            mean is NaN where the runs disagree.
-        """
-        return comparison_frame(self.comparison, {name: run["period"] for name, run in self.runs.items()})
-
-    def __repr__(self) -> str:
-        return "\n".join([self.comparison.message, *(one.message for one in self.joint)])
+        raise error.with_remedy(for_python(error.question, function, how.given())) from None
 
 
 def compare(
-    sources: Sequence[Any],
-    scene: Any = None,
+    sources: Sequence[AnySource],
+    scene: AnyScene | Sequence[AnyScene | None] | None = None,
     *,
     mass_correlation: float = 0.0,
-    **how: Any,
-) -> Comparison:
+    **how: Unpack[Analysing],
+) -> Compared:
     """Test whether runs agree on one spring constant, and whether one damping law fits all runs of one bob.
 
     Parameters
     ----------
     sources : sequence
-        At least two analyses, or sources that :func:`analyse` takes.
+        At least two runs, or sources that :func:`analyse` takes.
     scene : optional
         As for :func:`analyse`: one for all runs, or a list with one for each; default: each run's own scene.
     mass_correlation : float
@@ -208,10 +144,9 @@ def compare(
 
     Raises
     ------
-    AnalysisError
-        If fewer than two runs are given, or one does not oscillate.
-    springmass.errors.ProgramError
-        If a scene gives no bob mass, or the scenes state different springs.
+    springmass.Error
+        If fewer than two runs are given, one does not oscillate, a scene gives no bob mass, or the scenes state
+        different springs.
     """
     if len(sources) < 2:
         raise AnalysisError(f"compare needs two runs at least, got {len(sources)}")
@@ -219,30 +154,10 @@ def compare(
     if len(scenes) != len(sources):
         raise AnalysisError(f"expected one scene for all runs or one for each, got {len(scenes)} for {len(sources)}")
     each = [
-        one if isinstance(one, Analysis) else analyse(one, its, **how) for one, its in zip(sources, scenes, strict=True)
+        one if isinstance(one, Run) and its is None and not how else _run(one, its, "springmass.compare", how)
+        for one, its in zip(sources, scenes, strict=True)
     ]
-    runs = dict(zip(distinct_names([one.name or "run" for one in each]), each, strict=True))
-    demand_one_spring([(name, run.scene) for name, run in runs.items()])
-    found = compare_analysed([Analysed(name, run, {}) for name, run in runs.items()], mass_correlation=mass_correlation)
-    return Comparison(found.comparison, found.joint, found.findings, runs)
-
-
-def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:
-    """Return the requested laws, with ``...`` replaced by all built-in laws that are not named."""
-    if isinstance(wanted, str):
-        raise AnalysisError(f"laws must be a list of names and laws, got the text {wanted!r}")
-    named = [law for law in wanted if not isinstance(law, EllipsisType)]
-    for law in named:
-        find_law(law)
-    others = [name for name in LAWS if name not in named]
-    found: list[Any] = []
-    for each in wanted:
-        found += others if isinstance(each, EllipsisType) else [each]
-    return tuple(found)
-
-
-def _scene(given: Any) -> Scene | None:
-    """Return the given scene as a ``Scene``, or None if none was given."""
-    if given is None or isinstance(given, Scene):
-        return given
-    return Scene.from_mapping(given) if isinstance(given, Mapping) else read_scene(given)
+    names = distinct_names([run.name or "run" for run in each])
+    return compare_runs(
+        [run.named(name) for run, name in zip(each, names, strict=True)], mass_correlation=mass_correlation
+    )

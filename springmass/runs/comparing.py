@@ -1,10 +1,10 @@
-"""Compare several runs of one spring: the steps that the commands share, and the JSON of the result."""
+"""Compare several runs of one spring: the result for scripts, commands and reports, and its JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
@@ -16,15 +16,17 @@ from pipeline.registry.found import Found
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.derive import limited
 from springmass.errors import USAGE, ProgramError
-from springmass.runs.analysing import Analysed
+from springmass.runs.frames import comparison_frame
 from springmass.runs.json_results import SCHEMA, parameters_json, picked, plain
+from springmass.runs.run import Run
 
-__all__ = ["Compared", "compare_analysed", "comparison_json", "demand_one_spring"]
+if TYPE_CHECKING:
+    import pandas as pd
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Compared:
-    """The joint result of several runs of one spring.
+    """The joint result of several runs of one spring, as :func:`springmass.compare` returns it.
 
     Parameters
     ----------
@@ -34,25 +36,31 @@ class Compared:
         Joint damping fit for each bob that several runs have in common.
     findings : tuple of Finding
         The most severe first.
+    runs : mapping of str to Run
     """
 
     comparison: Comparison
     joint: tuple[JointDamping, ...]
     findings: tuple[Finding, ...]
+    runs: Mapping[str, Run]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row per run, and a row "together" for their mean.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A frame with the columns period and u_period (s), spring_constant, u and u_own (N/m), pull and agree; the
+            mean is NaN where the runs disagree.
+        """
+        return comparison_frame(self.comparison, {name: run["period"] for name, run in self.runs.items()})
+
+    def __repr__(self) -> str:
+        return "\n".join([self.comparison.message, *(one.message for one in self.joint)])
 
 
 def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
-    """Refuse scenes whose spring constants cannot be compared.
-
-    Parameters
-    ----------
-    scenes : sequence of (name, Scene)
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if a scene gives no bob mass, or the scenes state different springs.
-    """
+    """Refuse scenes without a mass of the bob, or of different springs: their spring constants cannot be compared."""
     missing = [name for name, scene in scenes if scene.bob_mass_kg is None]
     if missing:
         raise ProgramError(
@@ -70,46 +78,31 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
             )
 
 
-def compare_analysed(runs: Sequence[Analysed], *, mass_correlation: float = 0.0) -> Compared:
-    """Compare analysed runs of one spring.
+def compare_runs(runs: Sequence[Run], *, mass_correlation: float = 0.0) -> Compared:
+    """Compare two or more runs of one spring; raise AnalysisError if one does not oscillate.
 
-    Parameters
-    ----------
-    runs : sequence of Analysed
-        At least two.
-    mass_correlation : float
-        Correlation coefficient between the errors of two bobs' masses, 0 to 1.
-
-    Raises
-    ------
-    AnalysisError
-        If a run does not oscillate or has no bob mass.
+    ``mass_correlation`` is the correlation coefficient between the errors of two bobs' masses, 0 to 1.
     """
+    demand_one_spring([(run.name, run.scene) for run in runs])
     motions = [(run.name, _moving(run)) for run in runs]
     comparison = compare_springs(
         [
             SpringRun.of(name, motion.derived, clock=run.analysis.track.clock)
             for (name, motion), run in zip(motions, runs, strict=True)
         ],
-        spring_mass_kg=runs[0].analysis.scene.spring_mass_kg,
+        spring_mass_kg=runs[0].scene.spring_mass_kg,
         mass_correlation=mass_correlation,
     )
     joint = tuple(
         join([(name, m.damping, float(m.demodulated.t[-1]) - m.damping.t0) for name, m in group])
-        for group in _of_one_bob(motions, [run.analysis.scene for run in runs])
+        for group in _of_one_bob(motions, [run.scene for run in runs])
     )
-    return Compared(comparison, joint, tuple(_findings(comparison, joint)))
+    return Compared(comparison, joint, tuple(_findings(comparison, joint)), {run.name: run for run in runs})
 
 
-def comparison_json(compared: Compared, runs: Sequence[Analysed], provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a comparison as a JSON-serialisable mapping; numbers that are not finite become None.
-
-    Parameters
-    ----------
-    compared : Compared
-    runs : sequence of Analysed
-    provenance : mapping
-    """
+def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a comparison as a JSON-serialisable mapping; numbers that are not finite become None."""
+    runs = compared.runs.values()
     found = compared.comparison
     derived = [_moving(run).derived for run in runs]
     each = zip(found.names, derived, found.each, found.own_u, found.pulls, strict=True)
@@ -148,7 +141,7 @@ def comparison_json(compared: Compared, runs: Sequence[Analysed], provenance: Ma
     return {key: plain(value) for key, value in content.items()}
 
 
-def _moving(run: Analysed) -> Oscillation:
+def _moving(run: Run) -> Oscillation:
     motion = run.analysis.motion
     if not isinstance(motion, Oscillation):
         raise AnalysisError(f"{run.name}: no oscillation to compare: {motion.why}")

@@ -33,7 +33,7 @@ __all__ = [
     "with_traps",
 ]
 
-SCHEMA = 2
+SCHEMA = 3
 _REJECTED_WARNINGS = frozenset({"sensor_lost"})
 
 
@@ -46,26 +46,14 @@ def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
 def result_of(
     loaded: Loaded,
     analysis: Analysis,
-    *,
-    time_utc: str,
+    classic: Classic | None,
     accuracy: str,
     parameters: Mapping[str, Any],
-    classic: Classic | None = None,
+    time_utc: str,
 ) -> dict[str, Any]:
     """Return the result as a JSON-serialisable mapping; numbers that are not finite become None.
 
-    Parameters
-    ----------
-    loaded : Loaded
-    analysis : Analysis
-    time_utc : str
-        Time of the analysis, ISO 8601.
-    accuracy : str
-        Accuracy tier, or "classic".
-    parameters : mapping
-        Resolved options.
-    classic : Classic, optional
-        If given, its estimates replace those of the analysis.
+    The estimates of ``classic``, if it is given, replace those of the analysis.
     """
     estimates = classic.estimates if classic is not None else analysis.estimates
     content = {

@@ -1,16 +1,14 @@
-"""Load a track from a path, for old recordings and run files alike, with any problems noticed while reading."""
+"""Load a recording, a run file or a wire log, with everything that its reader noticed."""
 
 from __future__ import annotations
 
 import hashlib
 import math
-import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -35,8 +33,6 @@ from storage.run_file.layout import MAGIC
 from storage.run_file.reading import CHECKED, open_run
 from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
-__all__ = ["Loaded", "between", "cut", "kind_of", "load", "sample_data"]
-
 UNVERIFIED = "unverified"
 NAMED = 5  # maximum number of differences that a message names
 _OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", "time_unit", "delimiter", "decimal"})
@@ -44,33 +40,12 @@ _OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """One input that has been read.
+    """One input that has been read: the samples as they were recorded, and the track that the pipeline analyses.
 
-    The original files inside a run file, and its digest, are read only when they are needed.
-
-    Parameters
-    ----------
-    path : Path
-    format : str
-        The family that read the input; "run" for a run file, "wire" for a wire log.
-    info : SourceInfo
-    channel : str
-    title : str
-    samples : Block
-    track : Track
-        The samples for the pipeline, cut to the chosen time interval.
-    traps : tuple of Trap
-    malformed_rows : int
-    take_originals : callable
-        Returns the original files.
-    take_sha256 : callable
-        Returns the SHA-256 digest of the file's bytes.
-    scene : mapping or None
-        The scene from the notes next to the file, or else the scene inside a run file.
-    provenance : mapping
-        The origin that the recording states, with marks and notes.
-    recorded_format : str
-        The family that read the recording; for a run file, the family of the recording inside it, or empty if none.
+    ``format`` is the family that read it, "run" for a run file, "wire" for a wire log, "memory" for arrays;
+    ``recorded_format`` is the family of the recording inside a run file. ``scene`` comes from the notes next to the
+    file, or else from inside a run file. ``kept`` are the original files; those inside a run file are read when they
+    are needed. ``sha256`` is the digest of the file's bytes, empty for arrays and for an empty wire log.
     """
 
     path: Path
@@ -80,37 +55,23 @@ class Loaded:
     title: str
     samples: Block
     track: Track
-    traps: tuple[Trap, ...]
-    malformed_rows: int
-    take_originals: Callable[[], tuple[Original, ...]]
-    take_sha256: Callable[[], str]
-    scene: Mapping[str, Any] | None
+    traps: tuple[Trap, ...] = ()
+    malformed_rows: int = 0
+    scene: Mapping[str, Any] | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
     recorded_format: str = ""
+    sha256: str = ""
+    kept: tuple[Original, ...] | None = ()
 
-    @cached_property
+    @property
     def originals(self) -> tuple[Original, ...]:
-        """Exact copies of the original files.
-
-        Raises
-        ------
-        storage.errors.StorageError
-            If an original inside a run file has a checksum mismatch.
-        springmass.errors.ProgramError
-            If the run file has changed since it was loaded.
-        """
-        return self.take_originals()
-
-    @cached_property
-    def sha256(self) -> str:
-        """SHA-256 digest of the file's bytes; empty for a wire log of which nothing was kept.
-
-        Raises
-        ------
-        springmass.errors.ProgramError
-            If the run file has changed since it was loaded.
-        """
-        return self.take_sha256()
+        """Exact copies of the original files; those inside a run file are checked as they are read."""
+        if self.kept is not None:
+            return self.kept
+        if _sha256_of(self.path) != self.sha256:
+            raise ProgramError(f"{self.path}: the file has changed since it was loaded; load it again", UNREADABLE)
+        with open_run(self.path, unverified=any(trap.code == UNVERIFIED for trap in self.traps)) as run:
+            return run.originals()
 
     def samples_in_blocks(self, size: int = 1024) -> Iterator[Block]:
         """Yield the samples in blocks of at most ``size``."""
@@ -119,25 +80,11 @@ class Loaded:
 
 
 def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
-    """Read a recording, a run file or a wire log.
+    """Read a recording, a run file or a wire log, or standard input.
 
-    All digests of a run file are checked before any sample is used.
-
-    Parameters
-    ----------
-    path : path
-        :data:`springmass.layout.STDIN` for standard input.
-    options : ReadOptions
-
-    Raises
-    ------
-    acquisition.errors.NeedsAnswer
-        If the file leaves something open that the options do not give. The error's ``question`` lists the missing items
-        and all their possible answers.
-    acquisition.errors.FormatError, storage.errors.StorageError
-        If the file cannot be read; the message is one line.
-    ProgramError
-        If no sample lies within the chosen time interval, or an option is given that the file states itself.
+    All digests of a run file are checked before any sample is used. Raises NeedsAnswer if the file leaves something
+    open that the options do not give, FormatError or StorageError if it cannot be read, and ProgramError if no sample
+    lies within the chosen time interval, or an option is given that the file states itself.
     """
     if str(path) == STDIN:
         return _load_stdin(options)
@@ -150,21 +97,8 @@ def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
         _refuse(where, "a wire log", options, ("channel",))
         loaded = _load_wire(where, options.channel)
     else:
-        loaded = _from_recording(
-            where,
-            open_recording(
-                where,
-                channel=options.channel,
-                rate_hz=options.rate_hz,
-                unit=options.unit,
-                run=options.run,
-                time=options.time,
-                time_unit=options.time_unit,
-                delimiter=options.delimiter,
-                decimal=options.decimal,
-                velocity_path=options.velocity,
-            ),
-        )
+        stated = {name: getattr(options, name) for name in _OF_FILES - {"velocity"}}
+        loaded = _from_recording(where, open_recording(where, velocity_path=options.velocity, **stated))
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             complain(f"{where}: {trap.message}")
@@ -178,9 +112,15 @@ def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
         loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
     summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
     detail(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
+    return within(loaded, options)
+
+
+def within(loaded: Loaded, options: ReadOptions) -> Loaded:
+    """Return an input with its track cut to the chosen seconds, and with the stated error of its clock."""
+    track = cut(loaded.track, options.from_s, options.to_s, where=loaded.path)
     if options.clock_ppm is not None:
-        loaded = replace(loaded, track=replace(loaded.track, clock_limit=options.clock_ppm * 1e-6))
-    return replace(loaded, track=cut(loaded.track, options.from_s, options.to_s, where=where))
+        track = replace(track, clock_limit=options.clock_ppm * 1e-6)
+    return replace(loaded, track=track)
 
 
 def _load_stdin(options: ReadOptions) -> Loaded:
@@ -192,8 +132,8 @@ def _load_stdin(options: ReadOptions) -> Loaded:
         with open(spooled, "wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
         loaded = load(spooled, options)
-        originals, sha256 = loaded.originals, loaded.sha256  # read while the file exists
-    return replace(loaded, path=Path(STDIN), take_originals=lambda: originals, take_sha256=lambda: sha256)
+        kept = loaded.originals  # read while the file exists
+    return replace(loaded, path=Path(STDIN), kept=kept)
 
 
 def sample_data() -> Path:
@@ -224,6 +164,7 @@ def _refuse(path: Path, what: str, options: ReadOptions, allowed: Sequence[str])
 
 
 def _from_recording(path: Path, recording: Recording) -> Loaded:
+    origin = {"start_time": recording.start_time, "recorded_run": recording.run}
     return Loaded(
         path,
         recording.format,
@@ -234,22 +175,15 @@ def _from_recording(path: Path, recording: Recording) -> Loaded:
         to_track(recording.samples, recording.info, recorded_format=recording.format),
         recording.traps,
         recording.malformed_rows,
-        lambda: recording.originals,
-        lambda: recording.originals[0].sha256,
-        None,
-        provenance=_origin(recording),
+        provenance={name: value for name, value in origin.items() if value},
         recorded_format=recording.format,
+        sha256=recording.originals[0].sha256,
+        kept=recording.originals,
     )
 
 
-def _origin(recording: Recording) -> dict[str, Any]:
-    """Return the origin that an old recording states: start time and run."""
-    origin = {"start_time": recording.start_time, "recorded_run": recording.run}
-    return {name: value for name, value in origin.items() if value}
-
-
 def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
-    stamp = _stamp(path)
+    sha256 = _sha256_of(path)
     with open_run(path, unverified=unverified) as run:
         try:
             samples, traps = run.samples(), run.traps
@@ -272,11 +206,11 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
             to_track(samples, run.info, recorded_format=run.format, provenance=run.provenance),
             traps,
             run.malformed_rows,
-            lambda: _originals_of(path, stamp, unverified),
-            lambda: _sha256_of(path, stamp),
             run.scene,
             run.provenance,
             run.format,
+            sha256,
+            kept=None,
         )
 
 
@@ -290,30 +224,7 @@ def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[Trap, ...]
     return (Trap(UNVERIFIED, message, len(differing)),)
 
 
-def _stamp(path: Path) -> tuple[int, int, int] | None:
-    """Return a stamp that distinguishes a file from a later one of the same name; None if there is no file."""
-    try:
-        found = os.stat(path)
-    except OSError:
-        return None
-    return found.st_ino, found.st_size, found.st_mtime_ns
-
-
-def _demand_same(path: Path, stamp: tuple[int, int, int] | None) -> None:
-    if _stamp(path) != stamp:
-        raise ProgramError(f"{path}: the file has changed since it was loaded; load it again", UNREADABLE)
-
-
-def _originals_of(path: Path, stamp: tuple[int, int, int] | None, unverified: bool) -> tuple[Original, ...]:
-    """Read the original files inside an already loaded run file."""
-    _demand_same(path, stamp)
-    with open_run(path, unverified=unverified) as run:
-        return run.originals()
-
-
-def _sha256_of(path: Path, stamp: tuple[int, int, int] | None) -> str:
-    """Return the SHA-256 digest of an already loaded run file."""
-    _demand_same(path, stamp)
+def _sha256_of(path: Path) -> str:
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -339,28 +250,14 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
         loaded,
         path=path,
         format="wire",
-        take_originals=lambda: originals,
-        take_sha256=lambda: originals[0].sha256 if originals else "",
         recorded_format="wire",
+        sha256=originals[0].sha256 if originals else "",
+        kept=originals,
     )
 
 
 def cut(track: Track, from_s: float | None, to_s: float | None, *, where: object) -> Track:
-    """Return the samples within a time interval.
-
-    Parameters
-    ----------
-    track : Track
-    from_s, to_s : float or None
-        Limits of the interval, s, both included; None: from the first sample, or to the last.
-    where : object
-        Named in errors, usually the file.
-
-    Raises
-    ------
-    ProgramError
-        If no sample lies in the interval.
-    """
+    """Return the samples between two times, s, both included; ``where`` is named in the error if there are none."""
     low = -np.inf if from_s is None else from_s
     high = np.inf if to_s is None else to_s
     part = between(track, low, high)

@@ -50,6 +50,13 @@ def read_scene(path: str | Path) -> Scene:
     return _scene_of(read_tables(path), str(path))
 
 
+def scene_from(given: Any) -> Scene | None:
+    """Return a scene given as such, as its tables, or by the path of its file; None if none was given."""
+    if given is None or isinstance(given, Scene):
+        return given
+    return Scene.from_mapping(given) if isinstance(given, Mapping) else read_scene(given)
+
+
 def read_tables(path: str | Path) -> dict[str, Any]:
     """Read a small TOML file of a scene or of notes.
 

@@ -65,11 +65,15 @@ def _trigger_s(provenance: Mapping[str, Any]) -> float | None:
 
 def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Return the device clock's rate relative to the host's, if both timestamps exist, and its largest rate error."""
-    if info.clock != "device" or samples.host_ns is None or not (samples.host_ns >= 0).all():
-        return {}
     noted = provenance.get("decoding", {}).get("clock", {})
-    # The stored comparison uses the pings, whose times are in no sample; files of earlier versions may lack it.
-    comparison = noted if noted.keys() >= COMPARED else fit_clock(samples.t, samples.host_ns).to_mapping()
+    if info.clock != "device":
+        return {}
+    if noted.keys() >= COMPARED:
+        comparison = noted  # by the pings, whose times are in no sample; files of earlier versions may lack it
+    elif samples.host_ns is not None and (samples.host_ns >= 0).all():
+        comparison = fit_clock(samples.t, samples.host_ns).to_mapping()
+    else:
+        return {}
     clock = {
         "clock_limit": 1e-6 * noted.get("limit_ppm", RESONATOR_PPM),
         "held_samples": comparison["held_readings"],

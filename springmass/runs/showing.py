@@ -1,19 +1,21 @@
-"""Summaries of an analysis: at most 15 lines for a terminal, and page-wide HTML for a notebook."""
+"""Summaries of a run: at most 15 lines for a terminal, and page-wide HTML for a notebook."""
 
 from __future__ import annotations
 
 import textwrap
 from collections import Counter
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from acquisition.errors import visible
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Oscillation
 from springmass.report.laws import laws_of
-from springmass.report.tables import law_status, pretty, pretty_number, table_rows
+from springmass.report.tables import law_status, pretty, pretty_number
 
-__all__ = ["html_summary", "text_summary"]
+if TYPE_CHECKING:
+    from springmass.runs.run import Run
 
 WIDTH = 79
 MOST_ROWS = 10
@@ -38,71 +40,61 @@ FIRST = (
 )
 
 
-def text_summary(analysis: Analysis) -> str:
-    """Return an analysis in at most 15 lines of at most 79 characters.
-
-    Parameters
-    ----------
-    analysis : Analysis
-        Its ``name``, if it has one, comes first.
-    """
-    rows = {row.name: row for row in table_rows([analysis])}
+def text_summary(run: Run) -> str:
+    """Return a run in at most 15 lines of at most 79 characters."""
+    rows = {row.name: row for row in run.rows}
     shown = [name for name in FIRST if name in rows][:MOST_ROWS]
-    lines = [_cut(visible(_head(analysis)))]
-    width = max(len(rows[name].quantity) for name in shown) + 2
+    lines = [_cut(visible(_head(run)))]
+    width = max((len(rows[name].quantity) for name in shown), default=0) + 2
     lines += [f"  {rows[name].quantity:{width}}{rows[name].symbol:8}{rows[name].estimates[0]!r}" for name in shown]
-    if isinstance(analysis.motion, Oscillation):
-        lines.append(_cut(f"damping: {_law(analysis.motion)}"))
-    lines.append(_cut(_findings(analysis)))
+    if isinstance(run.analysis.motion, Oscillation):
+        lines.append(_cut(f"damping: {_law(run.analysis.motion)}"))
+    lines.append(_cut(_findings(run)))
     hidden = len(rows) - len(shown)
     lines.append("to_dataframe() has all estimates" + (f" ({hidden} more)" if hidden else "") + ", plot() the run")
     return "\n".join(lines)
 
 
-def html_summary(analysis: Analysis) -> str:
-    """Return an analysis as an HTML fragment without scripts: estimates, laws and findings.
-
-    Parameters
-    ----------
-    analysis : Analysis
-    """
+def html_summary(run: Run) -> str:
+    """Return a run as an HTML fragment without scripts: estimates, laws and findings."""
+    motion = run.analysis.motion
     rows = [
         f"<tr><td>{escape(row.quantity)}</td><td><i>{_subscript(row.page_symbol)}</i></td>"
         f"<td>{escape(pretty(row.estimates[0]))}</td></tr>"
-        for row in table_rows([analysis])
+        for row in run.rows
     ]
     parts = [
-        f"<p><b>{escape(visible(_head(analysis)))}</b></p>",
+        f"<p><b>{escape(visible(_head(run)))}</b></p>",
         "<table><thead><tr><th>quantity</th><th>symbol</th><th>estimate</th></tr></thead>"
         f"<tbody>{''.join(rows)}</tbody></table>",
     ]
-    if isinstance(analysis.motion, Oscillation):
+    if isinstance(motion, Oscillation):
         fits = [
             f"<tr><td>{escape(row['name'])}</td><td>{escape(row['status'])}</td>"
             f"<td>{pretty_number(row['fit'].reduced_chi2, 3)}</td><td>{escape(row['bic'])}</td>"
             f"<td>{escape(', '.join(row['coefficients'][1:]))}</td></tr>"
-            for row in laws_of(analysis.motion)["rows"]
+            for row in laws_of(motion)["rows"]
         ]
         heads = "<th>law</th><th>status</th><th>reduced χ²</th><th>ΔBIC</th><th>coefficients</th>"
         parts.append(
-            f"<details><summary>Damping: {escape(_law(analysis.motion))}</summary>"
+            f"<details><summary>Damping: {escape(_law(motion))}</summary>"
             f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(fits)}</tbody></table></details>"
         )
     items = "".join(
         f"<li><b>{escape(f.severity)}</b> <code>{escape(f.code)}</code>: {escape(visible(f.message))}</li>"
-        for f in analysis.findings
+        for f in run.findings
     )
-    opened = " open" if any(f.severity != "info" for f in analysis.findings) else ""
-    parts.append(f"<details{opened}><summary>{escape(_findings(analysis))}</summary><ul>{items}</ul></details>")
+    opened = " open" if any(f.severity != "info" for f in run.findings) else ""
+    parts.append(f"<details{opened}><summary>{escape(_findings(run))}</summary><ul>{items}</ul></details>")
     return f'<div class="springmass-analysis">{"".join(parts)}</div>'
 
 
-def _head(analysis: Analysis) -> str:
-    track = analysis.track
-    name = getattr(analysis, "name", "") or "run"
+def _head(run: Run) -> str:
+    track = run.analysis.track
     span = float(np.nanmax(track.t) - np.nanmin(track.t))
-    words = f"{name}: {track.kind}, {len(track)} samples in {span:.4g} s, {analysis.quality['used']} used"
-    return words if isinstance(analysis.motion, Oscillation) else f"{words}; {analysis.motion.why}"
+    words = f"{run.name or 'run'}: {track.kind}, {len(track)} samples in {span:.4g} s, "
+    words += f"{run.analysis.quality['used']} used"
+    return f"{words}; {run.why}" if run.why else words
 
 
 def _law(motion: Oscillation) -> str:
@@ -115,11 +107,11 @@ def _law(motion: Oscillation) -> str:
     return f"{damping.selected} ({state} of {len(damping.fits)} laws){tail}"
 
 
-def _findings(analysis: Analysis) -> str:
-    counts: Counter[str] = Counter(finding.severity for finding in analysis.findings)
+def _findings(run: Run) -> str:
+    counts: Counter[str] = Counter(finding.severity for finding in run.findings)
     parts = [f"{counts[name]} {name}{'s' * (counts[name] > 1)}" for name in ("error", "warning") if counts[name]]
     parts += [f"{counts['info']} for information"] if counts["info"] else []
-    grave = [f.code for f in analysis.findings if f.severity != "info"]
+    grave = [f.code for f in run.findings if f.severity != "info"]
     return f"findings: {', '.join(parts) or 'none'}" + (f": {', '.join(grave)}" if grave else "")
 
 

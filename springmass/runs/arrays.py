@@ -1,52 +1,96 @@
-"""Tracks from arrays in memory: their units are read or refused, never ignored."""
+"""Recordings from arrays in memory: their units are read or refused, never ignored."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from acquisition.block import Block
 from acquisition.recordings import units
+from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.headings import heading_of, is_time
+from acquisition.source import SourceInfo
 from pipeline.errors import TrackError
 from pipeline.track import F8, Track
+from springmass.runs.loading import Loaded, kind_of, load
+from springmass.runs.options import ReadOptions
+from springmass.runs.tracks import to_track
 
-EXPECTED = "a path, a run, a track, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
+EXPECTED = "a path, a run, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
+ABOUT = "springmass"
+"""The attribute of a dataset with everything but the samples."""
+_OF_RUNS = frozenset({"from_s", "to_s", "clock_ppm"})
 
 
-def track_of(source: Any, *, unit: str | None = None, time_unit: str | None = None) -> Track:
-    """Return a track from arrays in any supported container; see :func:`springmass.analyse`.
+def loaded_of(source: Any, options: ReadOptions) -> Loaded:
+    """Return arrays in any supported container as a loaded recording; see :func:`springmass.analyse`.
 
-    Parameters
-    ----------
-    source : Track, Dataset, DataArray, DataFrame, Series, mapping or pair
-    unit, time_unit : str, optional
-        Units of the values and of the times; by default those that the source states, else m and s.
-
-    Raises
-    ------
-    TrackError
-        If the source contains no times and values, or states units that are not known.
+    A dataset of springmass, or one that xarray read from a run file, comes with all that the file states.
     """
-    if isinstance(source, Track):
-        if unit is not None or time_unit is not None:
-            raise TrackError("a track has its units: leave unit and time_unit out")
-        return source
+    _demand(options, {"unit", "time_unit", *_OF_RUNS}, type(source).__name__)
     t, y, flags = _columns(source)
     about: Mapping[str, Any] = getattr(source, "attrs", {})
     of_y: Mapping[str, Any] = getattr(y.values, "attrs", {})
-    measure = _measure(unit or y.unit or _unit_of(y.values) or "m")
+    measure = _measure(options.unit or y.unit or _unit_of(y.values) or "m")
     track = Track.from_arrays(
-        _seconds(t.values, time_unit or t.unit or _unit_of(t.values)),
+        _seconds(t.values, options.time_unit or t.unit or _unit_of(t.values)),
         _numbers(y.values, "values") * 10.0**measure.power * measure.factor,
         flags=flags,
         **{name: about[name] for name in ("rate_hz", "sigma_m", "quantum_m", "kind") if name in about},
         quantity=of_y.get("quantity", measure.quantity),
         unit=measure.si,
     )
-    return replace(track, clock=getattr(t.values, "attrs", {}).get("clock", track.clock))
+    velocity = np.asarray(source["velocity"], np.float64) if ABOUT in about and "velocity" in source else None
+    samples = Block(0, track.t, track.y, track.flags, None, velocity, track.quantity, track.unit)
+    if (known := _stated(source, about, samples)) is not None:
+        return known
+    track = replace(track, clock=getattr(t.values, "attrs", {}).get("clock", track.clock))
+    info: Any = (track.kind, "", track.rate_hz, track.sigma_m, track.quantum_m, track.clock)
+    return Loaded(Path(), "memory", SourceInfo(*info), "", "", samples, track)
+
+
+def again(loaded: Loaded, options: ReadOptions) -> Loaded:
+    """Return a recording that was read before; refuse options of reading, which would have no effect."""
+    _demand(options, _OF_RUNS, "run that is read already")
+    return loaded
+
+
+def _demand(options: ReadOptions, allowed: Collection[str], what: str) -> None:
+    reading = {each.name for each in fields(ReadOptions)}
+    if others := [name for name in options.given() if name in reading and name not in allowed]:
+        raise TrackError(f"{', '.join(others)} complete recordings named by a path, got a {what}; leave that out")
+
+
+def _stated(source: Any, about: Mapping[str, Any], samples: Block) -> Loaded | None:
+    """Return the recording of a dataset that says where its samples come from; None for any other."""
+    path = Path(getattr(source, "encoding", {}).get("source", ""))
+    if ABOUT in about:
+        known = json.loads(about[ABOUT])
+        known |= {"info": SourceInfo(**known["info"]), "traps": tuple(Trap(**trap) for trap in known["traps"])}
+        loaded = Loaded(**known | {"path": Path(known["path"])}, samples=samples, track=Track.from_arrays([0, 1], [0, 0]))
+    elif path.is_file() and kind_of(path) == "run":
+        loaded = load(path)
+        # Samples at the same times have the same velocities and times of arrival.
+        if len(samples) == len(loaded.samples):
+            samples = replace(samples, velocity=loaded.samples.velocity, host_ns=loaded.samples.host_ns)
+    else:
+        return None
+    track = to_track(samples, loaded.info, recorded_format=loaded.recorded_format, provenance=loaded.provenance)
+    return replace(loaded, samples=samples, track=track)
+
+
+def about_json(loaded: Loaded, scene: Mapping[str, Any]) -> str:
+    """Return everything about a recording but its samples and the bytes of its originals."""
+    names = ("format", "channel", "title", "malformed_rows", "provenance", "recorded_format", "sha256")
+    about = {name: getattr(loaded, name) for name in names}
+    info = {name: getattr(loaded.info, name) for name in SourceInfo.__slots__}
+    traps = [{name: getattr(trap, name) for name in Trap.__slots__} for trap in loaded.traps]
+    return json.dumps({**about, "path": str(loaded.path), "info": info, "traps": traps, "scene": dict(scene)})
 
 
 class _Column(NamedTuple):

@@ -1,0 +1,130 @@
+"""Runs and comparisons as pandas frames and xarray datasets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from acquisition.block import Flag
+from pipeline.analyse import Oscillation
+from pipeline.bench.scene import Scene
+from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.quantity import Unit
+from pipeline.results.budget import Budget
+from pipeline.results.compare import Comparison
+from pipeline.track import Quality
+from springmass.report.motion_table import smoothed_or_why
+from springmass.runs.arrays import ABOUT, about_json
+from springmass.runs.estimates import Value
+from springmass.runs.loading import Loaded
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from springmass.runs.run import Run
+
+
+def estimates_frame(run: Run, *, correlations: bool = False) -> pd.DataFrame:
+    """Return one row per estimate; see :meth:`springmass.Run.to_dataframe`."""
+    import pandas as pd
+
+    motion = run.analysis.motion
+    derived = motion.derived if isinstance(motion, Oscillation) else None
+    by_name = {row.name: row for row in run.rows}
+    rows: list[dict[str, Any]] = []
+    for name, x in run.items():
+        row = by_name.get(name)
+        words = {"quantity": row.quantity, "symbol": row.symbol} if row else {"quantity": name.replace("_", " ")}
+        budget = None if derived is None else derived.budgets.get(name)
+        rows.append({"symbol": "", **words, "value": x.value, "u": x.u, "unit": x.unit, **_expanded(budget)})
+    columns = ["quantity", "symbol", "value", "u", "unit", "dof", "coverage_factor", "expanded"]
+    frame = pd.DataFrame(rows, index=pd.Index(list(run), name="name"), columns=columns)
+    if correlations and derived is not None:
+        names, matrix = derived.joint.names, derived.joint.correlation
+        beside = pd.DataFrame(matrix, index=names, columns=[f"r({name})" for name in names])
+        frame = frame.join(beside[[f"r({name})" for name in frame.index]])
+    return frame
+
+
+def _expanded(budget: Budget | None) -> dict[str, float]:
+    if budget is None:
+        return {"dof": math.nan, "coverage_factor": math.nan, "expanded": math.nan}
+    return {"dof": budget.dof, "coverage_factor": budget.coverage_factor, "expanded": budget.expanded}
+
+
+def comparison_frame(found: Comparison, periods: Mapping[str, Value]) -> pd.DataFrame:
+    """Return one row per run, by name, and one for their mean."""
+    import pandas as pd
+
+    rows = [
+        {"period": periods[name].value, "u_period": periods[name].u, "spring_constant": k.value, "u": k.u}
+        | {"u_own": own, "pull": pull, "agree": found.agree}
+        for name, k, own, pull in zip(found.names, found.each, found.own_u, found.pulls, strict=True)
+    ]
+    mean = found.spring_constant if found.agree else Estimate(math.nan, math.nan, "N/m")
+    none = {"period": math.nan, "u_period": math.nan, "u_own": math.nan, "pull": math.nan}
+    rows.append(none | {"spring_constant": mean.value, "u": mean.u, "agree": found.agree})
+    columns = ["period", "u_period", "spring_constant", "u", "u_own", "pull", "agree"]
+    return pd.DataFrame(rows, index=pd.Index([*found.names, "together"], name="run"), columns=columns)
+
+
+def samples_dataset(loaded: Loaded, scene: Scene) -> xr.Dataset:
+    """Return samples as recorded, with everything about them; see :meth:`springmass.Run.dataset`."""
+    import xarray as xr
+
+    samples, info = loaded.samples, loaded.info
+    flags = {
+        "flag_masks": np.array([flag.value for flag in Flag], np.uint8),
+        "flag_meanings": " ".join(str(flag.name).lower() for flag in Flag),
+    }
+    of_value = {"units": samples.unit, "quantity": samples.quantity, "long_name": loaded.channel or samples.quantity}
+    variables: dict[str, Any] = {
+        "distance": ("time", samples.distance, of_value),
+        "quality": ("time", samples.flags, {"standard_name": "quality_flag", **flags}),
+    }
+    if samples.velocity is not None:
+        variables["velocity"] = ("time", samples.velocity, {"units": Unit(1, -1).of(samples.unit)})
+    time = {"units": "s", "standard_name": "time", "long_name": "time since the start of the run", "clock": info.clock}
+    attributes = {"kind": info.kind, "title": loaded.title, ABOUT: about_json(loaded, scene.to_mapping())}
+    return xr.Dataset(variables, {"time": ("time", samples.t, time)}, attributes)
+
+
+def run_dataset(run: Run) -> xr.Dataset:
+    """Return samples, windows and estimates; see :meth:`springmass.Run.to_dataset`."""
+    found, analysis, track, motion = run.dataset(), run.analysis, run.analysis.track, run.analysis.motion
+    of_value, of_first, of_second = (Unit(1, -order).of(track.unit) for order in range(3))
+    meanings = " ".join(str(flag.name).lower() for flag in Quality)
+    masks = np.array([flag.value for flag in Quality], np.uint8)
+    if len(track) < len(run.loaded.samples):
+        times = run.loaded.samples.t
+        found = found.isel(time=(times >= np.nanmin(track.t)) & (times <= np.nanmax(track.t)))
+    left_out = {"flag_masks": masks, "flag_meanings": meanings, "long_name": "why the analysis left a sample out"}
+    variables: dict[str, Any] = {"left_out": ("time", analysis.flags, left_out)}
+    coordinates: dict[str, Any] = {}
+    if isinstance(motion, Oscillation):
+        fit = {"fit": motion.waveform.position, "residual": motion.waveform.residual, "rest": motion.rest.at(track.t)}
+        variables |= {name: ("time", values, {"units": of_value}) for name, values in fit.items()}
+        smoothed = smoothed_or_why(analysis)
+        if not isinstance(smoothed, str):
+            for name, unit in (("position", of_value), ("velocity", of_first), ("acceleration", of_second)):
+                variables[f"smoothed_{name}"] = ("time", getattr(smoothed, name), {"units": unit})
+                variables[f"u_smoothed_{name}"] = ("time", getattr(smoothed, f"u_{name}"), {"units": unit})
+        damping, windows = motion.damping, motion.demodulated
+        coordinates["window"] = ("window", windows.t, {"units": "s", "long_name": "centre of a window"})
+        coordinates["law"] = ("law", list(damping.fits))
+        curves = [fit.amplitude(windows.t - damping.t0) for fit in damping.fits.values()]
+        variables |= {
+            "amplitude_of_window": ("window", windows.amplitude, {"units": of_value}),
+            "u_amplitude_of_window": ("window", damping.scatter.u, {"units": of_value}),
+            "kept": ("window", damping.scatter.kept, {"long_name": "whether the laws are fitted to it"}),
+            "phase_of_window": ("window", windows.phase, {"units": "rad"}),
+            "law_amplitude": (("law", "window"), np.array(curves), {"units": of_value}),
+        }
+        found.attrs["damping_law"] = damping.selected
+    for name, value in run.items():
+        variables[name] = ((), value.value, {"u": value.u, "units": value.unit or "1"})
+    return found.assign_coords(coordinates).assign(variables).assign_attrs(name=run.name)

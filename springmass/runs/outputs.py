@@ -1,0 +1,97 @@
+"""Names, folders and origins of what the program writes."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from acquisition.block import Block
+from springmass import __version__
+from springmass.errors import USAGE, ProgramError
+from springmass.runs.loading import Loaded
+from storage.run_file.writing import write_run
+
+LONGEST_NAME = 255
+
+
+def distinct_names(paths: Sequence[str]) -> list[str]:
+    """Return a name for each input: its file name without the suffix, with repeated names numbered.
+
+    >>> distinct_names(["a/bob.txt", "b/bob.txt", "disc.h5"])
+    ['bob', 'bob-2', 'disc']
+    """
+    counts: dict[str, int] = {}
+    names: dict[str, None] = {}
+    for stem in (Path(path).stem for path in paths):
+        count = counts.get(stem, 0) + 1
+        while (name := stem if count == 1 else f"{stem}-{count}") in names:
+            count += 1
+        counts[stem] = count
+        names[name] = None
+    return list(names)
+
+
+def in_a_name(name: str, suffix: str) -> str:
+    """Return a name with a suffix added, with the name cut if both exceed the 255 bytes that a file name may have.
+
+    >>> in_a_name("bob", ".results")
+    'bob.results'
+    >>> len(in_a_name("b" * 255, ".results"))
+    255
+    """
+    whole = os.fsencode(name)
+    if len(whole) + len(suffix) <= LONGEST_NAME:
+        return name + suffix
+    digest = hashlib.sha256(whole).hexdigest()[:8]  # keeps names distinct that are identical up to the cut
+    return f"{whole[: LONGEST_NAME - len(suffix) - 9].decode(errors='ignore')}-{digest}{suffix}"
+
+
+def make_folder(path: str | Path) -> Path:
+    """Return a folder for results, created if it does not exist."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ProgramError(
+            f"{folder}: cannot make the folder for results ({error.strerror}); name another with -o", USAGE
+        ) from error
+    return folder
+
+
+def made_now() -> dict[str, str]:
+    """Return the origin that a run file states: program, version and time of creation."""
+    return {"software": "springmass", "version": __version__, "created_utc": now_utc()}
+
+
+def now_utc() -> str:
+    """Return the current time in ISO 8601, UTC, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def save_run(
+    path: str | os.PathLike[str],
+    loaded: Loaded,
+    *,
+    blocks: Iterable[Block] | None = None,
+    scene: Mapping[str, Any] | None = None,
+    overwrite: bool = False,
+) -> Path:
+    """Write a run file of an input with everything it states, its own bytes inside; ``blocks`` replace its samples."""
+    return write_run(
+        path,
+        loaded.samples_in_blocks() if blocks is None else blocks,
+        loaded.info,
+        originals=loaded.originals,
+        scene=scene if scene is not None else loaded.scene,
+        title=loaded.title,
+        channel=loaded.channel,
+        traps=loaded.traps,
+        malformed_rows=loaded.malformed_rows,
+        format=loaded.recorded_format,
+        provenance={**loaded.provenance, **made_now()},
+        overwrite=overwrite,
+    )

@@ -1,0 +1,282 @@
+"""One run: a recording with its analysis, which every command, page, report, course and script shows."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
+from pipeline.bench.scene import Scene
+from pipeline.errors import AnalysisError
+from pipeline.findings.finding import Finding
+from pipeline.numerics.estimate import Estimate
+from pipeline.results.classic import Classic, classic
+from springmass.errors import detail
+from springmass.runs.arrays import again, loaded_of
+from springmass.runs.estimates import Value
+from springmass.runs.frames import estimates_frame, run_dataset, samples_dataset
+from springmass.runs.how import How
+from springmass.runs.json_results import result_of, with_traps
+from springmass.runs.loading import Loaded, load, within
+from springmass.runs.outputs import now_utc, save_run
+from springmass.runs.scenes import scene_from, stated_keys
+from springmass.runs.showing import html_summary, text_summary
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+    from springmass.report.tables import TableRow
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Mapping[str, Value]):
+    """A recording with its analysis, as :func:`springmass.load` and :func:`springmass.analyse` return it.
+
+    It is a mapping of names and symbols to values: ``run["period"]``, ``run["T"]``, ``run["k"]``, and the coefficients
+    of the selected law, ``run["gamma"]``; ``run["quadratic.beta"]`` is a parameter of any law. A value is a number of
+    the ``uncertainties`` package that knows its ``unit``; values of one run are correlated, and arithmetic accounts for
+    it. The recording is analysed when a result is first asked for.
+
+    Parameters
+    ----------
+    loaded : Loaded
+        The recording as it was read.
+    stated : Scene or None
+        The scene that replaces the recording's own.
+    how : How
+        How it was read, and how it is analysed.
+    name : str
+        Name of the run.
+
+    Examples
+    --------
+    >>> import springmass as sm
+    >>> run = sm.analyse(sm.sample_data() / "undamped_simulated_position.txt")
+    >>> run["period"]
+    0.758516(22) s
+    >>> print(2 * run["T"])
+    1.517032 +- 0.000044 s
+    """
+
+    loaded: Loaded
+    stated: Scene | None = None
+    how: How = field(default_factory=How)
+    name: str = ""
+
+    __hash__ = object.__hash__
+    __eq__ = object.__eq__
+
+    @classmethod
+    def of(cls, source: Any, scene: Any = None, how: How = How(), name: str = "") -> Run:
+        """Return the run of a path, arrays, or another run; ``scene`` is one, its tables, or the path of its file."""
+        if isinstance(source, str | os.PathLike):
+            loaded = load(Path(source), how)
+        elif isinstance(source, Run):
+            loaded = within(again(source.loaded, how), how)
+            scene, name = source.stated if scene is None else scene, name or source.name
+            how = replace(source.how, **how.stated())
+        else:
+            loaded = within(loaded_of(source, how), how)
+        return cls(loaded, scene_from(scene), how, name or loaded.path.name)
+
+    def named(self, name: str) -> Run:
+        """Return the run under another name, with its analysis if it has one."""
+        other = copy.copy(self)
+        object.__setattr__(other, "name", name)
+        return other
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene: the one that was given, or else the one that the recording carries."""
+        return self.stated or Scene.from_mapping(self.loaded.scene or {}, where=f"{self.loaded.path} (its scene)")
+
+    @cached_property
+    def analysis(self) -> Analysis:
+        """The analysis; its findings include those of the reader."""
+        found = analyse(self.loaded.track, self.scene, self.how.options)
+        detail(f"analysed: {self.name} at {self.how.accuracy}, with a scene that states {stated_keys(self.scene)}")
+        return replace(found, findings=with_traps(found.findings, self.loaded.traps))
+
+    @cached_property
+    def classic(self) -> Classic | None:
+        """The result of the lab report's own method, if ``how`` asks for it."""
+        return None if self.how.method is None else classic(self.loaded.track, self.scene)
+
+    @cached_property
+    def result(self) -> dict[str, Any]:
+        """The result as JSON has it: what ``springmass analyse --json`` prints and the report stores."""
+        parameters = {**self.how.parameters, "scene": self.scene.to_mapping()}
+        accuracy = self.how.method or self.how.accuracy
+        return result_of(self.loaded, self.analysis, self.classic, accuracy, parameters, now_utc())
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run oscillates or relaxes, so that there is something to report."""
+        return isinstance(self.analysis.motion, Oscillation | Overdamped)
+
+    @property
+    def why(self) -> str:
+        """Why the run is not ``ok``, as a sentence; empty if it is."""
+        return "" if isinstance(self.analysis.motion, Oscillation | Overdamped) else self.analysis.motion.why
+
+    @property
+    def law(self) -> str | None:
+        """The name of the damping law that fits best or is stated; None without an oscillation."""
+        motion = self.analysis.motion
+        return motion.damping.selected if isinstance(motion, Oscillation) else None
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the reader and the analysis found, the most severe first."""
+        return self.analysis.findings
+
+    @property
+    def recorded(self) -> Mapping[str, Any]:
+        """What the recording states about its origin: start time, title, marks, events, calibration."""
+        return {**self.loaded.provenance, "title": self.loaded.title}
+
+    @property
+    def rows(self) -> tuple[TableRow, ...]:
+        """The lines of Table 1."""
+        from springmass.report.tables import table_rows
+
+        return table_rows([self.analysis])
+
+    def _numbers(self) -> Mapping[str, Estimate]:
+        """Return all estimates and the coefficients of the selected law, by name."""
+        motion = self.analysis.motion
+        law = motion.derived.coefficients if isinstance(motion, Oscillation) else {}
+        return {**self.analysis.estimates, **law}
+
+    def __getitem__(self, name: str) -> Value:
+        everything, motion = self._numbers(), self.analysis.motion
+        if name in everything:
+            return Value.of(everything[name])
+        for row in self.rows:
+            (estimate,) = row.estimates
+            if estimate is not None and name in (row.symbol, row.page_symbol.replace(" ", "_")):
+                return Value.of(estimate)
+        law, _, parameter = name.partition(".")
+        if isinstance(motion, Oscillation) and law in motion.damping.fits:
+            parameters = motion.derived.parameters_of(motion.damping.fits[law])
+            if parameter in parameters:
+                return Value.of(parameters[parameter])
+        if name in ("spring_constant", "k") and self.scene.bob_mass_kg is None and "period" in everything:
+            raise _NoValue(f"{name} needs the mass of the bob: pass scene=Scene(bob_mass_kg=(KG, U_KG))")
+        errors = [finding.message for finding in self.findings if finding.severity == "error"]
+        why = f": {self.why or errors[0]}" if self.why or errors else ""
+        raise _NoValue(
+            f"no estimate {name!r} of this run{why}; there are {', '.join(everything) or 'none'}: see "
+            "docs/reference/estimates.md for what others need of record and scene"
+        )
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers())
+
+    def __len__(self) -> int:
+        return len(self._numbers())
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
+    def plot(self, chart: str = "position", ax: Axes | None = None) -> Axes:
+        """Draw a chart of the report into ``ax``, or into a new figure, and return the axes.
+
+        Parameters
+        ----------
+        chart : str
+            "position", "residual", "spectrum", "amplitude", "frequency", "phase", "energy" or "drag".
+        ax : matplotlib.axes.Axes, optional
+
+        Raises
+        ------
+        springmass.Error
+            If there is no such chart, or the run does not give it.
+        """
+        from springmass.charts.draw import draw
+        from springmass.charts.run import CHARTS
+
+        if chart not in CHARTS:
+            raise AnalysisError(f"no chart {chart!r}; there are {', '.join(CHARTS)}")
+        drawn = CHARTS[chart](self.analysis)
+        if drawn is None:
+            if not isinstance(self.analysis.motion, Oscillation):
+                raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.motion.why}")
+            needs = "[bob] mass_kg, [disc] diameter_m and an amplitude that falls" if chart == "drag" else "more periods"
+            raise AnalysisError(f"the chart {chart} needs {needs}; state them in the scene, or record longer")
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.subplots(layout="constrained")[1]
+        draw(drawn.panels[0], ax)
+        ax.legend(fontsize="small")
+        return ax
+
+    def to_dataframe(self, *, correlations: bool = False) -> pd.DataFrame:
+        """Return one row per estimate, by name.
+
+        Parameters
+        ----------
+        correlations : bool
+            Whether to append columns ``r(NAME)`` with the correlation coefficients.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A frame with the columns quantity, symbol, value, u, unit, dof, coverage_factor and expanded. The last three
+            are those of the budget in the JSON output, and are NaN for an estimate without a budget.
+        """
+        return estimates_frame(self, correlations=correlations)
+
+    def dataset(self) -> xr.Dataset:
+        """Return the samples as they were recorded, with all that is known about them in the attributes.
+
+        :func:`springmass.analyse` takes such a dataset, also after a selection by time, and uses all of it. The bytes
+        of the original files are not in it; :meth:`save` keeps them.
+        """
+        return samples_dataset(self.loaded, self.scene)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return :meth:`dataset` with the analysis: every sample with its fit, every window, every estimate.
+
+        Returns
+        -------
+        xarray.Dataset
+            Along ``time``: distance, quality and left_out and, for an oscillation, fit, residual, rest and the smoothed
+            motion with its uncertainties. Along ``window``: amplitude_of_window, u_amplitude_of_window, kept and
+            phase_of_window. Along ``law`` and ``window``: law_amplitude. Estimates have no dimension; their ``u`` and
+            ``units`` are attributes.
+        """
+        return run_dataset(self)
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the recording to a run file with its scene, calibration, flags and original files.
+
+        Parameters
+        ----------
+        path : path
+            The file to create, ``NAME.h5``.
+        overwrite : bool
+            Whether an existing file may be replaced.
+        """
+        return save_run(path, self.loaded, scene=self.scene.to_mapping() or None, overwrite=overwrite)
+
+    def __repr__(self) -> str:
+        return text_summary(self)
+
+    def _repr_html_(self) -> str:
+        return html_summary(self)
+
+
+class _NoValue(KeyError):
+    """The error for a name that no estimate has; its message is shown as a plain sentence, not as a repr."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
