@@ -25,8 +25,6 @@ from springmass.errors import (
 )
 from springmass.stops import STOPS
 
-__all__ = ["main"]
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit code; a user's error and a program defect each give one line on stderr."""
@@ -78,18 +76,17 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _call(words: Sequence[str]) -> int:
-    """Call a command; word command-line errors and a reader's questions, because both need the command line."""
+    """Call a command; answer command-line errors and a reader's questions, because both need the command line."""
     from cyclopts import CycloptsError
 
-    from springmass.command_line import COMMANDS, call, without_reading
+    from springmass.commands import call, without_reading
 
     try:
         with STOPS.raised():
             return call(words)
     except CycloptsError as error:
-        from springmass.terminal.usage import worded
-
-        complain(worded(error, COMMANDS))
+        called = " ".join(("springmass", *(error.command_chain or ())))
+        complain(f"{' '.join(str(error).split()).rstrip('.')}; {called} --help shows what it takes")
         return USAGE
     except Exception as error:
         from acquisition.errors import NeedsAnswer

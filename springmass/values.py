@@ -10,22 +10,6 @@ from cyclopts import Parameter
 
 from pipeline.registry.laws import LAW_NAMES
 
-__all__ = [
-    "ANY_LAW",
-    "Count",
-    "Finite",
-    "LawName",
-    "NotNegative",
-    "PartsPerMillion",
-    "Positive",
-    "ReadingsPerSecond",
-    "SampleShare",
-    "Share",
-    "SignedPartsPerMillion",
-    "TcpPort",
-    "WholeNumber",
-]
-
 
 def _where(holds: Callable[[float], bool], demand: str) -> Parameter:
     """Return a validator that rejects infinities, NaN and numbers for which ``holds`` is false, also in a tuple."""
@@ -35,9 +19,9 @@ def _where(holds: Callable[[float], bool], demand: str) -> Parameter:
             if each is None:
                 continue
             if not math.isfinite(each):
-                raise ValueError("must be a finite number")
+                raise ValueError("It must be a finite number.")
             if not holds(each):
-                raise ValueError(demand)
+                raise ValueError(f"It {demand}.")
 
     return Parameter(validator=validate)
 
@@ -48,7 +32,7 @@ ANY_LAW = "any"
 
 def _one_of_the_laws(_: object, name: str | None) -> None:
     if name is not None and name not in (*LAW_NAMES, ANY_LAW):
-        raise ValueError(f"must be one of {', '.join((*LAW_NAMES, ANY_LAW))}")
+        raise ValueError(f"It must be one of {', '.join((*LAW_NAMES, ANY_LAW))}.")
 
 
 LawName = Annotated[str, Parameter(validator=_one_of_the_laws)]

@@ -151,7 +151,7 @@ def _executed() -> dict[str, set[int]]:
         commands = [
             ["record", "--simulate", bench, "--seconds", "2", "-o", "run.h5"],
             ["recover", log, "-o", "out.h5"],
-            ["analyse", recording, "--scene", scene, "--out", "."],
+            ["analyse", recording, "--scene", scene, "--output", "."],
             ["compare", recording, recording, "--scene", scene],
             ["batch", ROOT / "sample_data", "-o", "course", "--jobs", "1", "--reports", "0"],
             ["simulate", "--scene", bench, "--seconds", "5", "-o", "simulated.h5"],

@@ -13,9 +13,9 @@ from cyclopts import Group
 from cyclopts.argument import Argument
 
 from pipeline.findings.finding import RANK, Kind, kinds
-from springmass.command_line import COMMANDS, app
+from springmass.commands import COMMANDS, app
+from springmass.commands.options import THE_PAGE
 from springmass.glossary import TERMS
-from springmass.options import THE_PAGE
 from springmass.runs.options import HOW_READ
 
 PAGE = Path(__file__).with_name("command-line.md")

@@ -1,6 +1,135 @@
-"""One module a command: ``run(arguments, options) -> exit code``.
+"""The command line: a command is one function in the module of its name, which is imported when the command is called.
 
-In: arguments and options, as ``springmass.command_line`` and ``springmass.options`` declare them. Out: lines on stdout,
-messages on stderr, files, an exit code of `springmass.errors`. Free to change: what one command prints. A new command
-is a module here, a function in ``springmass.command_line`` and perhaps a dataclass of options.
+In: the arguments and options that the function declares. Out: lines on stdout, messages on stderr, files, an exit code
+of `springmass.errors`. Free to change: what one command prints. A new command is a module here and a line below.
 """
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import App, Group, Parameter
+
+from springmass import __version__
+from springmass.errors import OK, USAGE, ProgramError, adopt
+from springmass.layout import STDIN
+
+if TYPE_CHECKING:
+    from cyclopts.help import HelpPanel
+    from rich.console import Console, ConsoleOptions
+
+EVERY_COMMAND = Group("Every command", sort_key=5)
+FIRST = {
+    "demo": "Replay, analyse and compare the bundled recordings, and print the results.",
+    "analyse": "Analyse recordings: print results and findings, and write a report.",
+    "explain": "Explain a warning: meaning, cause, advice and an example. Without a code, list all warnings.",
+    "scene": "Print a scene template, check a scene, or save a scene and marks next to a recording.",
+    "compare": "Compare runs of one spring: whether they agree, and whether one damping law fits them all.",
+    "batch": "Analyse a course of many runs into one table and a page; you can interrupt and resume it.",
+    "ports": "List the serial ports and the sensors that answer on them.",
+    "record": "Record a run from the bench and store every byte that the sensor sends.",
+    "page": "Show a recording in a browser, live or afterwards.",
+}
+"""The commands that a student, a course and a bench need, with their help."""
+FURTHER = {
+    "report": "Write the full report of one run of a course.",
+    "catalog": "Search, filter and list the runs of courses.",
+    "map": "Draw the drag coefficients of a course against Reynolds and Keulegan-Carpenter number.",
+    "recover": "Build a run file from a wire log, even from a damaged one.",
+    "replay": "Play a recording through the interface of a live sensor.",
+    "convert": "Convert a recording to a run file or another format, or extract the original from a run file.",
+    "formats": "List the formats of recordings, or identify the format of a file.",
+    "simulate": "Solve the equation of motion of a scene, to a given tolerance or with a method that you choose.",
+    "trade": "Measure what accuracy costs on this machine: error relative to its lower bound, and computing time.",
+    "sensors": "List the families of rangefinders with rate, resolution, range and limits.",
+    "firmware": "Wire, flash and set the 100 Hz rangefinder.",
+    "doctor": "Check this installation.",
+}
+COMMANDS = (*FIRST, *FURTHER)
+
+
+def _columns(console: Console, options: ConsoleOptions, panel: HelpPanel) -> None:
+    """Print one group of commands or options as text in columns."""
+    from cyclopts.help import DefaultFormatter, PanelSpec  # these import rich, which few commands need
+    from rich import box
+
+    DefaultFormatter(panel_spec=PanelSpec(box=box.SIMPLE, padding=(0, 0)))(console, options, panel)
+
+
+app = App(
+    name="springmass",
+    help="Estimate period, spring constant and damping law from rangefinder samples, with reliable uncertainties.",
+    help_epilogue="Exit codes: 0 done, 1 some inputs failed, 2 usage, 3 unreadable input, 4 sensor, port or recording "
+    "disk, 5 rejected under --strict, 70 internal error, 130 Ctrl-C",
+    help_formatter=_columns,
+    help_format="plaintext",
+    version=f"springmass {__version__}",
+    version_format="plaintext",
+    default_parameter=Parameter(negative=(), show_default=False),
+    group_commands=Group("This program", sort_key=3),
+    group_parameters=Group("Options", sort_key=1),
+    result_action="return_value",
+    suppress_keyboard_interrupt=False,
+)
+app.meta.suppress_keyboard_interrupt = False
+app["--help"].help = "show this help"
+app["--version"].help = "show the version"
+for _group, _commands in ((Group("Commands", sort_key=1), FIRST), (Group("Further commands", sort_key=2), FURTHER)):
+    for _name, _words in _commands.items():
+        _order = COMMANDS.index(_name)
+        app.command(f"springmass.commands.{_name}:{_name}", name=_name, help=_words, group=_group, sort_key=_order)
+
+
+@app.meta.default
+def _begin(
+    *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+    quiet: Annotated[
+        bool, Parameter(name=("-q", "--quiet"), group=EVERY_COMMAND, help="print only errors and warnings on stderr")
+    ] = False,
+    verbose: Annotated[
+        bool,
+        Parameter(
+            name=("-v", "--verbose"),
+            group=EVERY_COMMAND,
+            help="print on stderr which files and settings are read, used and written",
+        ),
+    ] = False,
+) -> int:
+    adopt(quiet, verbose)
+    if not words:
+        raise ProgramError("no command; try springmass demo or springmass --help", USAGE)
+    end = words.index("--") if "--" in words else len(words)
+    named = [STDIN if word == "-" else word for word in words[:end]]
+    return int(app([*named, *words[end:]], exit_on_error=False, print_error=False) or OK)
+
+
+@app.command(name="--completion")
+def _completion(
+    shell: Annotated[Literal["bash", "zsh", "fish", "powershell"], Parameter(name="SHELL", help="your shell")], /
+) -> int:
+    """Print the script that lets a shell complete commands and options."""
+    print(app.generate_completion(shell=shell))
+    return OK
+
+
+def call(words: Sequence[str]) -> int:
+    """Call a command and return its exit code; ``CycloptsError`` if the words are not a valid command line."""
+    return int(app.meta(list(words), exit_on_error=False, print_error=False, result_action="return_value") or OK)
+
+
+def without_reading(words: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
+    """Return a command line without the options for reading a recording, and these options as a dictionary.
+
+    >>> without_reading(["analyse", "run.csv", "--unit", "rad", "--json"])
+    (['analyse', 'run.csv', '--json'], {'unit': 'rad'})
+    """
+    from springmass.commands.options import only_reading
+    from springmass.runs.options import READ
+
+    reading = App(default_parameter=app.default_parameter, help_flags=(), version_flags=())
+    reading.default(only_reading)
+    words = list(words)
+    end = words.index("--") if "--" in words else len(words)
+    _, bound, others, _ = reading.parse_known_args(words[:end])
+    return others + words[end:], bound.arguments.get("read", READ).given()

@@ -13,13 +13,16 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Group, Parameter
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.analyse import Oscillation, Overdamped
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
+from springmass.commands.options import Figures, File, Scenes, StatedLaw, Strict, Tier, argument, flag, option, output
 from springmass.errors import (
     INTERNAL,
     NO_MEMORY,
@@ -36,7 +39,6 @@ from springmass.errors import (
     tell,
 )
 from springmass.layout import STDIN
-from springmass.options import BENCH, AnalyseOptions, BenchOptions
 from springmass.runs.about import remember_scene
 from springmass.runs.analysing import (
     Analysed,
@@ -54,12 +56,11 @@ from springmass.runs.options import ReadOptions
 from springmass.runs.questions import for_command, option_of
 from springmass.runs.scenes import Amendments, amended, read_scenes
 from springmass.terminal.asking import ask_for_bench
+from springmass.values import Finite, NotNegative
 from storage.errors import StorageError, WriteFailed
 
 if TYPE_CHECKING:
     from springmass.report.tables import TableKey
-
-__all__ = ["run"]
 
 READING = ("velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_ppm")
 RESOLVED = ("accuracy", "method", "law", "strict")
@@ -99,7 +100,62 @@ class _Done:
     law: str = ""  # line that names the damping law stated by the scene
 
 
-def run(recordings: Sequence[str | Path], options: AnalyseOptions, read: ReadOptions, bench: BenchOptions) -> int:
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class AnalyseOptions:
+    """The options of ``springmass analyse``."""
+
+    scene: Scenes = ()
+    accuracy: Tier = "standard"
+    law: StatedLaw = None
+    method: Annotated[
+        Literal["classic"] | None, option("NAME", "also apply the lab report's classic method, for comparison")
+    ] = None
+    output: Annotated[File | None, output("DIR", "output folder (default: here; with --json: none)")] = None
+    report: Annotated[bool, flag("with several inputs, also write a report for each")] = False
+    no_report: Annotated[bool, flag("print the results, but write no files")] = False
+    full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
+    budget: Annotated[bool, flag("print the sources of uncertainty")] = False
+    ask: Annotated[bool, flag("ask for the masses and the disc, and save them next to the recording")] = False
+    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None
+    figures: Figures = ()
+    si: Annotated[bool, flag("print SI units without prefixes")] = False
+    json: Annotated[bool, flag("print one JSON object per input on standard output")] = False
+    strict: Strict = False
+
+
+@Parameter(name="*", group=Group("The bench, instead of the values in the scene", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class BenchOptions:
+    """Values of the bench, each with its standard uncertainty."""
+
+    mass_kg: Annotated[Finite | None, option("X", "total mass that hangs on the spring, kg")] = None
+    mass_u_kg: Annotated[NotNegative | None, option("U", "its standard uncertainty (default: exact)")] = None
+    spring_mass_kg: Annotated[Finite | None, option("X", "mass of the spring, kg")] = None
+    spring_mass_u_kg: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
+    disc_diameter_m: Annotated[Finite | None, option("X", "diameter of the disc, m")] = None
+    disc_diameter_u_m: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
+    temperature_c: Annotated[Finite | None, option("X", "temperature of the air, degrees Celsius")] = None
+    temperature_u_c: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
+
+
+BENCH = {
+    ("bob", "mass_kg"): ("mass_kg", "mass_u_kg"),
+    ("spring", "mass_kg"): ("spring_mass_kg", "spring_mass_u_kg"),
+    ("disc", "diameter_m"): ("disc_diameter_m", "disc_diameter_u_m"),
+    ("air", "temperature_c"): ("temperature_c", "temperature_u_c"),
+}
+"""Table and key of the scene, mapped to the fields of :class:`BenchOptions` for the value and its uncertainty."""
+
+
+def analyse(
+    *recordings: Annotated[
+        File, argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True)
+    ],
+    options: AnalyseOptions = AnalyseOptions(),
+    read: ReadOptions = ReadOptions(),
+    bench: BenchOptions = BenchOptions(),
+) -> int:
     """Analyse every input; if one fails, the others still give results."""
     inputs = [str(each) for each in recordings]
     if options.report and options.no_report:

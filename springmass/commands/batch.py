@@ -5,25 +5,55 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 from springmass.batch.course import template
 from springmass.batch.plan import plan
 from springmass.batch.rows import FAILED
 from springmass.batch.running import run_course
 from springmass.batch.store import CSV, GROUPS, PAGE
+from springmass.commands.options import File, StatedLaw, Tier, argument, flag, option, output, refuse
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, manner, suggest, tell
-from springmass.options import BatchOptions
 from springmass.runs.options import ReadOptions
 from springmass.terminal.printing import visible_lines
 from springmass.terminal.progress import TaskProgress
+from springmass.values import Count, WholeNumber
 
-__all__ = ["run"]
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class BatchOptions:
+    """The options of ``springmass batch``."""
+
+    output: Annotated[
+        File | None, output("DIR", "folder for table, page and reports; an existing course is continued")
+    ] = None
+    runs: Annotated[File | None, option("FILE", "CSV table with what you know about each run")] = None
+    template: Annotated[bool, flag("print an empty table for --runs to fill in")] = False
+    scene: Annotated[File | None, option("FILE", "scene file for all runs; values in the table take precedence")] = None
+    accuracy: Tier = "standard"
+    law: StatedLaw = None
+    jobs: Annotated[Count | None, option("N", "number of processes (default: one per core)")] = None
+    dask: Annotated[str | None, option("ADDRESS", "analyse on the workers of this dask scheduler")] = None
+    rehash: Annotated[bool, flag("read every file again to check whether it has changed")] = False
+    reports: Annotated[
+        WholeNumber, option("N", "write full reports of the N runs that most need a look (default: 20)")
+    ] = 20
 
 
-def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptions) -> int:
+def batch(
+    *recordings: Annotated[
+        File, argument("INPUT", "recordings, folders (with subfolders), patterns, or @FILE (a list)")
+    ],
+    options: BatchOptions = BatchOptions(),
+    read: ReadOptions = ReadOptions(),
+) -> int:
     """Analyse new and changed runs, and write the table and the page of all runs."""
+    refuse("batch", read, "velocity")
     inputs = [str(each) for each in recordings]
     if not inputs and options.runs is None:
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them", USAGE)

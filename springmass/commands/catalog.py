@@ -4,20 +4,36 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from springmass.batch.search import search
+from springmass.commands.options import File, argument, flag, option
 from springmass.errors import OK, suggest, tell
-from springmass.options import CatalogOptions
-
-__all__ = ["run"]
+from springmass.values import Count
 
 SHOWN = ("run", "status", "period", "period_u", "spring_constant", "spring_constant_u", "drag_coefficient", "law")
 """Columns that are listed if none are named, with the courses' own after the first."""
 
 
-def run(folders: Sequence[str | Path], options: CatalogOptions) -> int:
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class CatalogOptions:
+    """The options of ``springmass catalog``."""
+
+    where: Annotated[str, option("EXPR", "list only runs that match: \"section = 'A' and period_u < 1e-4\"")] = ""
+    columns: Annotated[str | None, option("A,B", "columns to list")] = None
+    sort: Annotated[str | None, option("NAME", "sort by this column; --sort=-NAME: largest first")] = None
+    limit: Annotated[Count | None, option("N", "list at most N runs")] = None
+    json: Annotated[bool, flag("print one JSON object per run instead of CSV")] = False
+
+
+def catalog(
+    *folders: Annotated[File, argument("DIR", "folders that batch created", required=True)],
+    options: CatalogOptions = CatalogOptions(),
+) -> int:
     """Print the runs for which an expression holds, as CSV or as JSON lines."""
     from springmass.batch.results_table import text_of
 

@@ -5,26 +5,69 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from acquisition.errors import visible
 from springmass.batch.store import is_course
+from springmass.commands.options import (
+    Figures,
+    File,
+    Json,
+    Scenes,
+    StatedLaw,
+    Strict,
+    Tier,
+    argument,
+    option,
+    output,
+    refuse,
+)
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
-from springmass.options import CompareOptions
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, law_line, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
 from springmass.runs.json_results import picked, provenance_of, rejected
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import read_scenes
-
-__all__ = ["run"]
+from springmass.values import Share
 
 READING = ("channel", "run", "rate_hz", "unit", "from_s", "to_s")
 
 
-def run(recordings: Sequence[str | Path], options: CompareOptions, read: ReadOptions) -> int:
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions:
+    """The options of ``springmass compare``."""
+
+    where: Annotated[str, option("EXPR", "for courses: compare only runs for which this expression is true")] = ""
+    bench: Annotated[
+        str | None, option("NAME", "for courses: column that names the bench (default: bench, group or section)")
+    ] = None
+    scene: Scenes = ()
+    accuracy: Tier = "standard"
+    law: StatedLaw = None
+    mass_correlation: Annotated[
+        Share, option("R", "correlation between the errors of two bobs' masses (default: 0)")
+    ] = 0.0
+    output: Annotated[File | None, output("DIR", "folder for a report (default: write no report)")] = None
+    figures: Figures = ()
+    json: Json = False
+    strict: Strict = False
+
+
+def compare(
+    *recordings: Annotated[
+        File, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
+    ],
+    options: CompareOptions = CompareOptions(),
+    read: ReadOptions = ReadOptions(),
+) -> int:
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
+    refuse("compare", read, "velocity")
     inputs = [str(each) for each in recordings]
     if all(is_course(path) for path in inputs):
         return _run_courses(inputs, options)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from pathlib import Path, PurePath
-from typing import Any
+from typing import Annotated, Any
 
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
+from springmass.commands.options import PART, File, Overwrite, argument, option, refuse
+from springmass.commands.options import output as output_option
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, suggest, tell
-from springmass.options import ConvertOptions
 from springmass.runs.analysing import made_now
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
@@ -18,28 +19,38 @@ from springmass.runs.scenes import read_scene
 from storage.atomic import write_whole
 from storage.run_file.writing import write_run
 
-__all__ = ["run", "write_loaded"]
-
 RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
 
 
-def run(recording: str | Path, output: str | Path | None, options: ConvertOptions, read: ReadOptions) -> int:
+def convert(
+    recording: Annotated[File, argument("IN", "recording, run file or wire log")],
+    target: Annotated[
+        File | None, argument("OUT", ".h5 (run file), .txt (pair) or .csv; or a folder to copy the original to")
+    ] = None,
+    /,
+    *,
+    output: Annotated[File | None, output_option("OUT", "the output, instead of a second argument")] = None,
+    scene: Annotated[File | None, option("FILE", "scene file to store in the run file")] = None,
+    overwrite: Overwrite = False,
+    read: ReadOptions = ReadOptions(),
+) -> int:
     """Convert one input."""
-    if output is not None and options.output is not None:
-        raise ProgramError(f"convert writes one output, got {output} and -o {options.output}; name it once", USAGE)
-    if (output := output or options.output) is None:
+    refuse("convert", read, *PART)
+    if output is not None and target is not None:
+        raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once", USAGE)
+    if (output := target or output) is None:
         raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form", USAGE)
-    scene = None if options.scene is None else read_scene(options.scene).to_mapping()
+    stated = None if scene is None else read_scene(scene).to_mapping()
     loaded = load(recording, read)
     out = Path(output)
     if out.suffix.lower() in RUN_SUFFIXES:
-        written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=scene, overwrite=options.overwrite)
+        written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=stated, overwrite=overwrite)
         tell(f"{written}: {len(loaded.samples)} samples from {loaded.path}")
         suggest(f"springmass analyse {shlex.quote(str(written))}")
         return OK
     if not _holds(loaded, out):
-        return _write_form(loaded, out, overwrite=options.overwrite)
-    for path in _give_back(loaded, out, options.overwrite):
+        return _write_form(loaded, out, overwrite=overwrite)
+    for path in _give_back(loaded, out, overwrite):
         tell(f"{path}: the original inside {loaded.path}, bit for bit")
     return OK
 

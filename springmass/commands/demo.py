@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Annotated
 
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.convert import write_loaded
+from springmass.commands.options import File
+from springmass.commands.options import output as output_option
 from springmass.errors import OK, suggest
-from springmass.options import DemoOptions
 from springmass.report.write import write_report
 from springmass.runs.analysing import Analysed, load_and_analyse, make_folder
 from springmass.runs.comparing import compare_analysed
@@ -20,14 +22,14 @@ from springmass.terminal.printing import findings_text
 from springmass.terminal.style import style_of
 from springmass.terminal.table1 import text_table
 
-__all__ = ["run"]
-
 RUNS = ("undamped", "damped")
 
 
-def run(options: DemoOptions) -> int:
+def demo(
+    *, output: Annotated[File, output_option("DIR", "output folder (default: springmass-demo)")] = "springmass-demo"
+) -> int:
     """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
-    out = make_folder(options.output)
+    out = make_folder(output)
     analysed = [_one(name, out) for name in RUNS]
     compared = compare_analysed(analysed)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")

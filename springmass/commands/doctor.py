@@ -13,11 +13,9 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from springmass.commands.options import Json
 from springmass.errors import OK, SOME_FAILED, suggest
 from springmass.layout import PACKAGES, PREFIX, part
-from springmass.options import JsonOption
-
-__all__ = ["Check", "examine", "foreign_packages", "run"]
 
 LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
@@ -59,12 +57,12 @@ class Check:
     remedy: str = ""
 
 
-def run(options: JsonOption) -> int:
+def doctor(*, as_json: Json = False) -> int:
     """Print every check; exit with 1 where one failed."""
     from acquisition.errors import visible  # imported here because doctor checks for a foreign package of this name
 
     checks = examine()
-    if options.json:
+    if as_json:
         print(json.dumps([asdict(check) for check in checks]))
     else:
         for check in checks:

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from difflib import get_close_matches
+from typing import Annotated
 
 from pipeline.findings.finding import Kind, kinds, word
 from pipeline.registry.found import Found
+from springmass.commands.options import Json, argument
 from springmass.errors import OK, USAGE, ProgramError
-from springmass.options import JsonOption
 from springmass.terminal.printing import wrapped
 
 COLUMNS = 80
 INDENT = " " * 9
 
 
-def run(codes: Sequence[str], options: JsonOption) -> int:
+def explain(
+    codes: Annotated[tuple[str, ...], argument("CODE", "codes of warnings, as analyse prints them")] = (),
+    /,
+    *,
+    as_json: Json = False,
+) -> int:
     """Print each finding asked for; without a code, every code with its meaning by symptom."""
     known = kinds()
     for code in codes:
@@ -24,7 +30,7 @@ def run(codes: Sequence[str], options: JsonOption) -> int:
             near = get_close_matches(code, known, n=1)
             hint = f"did you mean {near[0]}?" if near else "springmass explain lists all codes"
             raise ProgramError(f"there is no finding {code!r}; {hint}", USAGE)
-    if options.json:
+    if as_json:
         print(json.dumps([_fields(code, known[code]) for code in codes or known]))
     elif codes:
         print("\n\n".join(_explained(code, known[code]) for code in codes))

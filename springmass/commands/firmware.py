@@ -6,6 +6,10 @@ import contextlib
 import shlex
 import shutil
 import subprocess
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from cyclopts import Parameter, Token
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.family import Identity
@@ -13,11 +17,9 @@ from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.errors import visible
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
+from springmass.commands.options import flag, option
 from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
-from springmass.options import FirmwareOptions
 from springmass.session.identity import outdated, settings_of
-
-__all__ = ["run"]
 
 ANSWER_S = 5.0
 """Longest time until a board answers: opening the port restarts it, and its bootloader waits for two seconds."""
@@ -25,26 +27,49 @@ ASK_EVERY_S = 0.5
 FLASH_S = 120.0
 
 
-def run(options: FirmwareOptions) -> int:
+def _gate(_: Any, tokens: Sequence[Token]) -> tuple[int, int]:
+    near, comma, far = tokens[0].value.partition(",")
+    if not (comma and near.isdecimal() and far.isdecimal()):
+        raise ValueError("must be NEAR,FAR in whole us")
+    return int(near), int(far)
+
+
+Gate = Annotated[
+    tuple[int, int] | None,
+    Parameter(
+        metavar="NEAR,FAR",
+        help="range of accepted times of flight, us; NEAR is at least 116",
+        converter=_gate,
+        n_tokens=1,
+    ),
+]
+
+
+def firmware(
+    *,
+    port: Annotated[str | None, option("P", "port of the board")] = None,
+    flash: Annotated[bool, flag("write the firmware that comes with this program")] = False,
+    rate: Annotated[int | None, option("R", "pings per second, 10 to 125; the board stores the setting")] = None,
+    gate: Gate = None,
+    spread: Annotated[int | None, option("US", "largest random delay of a ping, 0 to 2000 us")] = None,
+    name: Annotated[str | None, option("NAME", "name of the board: at most 12 letters, digits, . _ or -")] = None,
+) -> int:
     """Show the wiring and how to flash; with a port, show the board's settings, change them, or flash it."""
-    commands = _commands(options)
-    if options.port is None:
-        if options.flash or commands:
+    settings = (("R", rate), ("G", None if gate is None else f"{gate[0]},{gate[1]}"), ("J", spread), ("N", name))
+    commands = [f"{letter}{value}" for letter, value in settings if value is not None]
+    if port is None:
+        if flash or commands:
             raise ProgramError("--port must name the board's port; `springmass ports` lists them", USAGE)
         _show()
         return OK
-    if options.flash:
-        _flash(options.port)
-    identity = _converse(options.port, commands)
-    print(visible(f"{options.port}: {identity}{settings_of(identity)}"))
+    if flash:
+        _flash(port)
+    identity = _converse(port, commands)
+    print(visible(f"{port}: {identity}{settings_of(identity)}"))
     if outdated(identity):
-        print(
-            visible(
-                f"{VERSION} comes with this program; `springmass firmware --port {options.port} --flash` updates it"
-            )
-        )
+        print(visible(f"{VERSION} comes with this program; `springmass firmware --port {port} --flash` updates it"))
     else:
-        suggest(f"springmass record --port {shlex.quote(options.port)} --page")
+        suggest(f"springmass record --port {shlex.quote(port)} --page")
     return OK
 
 
@@ -54,20 +79,6 @@ def _show() -> None:
     print("`springmass firmware --port PORT --flash` writes it, which runs one of these:")
     for baud, boards in zip(BAUDS, ("Uno, Nano", "Nano with the old bootloader"), strict=True):
         print(f"  {shlex.join(avrdude_arguments('PORT', baud))}    # {boards}")
-
-
-def _commands(options: FirmwareOptions) -> list[str]:
-    """Return the requested settings in the form that the device accepts."""
-    commands = []
-    if options.rate is not None:
-        commands.append(f"R{options.rate}")
-    if options.gate is not None:
-        commands.append("G{},{}".format(*options.gate))
-    if options.spread is not None:
-        commands.append(f"J{options.spread}")
-    if options.name is not None:
-        commands.append(f"N{options.name}")
-    return commands
 
 
 def _flash(port: str) -> None:

@@ -7,22 +7,21 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.base import Survey
-from acquisition.recordings.identify import Inspection, formats, inspect
+from acquisition.recordings.identify import Inspection, inspect
+from acquisition.recordings.identify import formats as every_format
+from springmass.commands.options import PART, File, Json, argument, refuse
 from springmass.errors import OK, suggest
-from springmass.options import FormatsOptions
 from springmass.runs.json_results import picked, plain
 from springmass.runs.loading import Loaded, kind_of, load
 from springmass.runs.options import ReadOptions
 from springmass.runs.questions import for_command
 from springmass.runs.shelf import Entry, is_shelf, shelf
-
-__all__ = ["run"]
 
 OURS = {
     "run": "springmass run file (HDF5, opens in xarray, h5py and NeXus tools)",
@@ -32,15 +31,22 @@ _WIDTHS = (44, 13, 36, 11, 11, 100)
 _WHY = {"run": "it begins with the signature of HDF5", "wire": "it begins with the mark of a log's record"}
 
 
-def run(file: str | Path | None, options: FormatsOptions, read: ReadOptions) -> int:
+def formats(
+    file: Annotated[File | None, argument("FILE", "identify this file, or every file in this folder or zip")] = None,
+    /,
+    *,
+    as_json: Json = False,
+    read: ReadOptions = ReadOptions(),
+) -> int:
     """List the formats, or describe a file."""
+    refuse("formats", read, *PART)
     if file is None:
-        return _list(as_json=options.json)
+        return _list(as_json=as_json)
     path = Path(file)
     if is_shelf(path):
-        return _shelf(path, as_json=options.json)
-    facts = _describe(path, read, as_json=options.json)
-    if options.json:
+        return _shelf(path, as_json=as_json)
+    facts = _describe(path, read, as_json=as_json)
+    if as_json:
         print(json.dumps(facts, allow_nan=False))
         return OK
     for line in _lines(facts):
@@ -78,7 +84,7 @@ def _fitted(cell: str, width: int) -> str:
 
 
 def _list(*, as_json: bool) -> int:
-    table = {**{f.name: f.title for f in formats()}, **OURS}
+    table = {**{f.name: f.title for f in every_format()}, **OURS}
     if as_json:
         print(json.dumps([{"name": name, "title": title} for name, title in table.items()]))
         return OK

@@ -6,22 +6,33 @@ import csv
 import io
 import json
 import shlex
-from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from cyclopts import Parameter
 
 from springmass.batch.search import search
+from springmass.commands.options import File, argument, option, output
 from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
-from springmass.options import MapOptions
 from springmass.runs.analysing import make_folder
-
-__all__ = ["run"]
 
 COLUMNS = ("run", "disc", "reynolds_number", "keulegan_carpenter_number", "drag_coefficient", "drag_coefficient_u")
 
 
-def run(folders: Sequence[str | Path], options: MapOptions) -> int:
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class MapOptions:
+    """The options of ``springmass map``."""
+
+    where: Annotated[str, option("EXPR", "draw only runs that match this expression, as in catalog")] = ""
+    output: Annotated[File, output("DIR", "folder for drag-map.svg, .pdf and .csv (default: here)")] = "."
+
+
+def map(
+    *folders: Annotated[File, argument("DIR", "folders that batch created", required=True)],
+    options: MapOptions = MapOptions(),
+) -> int:
     """Draw the map of every run for which an expression holds; write it as SVG and PDF, its numbers as CSV."""
     from springmass.charts.drag_map import DragRun, drag_map
     from springmass.charts.draw import save

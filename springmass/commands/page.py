@@ -8,10 +8,10 @@ import threading
 import webbrowser
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from springmass.commands.options import PART, PageOptions, Recording, flag, refuse
 from springmass.errors import OK, USAGE, ProgramError, manner, tell
-from springmass.options import PageOptions
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
 from springmass.page.web.log_lines import log_to_stderr
@@ -21,11 +21,17 @@ from springmass.runs.loading import kind_of, load
 from springmass.runs.options import ReadOptions
 from springmass.stops import STOPS
 
-__all__ = ["run"]
 
-
-def run(recording: str | Path, page: PageOptions, read: ReadOptions, *, recorder: bool = False) -> int:
+def page(
+    recording: Recording,
+    /,
+    *,
+    page: PageOptions = PageOptions(),
+    read: ReadOptions = ReadOptions(),
+    recorder: Annotated[bool, flag("used internally by `record --page`")] = False,
+) -> int:
     """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""
+    refuse("page", read, *PART)
     path = Path(recording)
     wanted_u_s = None if page.want_us is None else page.want_us * 1e-6
     over = threading.Event()

@@ -7,26 +7,29 @@ import json
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import describe_bytes, probe
 from acquisition.errors import PortError, visible
 from acquisition.live.serial_port import SerialPort, list_ports
+from springmass.commands.options import Json, flag, option
 from springmass.errors import OK, SENSOR, ProgramError, suggest, tell
-from springmass.options import PortsOptions
-
-__all__ = ["Named", "name_sensors", "run"]
 
 PROBE_S = 1.0
 BAUDS = (115200, 9600)
 
 
-def run(options: PortsOptions) -> int:
+def ports(
+    *,
+    no_probe: Annotated[bool, flag("only list the ports; do not open them")] = False,
+    port: Annotated[tuple[str, ...], option("P", "also listen on this address; may be repeated")] = (),
+    as_json: Json = False,
+) -> int:
     """List ports and the sensors on them: listen to each port for a second at each of the usual speeds."""
-    rows = [_row(port.device, port.description or "", not options.no_probe) for port in list_ports()]
-    rows += [_row(address, "named on the command line", True) for address in options.port]
-    if options.json:
+    rows = [_row(each.device, each.description or "", not no_probe) for each in list_ports()]
+    rows += [_row(address, "named on the command line", True) for address in port]
+    if as_json:
         print(json.dumps(rows))
         return OK
     if not rows:

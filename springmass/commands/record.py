@@ -11,9 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
@@ -24,9 +25,9 @@ from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
+from springmass.commands.options import File, PageOptions, converted, flag, option, output
 from springmass.commands.ports import name_sensors
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
-from springmass.options import PageOptions, RecordOptions
 from springmass.page.process import PageProcess
 from springmass.runs.analysing import made_now
 from springmass.runs.scenes import ask_about, read_scene
@@ -41,20 +42,73 @@ from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import END_WORDS, ProgressLine
 from springmass.terminal.style import style_of
+from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, SignedPartsPerMillion
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
 from storage.recovery.recover import recover
 from storage.recovery.report import RecoverReport
 from storage.run_file.reading import open_run
 
-__all__ = ["run"]
-
 U_RULER_M = 0.5e-3
 SIMULATED_FAMILY = "line-protocol"
 UNLIMITED_S = 3600.0  # assumed duration of a run without --seconds, for the check of disk space
 
 
-def run(options: RecordOptions, page_options: PageOptions) -> int:
+def _decoder_option(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise ValueError("must be NAME=VALUE")
+    return name, int(value) if value.isdecimal() else value
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class RecordOptions:
+    """The options of ``springmass record``."""
+
+    port: Annotated[
+        tuple[str, ...], option("P", "port of a sensor; may be repeated (default: the port on which a sensor answers)")
+    ] = ()
+    sensor: Annotated[
+        tuple[str, ...], option("NAME", "family of the sensor, from the list of `springmass sensors`")
+    ] = ()
+    simulate: Annotated[File | None, option("SCENE.toml", "record a simulated bench instead of a port")] = None
+    output: Annotated[
+        File | None, output("RUN.h5", "run file to create, never overwritten (default: date, time and title)")
+    ] = None
+    seconds: Annotated[Positive | None, option("N", "length of the recording, s (default: until Ctrl-C)")] = None
+    page: Annotated[bool, flag("show the recording in a browser, with buttons for marks and stop")] = False
+    ready: Annotated[bool, flag("set zero, calibrate, arm and record from the page; needs --page")] = False
+    scene: Annotated[
+        File | None, option("FILE", "scene file to store with the run; its air sets the speed of sound")
+    ] = None
+    title: Annotated[str, option("TEXT", "title of the run")] = ""
+    baud: Annotated[int | None, option("B", "baud rate of the ports (default: that of the sensor family)")] = None
+    rate_hz: Annotated[ReadingsPerSecond | None, option("R", "rate that the sensor is set to, readings per second")] = (
+        None
+    )
+    option: Annotated[
+        tuple[tuple[str, Any], ...],
+        converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option),
+    ] = ()
+    still: Annotated[Positive | None, option("S", "first measure rest position and noise for S seconds")] = None
+    ruler: Annotated[
+        tuple[Positive, ...], option("M", "ruler distance of the bob at rest, m; may be repeated; needs --still")
+    ] = ()
+    speed_of_sound: Annotated[Positive | None, option("C", "speed of sound for echo times, m/s")] = None
+    clock_ppm: Annotated[
+        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
+    ] = None
+    trigger: Annotated[Positive | None, option("M", "start when the bob is M metres from its rest position")] = None
+    pre: Annotated[Positive | None, option("S", "seconds to keep before the trigger (default: 2)")] = None
+    no_trace: Annotated[bool, flag("do not draw the motion on the terminal")] = False
+    seed: Annotated[int, option("N", "with --simulate: seed of the noise (default: 0)")] = 0
+    crystal_ppm: Annotated[
+        SignedPartsPerMillion, option("PPM", "with --simulate: rate error of the sensor's clock (default: 0)")
+    ] = 0.0
+
+
+def record(*, options: RecordOptions = RecordOptions(), page_options: PageOptions = PageOptions()) -> int:
     """Record, then build the run file from the log."""
     source = options.scene or options.simulate
     what = options.title or (

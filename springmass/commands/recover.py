@@ -4,26 +4,36 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import Annotated
 
 from acquisition.errors import CalibrationError
+from springmass.commands.options import File, Overwrite, argument, option
+from springmass.commands.options import output as output_option
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.options import RecoverOptions
 from springmass.runs.analysing import made_now
 from springmass.stops import STOPS
-from storage.recovery.recover import recover
+from springmass.values import Positive
+from storage.recovery.recover import recover as build
 
-__all__ = ["run"]
 
-
-def run(log: str | Path, options: RecoverOptions) -> int:
+def recover(
+    log: Annotated[File, argument("RUN.wire", "wire log")],
+    /,
+    *,
+    output: Annotated[File | None, output_option("RUN.h5", "run file to create (default: next to the log)")] = None,
+    overwrite: Overwrite = False,
+    speed_of_sound: Annotated[
+        Positive | None, option("C", "speed of sound for converting echo times, m/s (default: the log's)")
+    ] = None,
+) -> int:
     """Rebuild the run; the log stays."""
     STOPS.last_words = lambda: f"stopped immediately; the log stays: {log}"
     try:
-        report = recover(
+        report = build(
             log,
-            None if options.output is None else Path(options.output),
-            overwrite=options.overwrite,
-            speed_of_sound_m_per_s=options.speed_of_sound,
+            None if output is None else Path(output),
+            overwrite=overwrite,
+            speed_of_sound_m_per_s=speed_of_sound,
             provenance=made_now(),
         )
     except CalibrationError as error:

@@ -5,47 +5,76 @@ from __future__ import annotations
 import math
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter, Token
 
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.convert import write_loaded
+from springmass.commands.options import PART, File, Overwrite, PageOptions, Recording, flag, option, refuse
+from springmass.commands.options import output as output_option
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.options import PageOptions, ReplayOptions
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
+from springmass.values import Finite
 
-__all__ = ["run"]
+
+def _speed(_: Any, tokens: Sequence[Token]) -> float:
+    text = tokens[0].value
+    try:
+        speed = float("inf") if text == "max" else float(text)
+    except ValueError:
+        speed = 0.0
+    if not speed > 0.0 or (text != "max" and speed == float("inf")):
+        raise ValueError("must be positive, or max")
+    return speed
 
 
-def run(recording: str | Path, options: ReplayOptions, page: PageOptions, read: ReadOptions) -> int:
+def replay(
+    recording: Recording,
+    /,
+    *,
+    page: Annotated[bool, flag("play it on a page in the browser instead")] = False,
+    speed: Annotated[
+        float, Parameter(metavar="X", help="speed, in multiples of real time, or max (default: 1)", converter=_speed)
+    ] = 1.0,
+    seek: Annotated[Finite | None, option("S", "start at this second of the recording")] = None,
+    loop: Annotated[bool, flag("start again at the end, until Ctrl-C")] = False,
+    output: Annotated[
+        File | None, output_option("RUN.h5", "write the samples to a run file instead of standard output")
+    ] = None,
+    overwrite: Overwrite = False,
+    of_page: PageOptions = PageOptions(),
+    read: ReadOptions = ReadOptions(),
+) -> int:
     """Play the input to stdout, one line per sample, or into a run file."""
-    if options.loop and options.output is not None:
+    refuse("replay", read, *PART)
+    if loop and output is not None:
         raise ProgramError("--loop never ends and a run file is written whole at the end; leave one of them out", USAGE)
-    if options.page:
-        from springmass.commands.page import run as show
+    if page:
+        from springmass.commands.page import page as show
 
-        return show(recording, page, read)
+        return show(recording, page=of_page, read=read)
     loaded = load(recording, read)
-    fast = math.isinf(options.speed)
+    fast = math.isinf(speed)
     clock: Clock = VirtualClock() if fast else SystemClock()
     source = Replay(
         loaded.samples_in_blocks(),
         clock,
         info=loaded.info,
-        speed=None if fast else options.speed,
-        loop=options.loop,
+        speed=None if fast else speed,
+        loop=loop,
     )
     with source:
-        if options.seek is not None:
-            source.seek(options.seek)
-        if options.output is not None:
-            path = write_loaded(
-                Path(options.output), replace(loaded, info=source.info), source, overwrite=options.overwrite
-            )
+        if seek is not None:
+            source.seek(seek)
+        if output is not None:
+            path = write_loaded(Path(output), replace(loaded, info=source.info), source, overwrite=overwrite)
             tell(f"{path}: replayed from {loaded.path}")
             suggest(f"springmass analyse {shlex.quote(str(path))}")
             return OK

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Annotated
 
 from springmass.batch.page import line_of, write_page
 from springmass.batch.plan import Job
 from springmass.batch.reports import REPORTS, find_run, linked, report_name, write_one, write_script
 from springmass.batch.store import open_course
+from springmass.commands.options import File, argument
 from springmass.errors import OK, suggest, tell
 from springmass.runs.analysing import make_folder
 
-__all__ = ["run"]
 
-
-def run(course: str | Path, run_name: str) -> int:
+def report(
+    course: Annotated[File, argument("DIR", "folder that batch created")],
+    run_name: Annotated[str, argument("RUN", "name of a run in its table, or path of its recording")],
+    /,
+) -> int:
     """Analyse the run as the course did, write its report, and link it on the course's page."""
     folder = Path(course)
     store = open_course(folder)

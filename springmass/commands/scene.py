@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import Annotated
 
 from acquisition.errors import visible
+from springmass.commands.options import File, argument, converted, option
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.options import SceneOptions
-
-__all__ = ["run"]
 
 TEMPLATE = """\
 # What was at the bench. Every value may be left out (#): what is not known is not used.
@@ -45,19 +44,43 @@ position = "below"                          # or "above" the bob
 """
 
 
-def run(recording: str | Path | None, options: SceneOptions) -> int:
+def _mark(text: str) -> tuple[float, str]:
+    seconds, equals, words = text.partition("=")
+    try:
+        moment = float(seconds)
+    except ValueError:
+        equals = ""
+    if not equals or not words.strip() or not abs(moment) < float("inf"):
+        raise ValueError("must be SECONDS=TEXT")
+    return moment, words.strip()
+
+
+def scene(
+    recording: Annotated[
+        File | None, argument("RECORDING", "save scene, remarks and marks next to this recording")
+    ] = None,
+    /,
+    *,
+    check: Annotated[File | None, option("FILE", "show what a scene file states and which values are unusual")] = None,
+    scene: Annotated[File | None, option("FILE", "scene file to use with the recording from now on")] = None,
+    note: Annotated[tuple[str, ...], option("TEXT", "a remark; may be repeated")] = (),
+    mark: Annotated[
+        tuple[tuple[float, str], ...],
+        converted("S=TEXT", "a mark S seconds into the recording; may be repeated", _mark),
+    ] = (),
+) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from springmass.runs.about import about_of, write_about
     from springmass.runs.scenes import ask_about, read_scene, stated_keys
 
-    noted = options.scene is not None or options.note or options.mark
-    if options.check is not None:
+    noted = scene is not None or note or mark
+    if check is not None:
         if recording is not None or noted:
             raise ProgramError("--check looks at a scene file alone; leave the rest out", USAGE)
-        scene = read_scene(options.check)
-        ask_about(scene, options.check)
-        print(visible(f"{options.check}: a scene that states {stated_keys(scene)}"))
-        suggest(f"springmass analyse RECORDING --scene {shlex.quote(str(options.check))}")
+        checked = read_scene(check)
+        ask_about(checked, check)
+        print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
+        suggest(f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
         return OK
     if recording is None:
         if noted:
@@ -70,8 +93,8 @@ def run(recording: str | Path | None, options: SceneOptions) -> int:
     path = Path(recording)
     if not path.is_file():
         raise ProgramError(f"{path}: expected a recording, got none; check the name", USAGE)
-    given = None if options.scene is None else read_scene(options.scene)
-    written = write_about(about_of(path).with_more(given, options.note, options.mark))
+    given = None if scene is None else read_scene(scene)
+    written = write_about(about_of(path).with_more(given, note, mark))
     tell(f"{written}: used from now on with {path.name}")
     suggest(f"springmass analyse {shlex.quote(str(path))}")
     return OK

@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 
 from acquisition.decoders.registry import families
+from springmass.commands.options import Json
 from springmass.errors import OK, suggest
-from springmass.options import JsonOption
 from springmass.terminal.printing import wrapped
 
-__all__ = ["run"]
 
-
-def run(options: JsonOption) -> int:
+def sensors(*, as_json: Json = False) -> int:
     """Print every family with rate, resolution, range and limits."""
-    if options.json:
+    if as_json:
         print(json.dumps([family.describe() for family in families()]))
         return OK
     print(f"{'name':<18} {'rate / Hz':>9} {'step / mm':>9} {'range / m':>13} {'baud':>7}")

@@ -8,17 +8,20 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
+from cyclopts import Parameter
 
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band, spread
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
+from springmass.commands.options import Figures, File, flag, option, output
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.options import SimulateOptions
 from springmass.runs.analysing import load_and_analyse
 from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import ask_about, read_scene
@@ -28,18 +31,54 @@ from springmass.runs.simulating.simulation import (
     count_of,
     default_tolerance,
     demand_stable,
-    simulate,
 )
+from springmass.runs.simulating.simulation import simulate as simulated
 from springmass.runs.simulating.summaries import summary
 from springmass.terminal.printing import wrapped
-
-__all__ = ["run"]
+from springmass.values import Finite, NotNegative, Positive
 
 FAR_BELOW = 0.01  # fraction of the band; a smaller tolerance gives no benefit
 OF_OUTPUT = ("sensor", "noise_m", "echoes")
 
 
-def run(options: SimulateOptions, read: ReadOptions) -> int:
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class SimulateOptions:
+    """The options of ``springmass simulate``."""
+
+    scene: Annotated[File, option("S.toml", "scene file: masses, spring, start, damping")]
+    method: Annotated[str, option("NAME", "integrator, or auto (default: auto)")] = "auto"
+    dt: Annotated[Finite, option("S", "sampling interval and step of the solver, s (default: 0.01)")] = 0.01
+    seconds: Annotated[Positive, option("N", "length of the simulation, s (default: 10)")] = 10.0
+    tolerance: Annotated[
+        Finite | None, option("E", "largest error relative to the amplitude (default: from the band)")
+    ] = None
+    check: Annotated[bool, flag("also measure the error; this takes longer than the simulation")] = False
+    trade: Annotated[bool, flag("measure error and time of every method on this scene")] = False
+    without: Annotated[
+        tuple[Literal["drag", "disc", "spring-mass"], ...],
+        option("EFFECT", "leave out an effect that the scene implies; may be repeated"),
+    ] = ()
+    force: Annotated[bool, flag("simulate even if the step is unstable")] = False
+    against: Annotated[File | None, option("RUN", "measured run to compare with the prediction")] = None
+    output: Annotated[File | None, output("RUN.h5", "write the readings of a rangefinder to a run file")] = None
+    overwrite: Annotated[bool, flag("replace an existing RUN.h5")] = False
+    sensor: Annotated[
+        Literal["ideal", "rangefinder"] | None, option("NAME", "the sensor of RUN.h5 (default: rangefinder)")
+    ] = None
+    noise_m: Annotated[NotNegative | None, option("S", "noise of the sensor, m (default: from the scene, or 8e-5)")] = (
+        None
+    )
+    echoes: Annotated[NotNegative | None, option("HZ", "false echoes per second (default: 0.1)")] = None
+    seed: Annotated[int, option("N", "seed of the noise (default: 0)")] = 0
+    folder: Annotated[
+        File | None, option("DIR", "folder for NAME.simulated (default: here; with --json or -o: none)")
+    ] = None
+    figures: Figures = ()
+    json: Annotated[bool, flag("print one JSON object on standard output")] = False
+
+
+def simulate(*, options: SimulateOptions, read: ReadOptions = ReadOptions()) -> int:
     """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
     _demand(options)
     count = count_of(options.seconds, options.dt)
@@ -67,7 +106,7 @@ def run(options: SimulateOptions, read: ReadOptions) -> int:
     terms = required(ready.problem, options.dt * count, tolerance)[1] if options.method == "auto" and tolerance else ()
     effects = simulated_effects(ready.stated, ready.problem, terms, options.dt * count, ready.drag, options.without)
     try:
-        simulation = simulate(
+        simulation = simulated(
             ready.problem,
             options.method,
             options.dt,

@@ -5,31 +5,61 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from pipeline.errors import DynamicsError
 from springmass import __version__
+from springmass.commands.options import File, argument, flag, option, output
 from springmass.errors import OK, USAGE, ProgramError, manner
-from springmass.options import TradeOptions
 from springmass.runs.analysing import make_folder
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import read_scene
 from springmass.terminal.progress import TaskProgress, counted
+from springmass.values import Count, NotNegative, Positive, SampleShare
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from springmass.runs.simulating.prepared import Prepared
 
-__all__ = ["run", "trade_of_scene"]
-
 SIMULATED = ("seeds", "noise_m", "seconds", "damping", "echoes", "output")
 SPACING_S, LONG_S = 0.01, 120.0  # sample spacing and default duration of a scene's motion
 
 
-def run(recording: str | Path | None, options: TradeOptions, read: ReadOptions) -> int:
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class TradeOptions:
+    """The options of ``springmass trade``."""
+
+    seeds: Annotated[Count | None, option("N", "number of simulated recordings (default: 100; with --hostile: 20)")] = (
+        None
+    )
+    noise_m: Annotated[Positive | None, option("S", "noise of the recordings, m (default: 0.0003)")] = None
+    seconds: Annotated[Positive | None, option("N", "length of the recordings, s (default: 120)")] = None
+    damping: Annotated[NotNegative | None, option("G", "linear damping of the recordings, 1/s (default: 0.01463)")] = (
+        None
+    )
+    echoes: Annotated[SampleShare | None, option("X", "share of false echoes, 0 to 0.4 (default: 0)")] = None
+    hostile: Annotated[bool, flag("measure the accuracies on difficult recordings")] = False
+    integrators: Annotated[bool, flag("measure the integrators instead: error and time")] = False
+    scene: Annotated[File | None, option("S.toml", "with --integrators: measure only the motion of this scene")] = None
+    tolerance: Annotated[Positive | None, option("E", "with --scene: error to recommend a method for")] = None
+    output: Annotated[File | None, output("DIR", "folder for trade.svg, trade.pdf and trade.json")] = None
+    json: Annotated[bool, flag("print one JSON object on standard output")] = False
+
+
+def trade(
+    recording: Annotated[File | None, argument("INPUT", "measure all methods on this recording instead")] = None,
+    /,
+    *,
+    options: TradeOptions = TradeOptions(),
+    read: ReadOptions = ReadOptions(),
+) -> int:
     """Measure estimators on simulated recordings, or apply all of them to one recording."""
     if options.integrators:
         return _integrators(recording, options)

@@ -11,10 +11,7 @@ from cyclopts import Group, Parameter
 
 from springmass.values import Finite, PartsPerMillion, Positive
 
-__all__ = ["HOW_READ", "READ", "ChannelOptions", "ComparedOptions", "InputOptions", "ReadOptions", "RunsOptions"]
-
 HOW_READ = Group("How the recording is read", sort_key=2)
-_NO_OPTION = Parameter(parse=False)
 
 
 @Parameter(name="*", group=HOW_READ)
@@ -95,33 +92,3 @@ class ReadOptions:
 
 READ = ReadOptions()
 """No option given: only the file's own statements are used."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunsOptions(ReadOptions):
-    """The options for reading many runs, which have no velocity file in common."""
-
-    velocity: Annotated[str | Path | None, _NO_OPTION] = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComparedOptions(RunsOptions):
-    """The options for reading runs to compare."""
-
-    clock_ppm: Annotated[float | None, _NO_OPTION] = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class InputOptions(ReadOptions):
-    """The options for reading a whole recording, optionally with a velocity file."""
-
-    from_s: Annotated[float | None, _NO_OPTION] = None
-    to_s: Annotated[float | None, _NO_OPTION] = None
-    clock_ppm: Annotated[float | None, _NO_OPTION] = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChannelOptions(InputOptions):
-    """The options for reading one channel of a whole recording."""
-
-    velocity: Annotated[str | Path | None, _NO_OPTION] = None

@@ -12,8 +12,8 @@ __all__ = ["as_arguments", "as_options", "for_command", "for_course", "for_pytho
 
 
 def option_of(name: str) -> str:
-    """Return the option for a keyword argument: ``--rate-hz`` for ``rate_hz``."""
-    return f"--{name.replace('_', '-')}"
+    """Return the option for a keyword argument: ``--rate-hz`` for ``rate_hz``, ``--from`` for ``from_s``."""
+    return f"--{name.removesuffix('_s').replace('_', '-')}"
 
 
 def quoted(word: str) -> str:

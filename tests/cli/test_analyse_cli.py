@@ -118,7 +118,7 @@ def test_json_writes_no_files(cli: Cli, recording: Path, tmp_path: Path, monkeyp
 
 def test_a_folder_that_cannot_be_made_is_one_line(cli: Cli, recording: Path) -> None:
     """A file stands where the results should go: a usage error before the work, not a traceback after it."""
-    done = cli("analyse", recording, "--out", recording)
+    done = cli("analyse", recording, "--output", recording)
     assert (done.code, done.out) == (2, "")
     assert str(recording) in done.complaint
 
@@ -139,7 +139,7 @@ def test_the_module_runs_as_a_program(recording: Path, tmp_path: Path) -> None:
 def test_both_streams_come_in_their_order_in_one_file(recording: Path, tmp_path: Path) -> None:
     """Into one log (`> log 2>&1`) the table comes before the line that names the report, buffered or not."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    command = [sys.executable, "-m", "springmass", "analyse", str(recording), "--out", "results"]
+    command = [sys.executable, "-m", "springmass", "analyse", str(recording), "--output", "results"]
     done = subprocess.run(
         command,
         stdout=subprocess.PIPE,

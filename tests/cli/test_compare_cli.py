@@ -108,9 +108,9 @@ def test_another_spring_is_told_apart_from_an_exchange(tmp_path: Path, capsys: p
 
 
 def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The folder holds the page with the figure of the constants, and the JSON as printed; without --out nothing."""
+    """The folder holds the page with the figure of the constants, and the JSON as printed; without --output nothing."""
     out = tmp_path / "both"
-    assert main(["compare", *RIGHT, *FAST, "--out", str(out), "--json", "--figures", "svg"]) == 0
+    assert main(["compare", *RIGHT, *FAST, "--output", str(out), "--json", "--figures", "svg"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert json.loads((out / "results.json").read_text("utf-8")) == printed
     assert (out / "figures" / "comparison.svg").stat().st_size > 1000

@@ -30,7 +30,7 @@ def bench(tmp_path: Path, data: Path) -> Path:
 def test_several_inputs_share_one_table_and_one_file_of_numbers(cli: Cli, bench: Path, tmp_path: Path) -> None:
     """A column a run, a row a run and quantity, and no report unasked."""
     runs = [bench / f"{name}_simulated_position.txt" for name in ("undamped", "damped")]
-    done = cli("analyse", *runs, "--out", tmp_path / "out")
+    done = cli("analyse", *runs, "--output", tmp_path / "out")
     assert done.code == 0
     _, _, *body = done.out.splitlines()
     (period,) = (line for line in body if line.startswith("period"))

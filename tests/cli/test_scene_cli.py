@@ -111,7 +111,7 @@ def test_scenes_of_several_are_remembered_and_the_bundled_recordings_left_alone(
     runs = sorted(tmp_path.glob("*.txt"))
     cli("analyse", *runs, "--scene", data / "damped.scene.toml", "--no-report")
     assert not list(tmp_path.glob("*.about.toml"))
-    cli("analyse", *runs, "--scene", data / "damped.scene.toml", "--accuracy", "fast", "--out", tmp_path / "out")
+    cli("analyse", *runs, "--scene", data / "damped.scene.toml", "--accuracy", "fast", "--output", tmp_path / "out")
     assert sorted(path.name for path in tmp_path.glob("*.about.toml")) == ["a.about.toml", "b.about.toml"]
 
 

@@ -73,7 +73,7 @@ def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Callable, 
 def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Callable, scene: Path, tmp_path: Path) -> None:
     """One line, exit code 2, nothing written; --force runs it and measures how wrong it is."""
     arguments = ("simulate", "--scene", scene, "--seconds", "10", "--method", "forward-euler")
-    arguments += ("--out", tmp_path / "out")
+    arguments += ("--folder", tmp_path / "out")
     done = cli(*arguments)
     assert done.code == 2
     limit = float(done.complaint.split("--dt ")[1].split()[0])

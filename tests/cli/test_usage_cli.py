@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import springmass
-from springmass.command_line import COMMANDS
+from springmass.commands import COMMANDS
 
 Cli = Callable[..., Any]
 

@@ -73,7 +73,7 @@ def test_the_two_commands_of_the_readme_are_targets() -> None:
 
 def test_the_readme_shows_what_the_demo_prints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Each line of the README's first output is a line of the demo's own; its values agree within half their u."""
-    assert main(["demo", "--out", str(tmp_path / "demo-output")]) == 0
+    assert main(["demo", "--output", str(tmp_path / "demo-output")]) == 0
     printed = capsys.readouterr().out.replace(f"{tmp_path}/", "").splitlines()
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     shown = re.search(r"^```text\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)

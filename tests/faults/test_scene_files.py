@@ -111,7 +111,7 @@ def command(rng: np.random.Generator, scene: Path) -> list[str]:
         ["analyse", "--json", record],
         ["simulate", "--json"],
         ["simulate", "--json", "--method", str(rng.choice(["strang", "verlet", "rk4", "dop853", "exact"]))],
-        ["simulate", "--out", str(out)],
+        ["simulate", "--folder", str(out)],
         ["simulate", "--json", "--against", record],
         ["convert", record, f"{out}.h5", "--overwrite"],
         ["compare", "--json", record, disc],

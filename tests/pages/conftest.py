@@ -164,10 +164,10 @@ def page_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     def made(name: str) -> Path:
         if name == "analyse":
             bench = ["--scene", str(data / "damped.scene.toml"), "--method", "classic"]
-            assert main(["analyse", str(OLD_RUN), *bench, "--out", str(out)]) == 0
+            assert main(["analyse", str(OLD_RUN), *bench, "--output", str(out)]) == 0
             return out / f"{OLD_RUN.stem}.results" / "report.html"
         if name == "warned":
-            assert main(["analyse", clipped, "--out", str(out)]) == 0
+            assert main(["analyse", clipped, "--output", str(out)]) == 0
             return out / "clipped_simulated_position.results" / "report.html"
         if name == "simulate":
             words = [
@@ -182,7 +182,7 @@ def page_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
             assert main([*words, "--folder", str(out)]) == 0
             return out / "damped.simulated" / "simulation.html"
         if name == "compare":
-            assert main(["compare", undamped, slow, *scenes, "--out", str(out / "compared")]) == 0
+            assert main(["compare", undamped, slow, *scenes, "--output", str(out / "compared")]) == 0
             return out / "compared" / "report.html"
         return course_of(out)
 

@@ -27,7 +27,7 @@ TABLES = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv
 
 def reported(recording: Path, out: Path, *options: str) -> Path:
     """Analyse a recording; return the folder of its report."""
-    main(["analyse", str(recording), "--out", str(out), *options])
+    main(["analyse", str(recording), "--output", str(out), *options])
     return out / f"{recording.stem}.results"
 
 

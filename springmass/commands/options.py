@@ -1,0 +1,107 @@
+"""What several commands declare alike: files, outputs, figures, the law, the options of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import Group, Parameter, Token
+
+from springmass.errors import USAGE, ProgramError
+from springmass.runs.options import ReadOptions
+from springmass.runs.questions import option_of
+from springmass.values import LawName, Positive, TcpPort
+
+File = str | Path
+"""The name of a file; a shell completes it."""
+THE_PAGE = Group("The page", sort_key=4)
+Accuracy = Literal["fast", "standard", "best"]
+
+
+def argument(name: str, words: str, *, required: bool | None = None) -> Parameter:
+    """Return the declaration of a positional argument."""
+    return Parameter(name=name, metavar=name, help=words, required=required)
+
+
+def option(metavar: str, words: str, *names: str) -> Parameter:
+    """Return the declaration of an option that takes a value."""
+    return Parameter(name=names, metavar=metavar, help=words)
+
+
+def output(metavar: str, words: str) -> Parameter:
+    """Return the declaration of the option that names the output."""
+    return option(metavar, words, "-o", "--output")
+
+
+def flag(words: str) -> Parameter:
+    """Return the declaration of an option without a value."""
+    return Parameter(help=words)
+
+
+def converted(metavar: str, words: str, convert: Callable[[str], Any]) -> Parameter:
+    """Return the declaration of an option that may be repeated, with a function that converts each of its values."""
+
+    def every(_: Any, tokens: Sequence[Token]) -> tuple[Any, ...]:
+        return tuple(convert(token.value) for token in tokens)
+
+    return Parameter(metavar=metavar, help=words, converter=every, accepts_keys=False, n_tokens=1)
+
+
+def _formats(_: Any, tokens: Sequence[Token]) -> tuple[str, ...]:
+    kinds = tuple(kind.strip().lower() for kind in tokens[0].value.split(","))
+    if not set(kinds) <= {"svg", "pdf", "png"}:
+        raise ValueError("must be svg, pdf or png, or several of them with commas")
+    return kinds
+
+
+Recording = Annotated[File, argument("INPUT", "recording, run file or wire log")]
+Scenes = Annotated[
+    tuple[File, ...], option("FILE", "scene file: one for all inputs, or one per input in the same order")
+]
+Tier = Annotated[Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)")]
+Figures = Annotated[
+    tuple[Literal["svg", "pdf", "png"], ...],
+    Parameter(
+        name="--figures",
+        metavar="FORMATS",
+        help="also write each chart into figures/, as svg, pdf or png (or several: svg,pdf)",
+        converter=_formats,
+        n_tokens=1,
+    ),
+]
+StatedLaw = Annotated[
+    LawName | None, option("NAME", "damping law, if known: linear, quadratic ...; any: choose from the data")
+]
+Json = Annotated[bool, Parameter(name="--json", help="print JSON on standard output")]
+Overwrite = Annotated[bool, flag("replace an existing output")]
+Strict = Annotated[bool, flag("exit with code 5 if a finding is an error")]
+
+
+@Parameter(name="*", group=THE_PAGE)
+@dataclass(frozen=True, kw_only=True)
+class PageOptions:
+    """The options of the page in the browser."""
+
+    page_port: Annotated[TcpPort, option("N", "port of the page (default: a free one)")] = 0
+    no_browser: Annotated[bool, flag("print the address of the page, and do not open a browser")] = False
+    want_us: Annotated[
+        Positive | None, option("U", "target uncertainty of the period, us (default: 40 ppm of the period)")
+    ] = None
+    lan: Annotated[bool, flag("let other devices on the local network view the page")] = False
+    law: StatedLaw = None
+
+
+PART = ("from_s", "to_s", "clock_ppm")
+"""The reading options of an analysis, which mean nothing to a command that takes every sample as it is."""
+
+
+def refuse(command: str, read: ReadOptions, *names: str) -> None:
+    """Refuse options of reading that mean nothing to a command."""
+    if given := [option_of(name) for name in read.given() if name in names]:
+        raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out", USAGE)
+
+
+def only_reading(*, read: ReadOptions = ReadOptions()) -> None:
+    """Declare a command that has the options of reading alone, by which they are parted from the others of a line."""
