@@ -14,7 +14,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-MOVED = ("acquisition", "pipeline", "storage")
+MOVED = ("acquisition", "failure", "pipeline", "storage")
 RECORDINGS = "sample_data"  # except for the program that generates them
 
 _NAMES = "|".join(MOVED)

@@ -6,6 +6,8 @@ import unicodedata
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from failure import Error
+
 if TYPE_CHECKING:
     from acquisition.recordings.questions import Question
 
@@ -24,7 +26,7 @@ def _escaped(character: str) -> str:
     return character if unicodedata.category(character) == "Zs" else character.encode("unicode_escape").decode()
 
 
-class AcquisitionError(Exception):
+class AcquisitionError(Error):
     """Base class of the errors of acquisition; its message is one line, written for the user."""
 
 

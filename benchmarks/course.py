@@ -119,7 +119,7 @@ def recordings(folder: Path, runs: int) -> None:
 def _real() -> Iterator[tuple[np.ndarray, np.ndarray]]:
     for name, options in REAL:
         if (RECORDINGS / name).is_file():
-            track = load(RECORDINGS / name, **options).track
+            track = load(RECORDINGS / name, **options).loaded.track
             there = np.isfinite(track.t) & np.isfinite(track.y)
             yield track.t[there], track.y[there]
 

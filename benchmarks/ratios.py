@@ -55,8 +55,9 @@ print(len(y), fit.params["frequency"].value)
 """A script that a user would write for one file: read it with pandas and fit it with lmfit."""
 CHILD = """
 import json, sys, time
-from springmass import analyse, load
-track = load(sys.argv[1], **json.loads(sys.argv[3])).track
+from pipeline.analyse import analyse
+from springmass import load
+track = load(sys.argv[1], **json.loads(sys.argv[3])).loaded.track
 analyse(track)
 best = float("inf")
 for _ in range(int(sys.argv[2])):
@@ -119,8 +120,8 @@ def cases() -> Iterator[Case]:
         ours, theirs = process(program, "analyse", "--json", str(path), *flags), process(python, "-c", script)
         yield pair(f"cold springmass analyse --json, {name}", "a script of pandas and lmfit", 1.0, ours, theirs, 10)
     scene = read_scene(sample_data() / "damped.scene.toml")
-    tracks = {"clean": clean_record(), "5 % false echoes": load(bundled).track}
-    measured = {name: load(path, **options).track for name, (path, options) in real.items()}
+    tracks = {"clean": clean_record(), "5 % false echoes": load(bundled).loaded.track}
+    measured = {name: load(path, **options).loaded.track for name, (path, options) in real.items()}
     for name, track in {**tracks, **measured}.items():
         known = scene if name in tracks else Scene()
         yield from (tier(accuracy, limit, name, track, known) for accuracy, limit in LIMITS.items())

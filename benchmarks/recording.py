@@ -75,7 +75,7 @@ def measure(port: str, seconds: int, *, terminal: bool) -> tuple[int, int, float
         child.returncode = os.waitstatus_to_exitcode(status)
         if child.returncode:
             raise SystemExit(f"springmass record ended with exit code {child.returncode}")
-        samples = load(run).samples
+        samples = load(run).loaded.samples
         return len(samples), int((samples.flags != 0).sum()), usage.ru_utime + usage.ru_stime
 
 

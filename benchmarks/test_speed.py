@@ -14,7 +14,7 @@ from springmass.runs.scenes import read_scene
 def damped():
     """Return the bundled damped recording and its scene."""
     data = sample_data()
-    return load(data / "damped_simulated_position.txt").track, read_scene(data / "damped.scene.toml")
+    return load(data / "damped_simulated_position.txt").loaded.track, read_scene(data / "damped.scene.toml")
 
 
 def test_reading_a_text_recording(benchmark):

@@ -13,8 +13,10 @@ Every message is one line. It says where the error is, what is wrong, which valu
 
 from __future__ import annotations
 
+from failure import Error
 
-class PipelineError(Exception):
+
+class PipelineError(Error):
     """Base class of all errors that the pipeline raises; the message is a single line for the user."""
 
 

@@ -18,6 +18,8 @@ import contextlib
 import sys
 from collections.abc import Iterator
 
+from failure import Error as Error
+
 __all__ = [
     "INTERNAL",
     "INTERRUPTED",
@@ -47,7 +49,7 @@ OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERNAL, INTERRUPTED = 0,
 NO_MEMORY = "there is not enough memory; end other programs, or raise the limit"
 
 
-class ProgramError(Exception):
+class ProgramError(Error):
     """An error for the user: a message of one line and an exit code.
 
     Parameters

@@ -8,7 +8,7 @@ __all__ = ["PACKAGES", "PREFIX", "STDIN", "part", "static_file"]
 
 STDIN = "<stdin>"
 """The path that represents standard input, which is ``-`` on the command line."""
-PACKAGES = ("acquisition", "pipeline", "storage")
+PACKAGES = ("acquisition", "failure", "pipeline", "storage")
 
 _HOME = Path(__file__).resolve().parent
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from failure import Error
+
 
 def one_line(error: BaseException) -> str:
     """Return an error's text on a single line (HDF5 uses several).
@@ -21,7 +23,7 @@ def one_line(error: BaseException) -> str:
     return " ".join(str(text).split()) or type(error).__name__
 
 
-class StorageError(Exception):
+class StorageError(Error):
     """Base class of the errors of storage: a file, what is wrong with it, and advice to the user."""
 
     separator = ": "

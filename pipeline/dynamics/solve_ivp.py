@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.methods import acceleration
 from pipeline.dynamics.problem import Problem
-from pipeline.errors import DynamicsError
+from pipeline.errors import DynamicsError, PipelineError
 from pipeline.track import F8
 
 MOST_CALLS = 3_000_000  # maximum number of evaluations of the right-hand side, about ten seconds
@@ -51,6 +51,8 @@ class SolveIvp(Integrator):
             done = solve_ivp(
                 right_side, (0.0, float(t[-1])), start, method="DOP853", t_eval=t, rtol=self.rtol, atol=tolerance
             )
+        except PipelineError:
+            raise
         except ValueError as error:  # raised by scipy on overflow
             raise DynamicsError(f"{self.name} gave up: {error}; take strang or auto") from error
         if done.status < 0:

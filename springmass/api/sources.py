@@ -5,27 +5,32 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from types import EllipsisType
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypedDict, Unpack
 
 from acquisition.errors import NeedsAnswer
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import Law
 from pipeline.errors import AnalysisError
 from springmass.runs.comparing import Compared, compare_runs
-from springmass.runs.how import Accuracy, How
+from springmass.runs.options import Accuracy, How
 from springmass.runs.outputs import distinct_names
 from springmass.runs.questions import for_python
 from springmass.runs.run import Run
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    Path = str | os.PathLike[str]
-    Arrays = tuple[ArrayLike, ArrayLike] | Mapping[str, ArrayLike] | xr.Dataset | xr.DataArray | pd.DataFrame | pd.Series
-    AnySource = Path | Run | Arrays
-    AnyScene = Scene | Path | Mapping[str, Any]
+    class Indexed(Protocol):
+        """A frame or a series of pandas."""
+
+        @property
+        def index(self) -> Any: ...
+
+    Path: TypeAlias = str | os.PathLike[str]
+    Arrays: TypeAlias = tuple[ArrayLike, ArrayLike] | Mapping[str, ArrayLike] | xr.Dataset | xr.DataArray | Indexed
+    AnySource: TypeAlias = Path | Run | Arrays
+    AnyScene: TypeAlias = Scene | Path | Mapping[str, Any]
 
 
 class Reading(TypedDict, total=False):
@@ -119,7 +124,7 @@ def _run(source: Any, scene: Any, function: str, options: Mapping[str, Any]) -> 
     try:
         return Run.of(source, scene, how)
     except NeedsAnswer as error:
-        raise error.with_remedy(for_python(error.question, function, how.given())) from None
+        raise error.with_remedy(for_python(error.question, function, how.stated())) from None
 
 
 def compare(

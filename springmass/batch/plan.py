@@ -20,8 +20,8 @@ from springmass.batch.course import POSITION, Entry, join, read_course
 from springmass.batch.rows import dumped
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 from springmass.layout import PACKAGES, part
-from springmass.runs.analysing import numbered
 from springmass.runs.inputs import InputFile, files_of
+from springmass.runs.outputs import numbered
 from springmass.runs.scenes import read_scene
 
 __all__ = ["Job", "Plan", "code_sha256", "names_of", "plan"]

@@ -152,9 +152,7 @@ def write_one(run: str, job: Job, folder: Path) -> Path:
 
     try:
         with quietly():
-            analysed = analyse_job(job).described(
-                {**job.answers, "accuracy": job.accuracy, "law": job.law}, name=run, time_utc=TIME
-            )
+            analysed = replace(analyse_job(job), name=run, time_utc=TIME)
     except (AcquisitionError, StorageError, PipelineError) as error:
         raise ProgramError(str(error), UNREADABLE) from error
     result = {**analysed.result, "input": {**analysed.result["input"], "path": job.path}}

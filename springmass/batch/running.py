@@ -24,7 +24,7 @@ from springmass.batch.store import CSV, GROUPS, PAGE, PARQUET, Store
 from springmass.batch.worker import analyse_many, blank_row, unchanged
 from springmass.errors import USAGE, ProgramError
 from springmass.report.script import SHARED
-from springmass.runs.analysing import make_folder
+from springmass.runs.outputs import make_folder
 from storage.atomic import writing
 from storage.errors import WriteFailed
 

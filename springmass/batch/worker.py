@@ -25,10 +25,10 @@ from springmass.batch.store import sha256_of
 from springmass.errors import NO_MEMORY, ProgramError, internal_error, quietly
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.runs.about import about_path
-from springmass.runs.analysing import AnalysedRun, load_and_analyse
 from springmass.runs.loading import Loaded
-from springmass.runs.options import ReadOptions
+from springmass.runs.options import How
 from springmass.runs.questions import for_course
+from springmass.runs.run import Run
 from storage.errors import StorageError
 
 __all__ = ["analyse_job", "analyse_many", "blank_row", "stamps_of", "unchanged"]
@@ -65,13 +65,12 @@ def analyse_one(job: Job) -> dict[str, Any]:
     return row
 
 
-def analyse_job(job: Job) -> AnalysedRun:
+def analyse_job(job: Job) -> Run:
     """Read a run of a course and analyse it with the scene and options of its job."""
-    options = ReadOptions.of(job.answers)
-    if options.velocity is not None:
-        options = replace(options, velocity=job.whole(str(options.velocity)))
-    scene = None if job.scene is None else Scene.from_mapping(job.scene)
-    return load_and_analyse(job.whole(job.path), options, scene, accuracy=job.accuracy, law=job.law)
+    how = How.of({**job.answers, "accuracy": job.accuracy, "law": job.law})
+    if how.velocity is not None:
+        how = replace(how, velocity=job.whole(str(how.velocity)))
+    return Run.of(job.whole(job.path), job.scene, how)
 
 
 def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, Any]:

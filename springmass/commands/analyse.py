@@ -6,7 +6,6 @@ take longer to begin (``benchmarks/many.py``).
 
 from __future__ import annotations
 
-import filecmp
 import json
 import shlex
 import sys
@@ -17,15 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from acquisition.errors import AcquisitionError, NeedsAnswer
-from pipeline.analyse import Oscillation, Overdamped
-from pipeline.bench.scene import Scene
-from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
-from springmass.commands.options import Figures, File, Scenes, StatedLaw, Strict, Tier, argument, flag, option, output
+from springmass.commands.options import Figures, File, Json, Scenes, Strict, argument, flag, option, output
 from springmass.errors import (
-    INTERNAL,
-    NO_MEMORY,
     OK,
     REJECTED,
     SOME_FAILED,
@@ -33,71 +26,40 @@ from springmass.errors import (
     USAGE,
     ProgramError,
     complain,
-    internal_error,
     manner,
     suggest,
     tell,
 )
 from springmass.layout import STDIN
 from springmass.runs.about import remember_scene
-from springmass.runs.analysing import (
-    Analysed,
-    analyse_loaded,
-    distinct_names,
-    in_a_name,
-    law_line,
-    make_folder,
-    scene_of,
-)
-from springmass.runs.inputs import InputFile, files_of
-from springmass.runs.json_results import picked, rejected
-from springmass.runs.loading import Loaded, load, sample_data
-from springmass.runs.options import ReadOptions
+from springmass.runs.analysing import Failed, Task, analyse_all, law_line
+from springmass.runs.inputs import files_of
+from springmass.runs.json_results import rejected
+from springmass.runs.options import How
+from springmass.runs.outputs import distinct_names, make_folder, results_name
 from springmass.runs.questions import for_command, option_of
-from springmass.runs.scenes import Amendments, amended, read_scenes
-from springmass.terminal.asking import ask_for_bench
+from springmass.runs.run import Run
+from springmass.runs.scenes import read_scenes
 from springmass.values import Finite, NotNegative
-from storage.errors import StorageError, WriteFailed
+from storage.errors import WriteFailed
 
 if TYPE_CHECKING:
     from springmass.report.tables import TableKey
 
-READING = ("velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_ppm")
-RESOLVED = ("accuracy", "method", "law", "strict")
 TOGETHER = "together.results"
-STDIN_NAME = "stdin"
+MOST_IN_A_REPORT = 20  # runs of which one report shows every chart
 LONGEST_INPUTS = 48  # maximum length of input names repeated in a suggested command
 
 
 @dataclass(frozen=True, slots=True)
-class _Task:
-    """One input and what to make from it."""
-
-    file: InputFile
-    name: str
-    scene: Scene | None
-    scene_file: str | Path | None
-    options: AnalyseOptions
-    read: ReadOptions
-    bench: Amendments
-    alone: bool
-    writes: bool = False  # whether files may be written at all
-    report: Path | None = None  # folder for the report
-
-
-@dataclass(frozen=True, slots=True)
 class _Done:
-    """The outcome of one of several inputs: of a course of thousands, only what is printed at the end."""
+    """What is printed at the end of one of several runs."""
 
     name: str
-    code: int
-    complaints: tuple[str, ...] = ()
     result: Mapping[str, Any] = field(default_factory=dict)
     table: Mapping[TableKey, Estimate] = field(default_factory=dict)
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
-    page: Path | None = None
-    remembered: bool = False  # whether the scene was noted next to the recording
-    law: str = ""  # line that names the damping law stated by the scene
+    law: str = ""
 
 
 @Parameter(name="*")
@@ -106,21 +68,17 @@ class AnalyseOptions:
     """The options of ``springmass analyse``."""
 
     scene: Scenes = ()
-    accuracy: Tier = "standard"
-    law: StatedLaw = None
+    save_scene: Annotated[bool, flag("note the stated scene next to the recording, for later commands")] = False
     method: Annotated[
         Literal["classic"] | None, option("NAME", "also apply the lab report's classic method, for comparison")
     ] = None
     output: Annotated[File | None, output("DIR", "output folder (default: here; with --json: none)")] = None
-    report: Annotated[bool, flag("with several inputs, also write a report for each")] = False
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
     full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
-    budget: Annotated[bool, flag("print the sources of uncertainty")] = False
-    ask: Annotated[bool, flag("ask for the masses and the disc, and save them next to the recording")] = False
     template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None
     figures: Figures = ()
     si: Annotated[bool, flag("print SI units without prefixes")] = False
-    json: Annotated[bool, flag("print one JSON object per input on standard output")] = False
+    json: Json = False
     strict: Strict = False
 
 
@@ -153,191 +111,126 @@ def analyse(
         File, argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True)
     ],
     options: AnalyseOptions = AnalyseOptions(),
-    read: ReadOptions = ReadOptions(),
+    how: How = How(),
     bench: BenchOptions = BenchOptions(),
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
     inputs = [str(each) for each in recordings]
-    if options.report and options.no_report:
-        raise ProgramError("--report and --no-report exclude each other, got both; leave one out", USAGE)
-    if read.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
+    if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself", USAGE)
-    if options.ask and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
-        raise ProgramError("--ask is about one recording; analyse the others by themselves", USAGE)
-    if options.ask and inputs == [STDIN]:
-        raise ProgramError("--ask reads answers from standard input, which is the recording; give --mass-kg", USAGE)
-    scenes = read_scenes(options.scene, len(inputs))
-    values = _values(bench)
+    scenes, values = read_scenes(options.scene, len(inputs)), _values(bench)
     found, folders = files_of(inputs)
-    out = make_folder(options.output or ".") if _writes(options) else None
     for line in folders:
         tell(line)
-    every = len(found) == 1 or options.report
+    names = distinct_names(["stdin" if one.path == STDIN else one.path for one in found])
+    how = replace(how, method=options.method)
     tasks = [
-        _Task(
-            one,
-            name,
-            scenes[one.of],
-            options.scene[one.of if len(options.scene) > 1 else 0] if options.scene else None,
-            options,
-            read if one.velocity is None else replace(read, velocity=one.velocity),
-            values,
-            inputs == [one.path],
-            out is not None,
-            out / in_a_name(name, ".results") if out is not None and every else None,
+        Task(
+            one.path, name, scenes[one.of], how if one.velocity is None else replace(how, velocity=one.velocity), values
         )
-        for one, name in zip(
-            found, distinct_names([STDIN_NAME if one.path == STDIN else one.path for one in found]), strict=True
-        )
+        for one, name in zip(found, names, strict=True)
     ]
-    return _one(tasks[0]) if len(tasks) == 1 else _several(tasks, inputs, options, out)
-
-
-def _writes(options: AnalyseOptions) -> bool:
-    return not options.no_report and (options.report or options.output is not None or not options.json)
-
-
-def _one(task: _Task) -> int:
-    attempted = _attempt(task)
-    if isinstance(attempted, _Done):
-        complain(*attempted.complaints)
-        return attempted.code
-    analysed, noted = attempted
-    if task.options.json:
-        print(json.dumps(analysed.result, allow_nan=False), flush=True)
+    out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
+    files = [options.scene[one.of if len(options.scene) > 1 else 0] if options.scene else None for one in found]
+    if len(tasks) > 1:
+        return _several(tasks, files, inputs, options, out)
+    (run,) = analyse_all(tasks)
+    if isinstance(run, Failed):
+        if run.question is not None and inputs == [found[0].path]:
+            raise run.question  # the caller answers it with the typed command line
+        return _failed(run)
+    if options.json:
+        print(json.dumps(run.result, allow_nan=False), flush=True)
     else:
-        if line := law_line(analysed.analysis, Path(task.file.path), task.scene_file):
+        if line := law_line(run, files[0]):
             print(line)
-        _print_text(analysed, task.options)
-    if noted is not None:
-        tell(f"bench data saved for this file: {noted}")
-    if task.report is not None:
-        page = _write(analysed, task)
-        tell(f"report: {page}")
-    code, complaints = _judged(analysed, task)
-    for line in complaints:
-        complain(line)
-    return code
+        _print_text(run, options)
+    if options.save_scene:
+        _save_scene(run)
+    if out is not None:
+        _write(out / results_name(run), [run], options)
+    return _judged(run, options)
 
 
-def _several(tasks: Sequence[_Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:
-    """Analyse many inputs: one Table 1, one file of numbers."""
+def _several(
+    tasks: Sequence[Task],
+    files: Sequence[File | None],
+    inputs: Sequence[str],
+    options: AnalyseOptions,
+    out: Path | None,
+) -> int:
+    """Analyse many inputs: one Table 1, one file of numbers and, if they are few, one report."""
+    from springmass.report.tables import every_number, table_estimates
     from springmass.terminal.progress import counted
 
-    everything: list[_Done] = []
-    for done in counted(map(_work, tasks), len(tasks), "reports" if options.report else "runs", quiet=manner()[0]):
-        everything.append(done)
-        if options.json and done.result:
-            print(json.dumps(done.result, allow_nan=False), flush=True)
-        if done.page is not None:
-            tell(f"report: {done.page}")
-        for line in done.complaints:
-            complain(line)
-    analysed = [done for done in everything if done.result]
-    if noted := sum(done.remembered for done in everything):
-        tell(f"bench data saved for {noted} recordings, each in NAME.about.toml")
-    if analysed and not options.json:
-        _print_together(analysed, options)
-    if analysed and out is not None:
-        tell(f"written: {_write_together(analysed, out / TOGETHER)}")
-    if len(analysed) > 1:
+    done: list[_Done] = []
+    runs: list[Run] = []
+    codes: list[int] = []
+    analysed = counted(analyse_all(tasks), len(tasks), "runs", quiet=manner()[0])
+    for run, file in zip(analysed, files, strict=True):
+        if isinstance(run, Failed):
+            codes.append(_failed(run))
+            continue
+        if options.json:
+            print(json.dumps(run.result, allow_nan=False), flush=True)
+        if options.save_scene:
+            _save_scene(run)
+        codes.append(_judged(run, options))
+        table, numbers = table_estimates(run.analysis), every_number(run.analysis)
+        done.append(_Done(run.name, run.result, table, numbers, law_line(run, file)))
+        if len(tasks) <= MOST_IN_A_REPORT:
+            runs.append(run)
+    if done and not options.json:
+        _print_together(done, options)
+    if done and out is not None:
+        if runs:
+            _write(out / TOGETHER, runs, options)
+        else:
+            _write_numbers(out / TOGETHER, done)
+    if len(done) > 1:
         named = shlex.join(inputs)
         suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
-    codes = [done.code for done in everything]
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(codes)
 
 
-def _work(task: _Task) -> _Done:
-    """Analyse one of several inputs, and write its report; a defect met on one does not keep the others from theirs."""
+def _failed(failed: Failed) -> int:
+    """Say why a recording gives no run; the remedy of a question names the command for this recording alone."""
+    task, message = failed.task, failed.message
+    if failed.question is not None:
+        path = f"./{task.path}" if task.path.startswith("-") else task.path
+        velocity = () if task.how.velocity is None else ("--velocity", str(task.how.velocity))
+        given = {name: value for name, value in task.how.stated().items() if name != "velocity"}
+        words = ["springmass", "analyse", path, *velocity]
+        message = str(failed.question.with_remedy(for_command(failed.question.question, words, given)))
+    complain(message)
+    return failed.code
+
+
+def _judged(run: Run, options: AnalyseOptions) -> int:
+    """Return the exit code of an analysis, and say why it is not 0."""
+    path = run.result["input"]["path"]
+    if not run.ok:
+        complain(f"{path}: no oscillation: {run.why}")
+        return UNREADABLE
+    if options.strict and (wrong := rejected(run.result["findings"])):
+        complain(f"{path}: rejected under --strict: {', '.join(wrong)}")
+        return REJECTED
+    return OK
+
+
+def _save_scene(run: Run) -> None:
+    """Note the scene next to the recording; if that is impossible, print a message and continue."""
+    if run.loaded.path == Path(STDIN):
+        tell("--save-scene notes a scene next to a file; standard input has none, save the recording first")
+        return
     try:
-        return _analyse_and_report(task)
-    except MemoryError:
-        return _Done(task.name, UNREADABLE, (f"{task.file.path}: {NO_MEMORY}",))
-    except Exception as error:
-        return _Done(task.name, INTERNAL, (f"{task.file.path}: {internal_error(error)}",))
-
-
-def _analyse_and_report(task: _Task) -> _Done:
-    from springmass.report.tables import every_number, table_estimates
-
-    attempted = _attempt(task)
-    if isinstance(attempted, _Done):
-        return attempted
-    analysed, noted = attempted
-    code, complaints = _judged(analysed, task)
-    page = None
-    if task.report is not None:
-        try:
-            page = _write(analysed, task)
-        except WriteFailed as error:
-            code, complaints = USAGE, (*complaints, str(error))
-    analysis = analysed.analysis
-    table, numbers = table_estimates(analysis), every_number(analysis)
-    law = law_line(analysis, Path(task.file.path), task.scene_file)
-    return _Done(task.name, code, complaints, analysed.result, table, numbers, page, noted is not None, law)
-
-
-def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
-    """Analyse an input; return the analysis, and where its scene was saved."""
-    try:
-        options, read = task.options, task.read
-        loaded, bench = load(task.file.path, read), dict(task.bench)
-        if options.ask:
-            known = amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else None
-            bench |= ask_for_bench(known or scene_of(loaded, task.scene), loaded.path.name)
-        run = analyse_loaded(
-            loaded,
-            task.scene,
-            bench=bench,
-            accuracy=options.accuracy,
-            law=options.law,
-            with_classic=options.method == "classic",
-        )
-        parameters = {
-            **picked(options, ("accuracy", "method", "law")),
-            **picked(read, READING),
-            "strict": options.strict,
-        }
-        scene = run.analysis.scene if task.scene is not None or bench else None
-        return run.described(parameters), _remembered(loaded, scene) if task.writes or options.ask else None
-    except ProgramError as error:
-        return _Done(task.name, error.exit_code, (str(error),))
-    except NeedsAnswer as question:
-        if task.alone:
-            raise  # the caller answers it with the typed command line
-        remedy = for_command(question.question, _words(task), replace(task.read, velocity=None).given())
-        return _Done(task.name, UNREADABLE, (str(question.with_remedy(remedy)),))
-    except (AcquisitionError, StorageError) as error:
-        return _Done(task.name, UNREADABLE, (str(error),))
-    except PipelineError as error:
-        return _Done(task.name, UNREADABLE, (f"{task.file.path}: {error}",))
-
-
-def _words(task: _Task) -> list[str]:
-    """Return the command line for one of several inputs by itself."""
-    velocity = () if task.file.velocity is None else ("--velocity", task.file.velocity)
-    path = task.file.path
-    return ["springmass", "analyse", f"./{path}" if path.startswith("-") else path, *velocity]
-
-
-def _remembered(loaded: Loaded, scene: Scene | None) -> Path | None:
-    """Save a given scene next to its recording; if that is impossible, print a message and continue."""
-    if scene is None or loaded.path == Path(STDIN) or _bundled(loaded.path):
-        return None
-    try:
-        return remember_scene(loaded.path, loaded.scene, scene)
+        if noted := remember_scene(run.loaded.path, run.loaded.scene, run.scene):
+            tell(f"scene saved for this recording: {noted}")
     except WriteFailed as error:
-        tell(f"{error}; the bench data are not saved")
-        return None
-
-
-def _bundled(path: Path) -> bool:
-    """Whether a recording came with the program, wherever it is now: nothing is written into its folder."""
-    own = sample_data() / path.name
-    return own.is_file() and filecmp.cmp(own, path, shallow=False)
+        complain(error)
 
 
 def _values(bench: BenchOptions) -> dict[tuple[str, str], dict[str, float]]:
@@ -354,17 +247,7 @@ def _values(bench: BenchOptions) -> dict[tuple[str, str], dict[str, float]]:
     return values
 
 
-def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:
-    """Return the exit code of an analysis, and the message for it."""
-    path, motion = analysed.result["input"]["path"], analysed.analysis.motion
-    if not isinstance(motion, (Oscillation, Overdamped)):
-        return UNREADABLE, (f"{path}: no oscillation: {motion.why}",)
-    if task.options.strict and (wrong := rejected(analysed.result["findings"])):
-        return REJECTED, (f"{path}: rejected under --strict: {', '.join(wrong)}",)
-    return OK, ()
-
-
-def _print_text(analysed: Analysed, options: AnalyseOptions) -> None:
+def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.budgets import budget_text
     from springmass.report.words import damping_sentence, typeset
@@ -373,47 +256,54 @@ def _print_text(analysed: Analysed, options: AnalyseOptions) -> None:
     from springmass.terminal.table1 import text_table
 
     style = style_of(sys.stdout, si=options.si)
-    print(text_table([analysed.name], [analysed.analysis], style))
-    if analysed.classic is not None:
-        print(f"{classic_text(analysed.classic)}\n")
-    elif (options.full or options.budget) and (budget := budget_text(analysed.analysis)):
+    print(text_table([run.name], [run.analysis], style))
+    if run.classic is not None:
+        print(f"{classic_text(run.classic)}\n")
+    elif options.full and (budget := budget_text(run.analysis)):
         print(f"{fitted(budget, style.width) if style.terminal else budget}\n")
-    if sentence := damping_sentence(analysed.analysis):
+    if sentence := damping_sentence(run.analysis):
         print(f"{wrapped(sentence, '', 80)}\n")
-    print(findings_text(analysed.result["findings"], typeset if style.unicode else str, full=options.full))
+    print(findings_text(run.result["findings"], typeset if style.unicode else str, full=options.full))
 
 
-def _print_together(analysed: Sequence[_Done], options: AnalyseOptions) -> None:
+def _print_together(done: Sequence[_Done], options: AnalyseOptions) -> None:
     from springmass.report.words import typeset
     from springmass.terminal.printing import shared_findings_text
     from springmass.terminal.style import style_of
     from springmass.terminal.table1 import text_table
 
-    for line in dict.fromkeys(done.law for done in analysed if done.law):
+    for line in dict.fromkeys(one.law for one in done if one.law):
         print(line)
-    names = [done.name for done in analysed]
     style = style_of(sys.stdout, si=options.si)
-    print(text_table(names, [done.table for done in analysed], style))
-    findings = {done.name: done.result["findings"] for done in analysed}
+    print(text_table([one.name for one in done], [one.table for one in done], style))
+    findings = {one.name: one.result["findings"] for one in done}
     print(shared_findings_text(findings, typeset if style.unicode else str))
 
 
-def _write(analysed: Analysed, task: _Task) -> Path:
+def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> None:
+    """Write the report; a folder that cannot be written costs a line and not the results, which are printed."""
     from springmass.report.write import write_report
 
-    assert task.report is not None
-    return write_report(task.report, [analysed], figures=task.options.figures, template=task.options.template)
+    try:
+        make_folder(folder.parent)
+        page = write_report(folder, runs, figures=options.figures, template=options.template)
+        tell(f"report: {page}")
+    except (ProgramError, WriteFailed) as error:
+        complain(error)
 
 
-def _write_together(analysed: Sequence[_Done], folder: Path) -> Path:
+def _write_numbers(folder: Path, done: Sequence[_Done]) -> None:
     """Write the numbers of all runs: results.csv for a table, results.json for programs."""
     from springmass.report.tables import results_csv
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 
-    names = [done.name for done in analysed]
-    with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
-        text = json.dumps([done.result for done in analysed], indent=2, allow_nan=False, ensure_ascii=False)
-        write_whole(part / "results.json", f"{text}\n".encode("utf-8", "backslashreplace"))
-        write_whole(part / "results.csv", results_csv(names, [done.numbers for done in analysed]))
-    return folder / "results.csv"
+    text = json.dumps([one.result for one in done], indent=2, allow_nan=False, ensure_ascii=False)
+    try:
+        make_folder(folder.parent)
+        with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
+            write_whole(part / "results.json", f"{text}\n".encode("utf-8", "backslashreplace"))
+            write_whole(part / "results.csv", results_csv([one.name for one in done], [one.numbers for one in done]))
+        tell(f"written: {folder / 'results.csv'}")
+    except (ProgramError, WriteFailed) as error:
+        complain(error)

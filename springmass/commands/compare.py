@@ -18,24 +18,21 @@ from springmass.commands.options import (
     File,
     Json,
     Scenes,
-    StatedLaw,
     Strict,
-    Tier,
     argument,
     option,
     output,
     refuse,
 )
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
-from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, law_line, make_folder, now_utc, scene_of
-from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
-from springmass.runs.json_results import picked, provenance_of, rejected
-from springmass.runs.loading import load
-from springmass.runs.options import ReadOptions
+from springmass.runs.analysing import law_line
+from springmass.runs.comparing import Compared, compare_runs, comparison_json
+from springmass.runs.json_results import provenance_of, rejected
+from springmass.runs.options import How
+from springmass.runs.outputs import distinct_names, make_folder, now_utc
+from springmass.runs.run import Run
 from springmass.runs.scenes import read_scenes
 from springmass.values import Share
-
-READING = ("channel", "run", "rate_hz", "unit", "from_s", "to_s")
 
 
 @Parameter(name="*")
@@ -48,8 +45,6 @@ class CompareOptions:
         str | None, option("NAME", "for courses: column that names the bench (default: bench, group or section)")
     ] = None
     scene: Scenes = ()
-    accuracy: Tier = "standard"
-    law: StatedLaw = None
     mass_correlation: Annotated[
         Share, option("R", "correlation between the errors of two bobs' masses (default: 0)")
     ] = 0.0
@@ -64,10 +59,10 @@ def compare(
         File, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
     ],
     options: CompareOptions = CompareOptions(),
-    read: ReadOptions = ReadOptions(),
+    how: How = How(),
 ) -> int:
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
-    refuse("compare", read, "velocity")
+    refuse("compare", how, "velocity")
     inputs = [str(each) for each in recordings]
     if all(is_course(path) for path in inputs):
         return _run_courses(inputs, options)
@@ -77,29 +72,21 @@ def compare(
         raise ProgramError(
             f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one", USAGE
         )
-    names = distinct_names(inputs)
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
-    given = read_scenes(options.scene, len(inputs))
+    scenes = read_scenes(options.scene, len(inputs))
     out = None if options.output is None else make_folder(options.output)
-    loaded = [load(path, read) for path in inputs]
-    scenes = [scene_of(one, scene) for one, scene in zip(loaded, given, strict=True)]
-    demand_one_spring(list(zip(names, scenes, strict=True)))
-    time_utc = now_utc()
-    parameters = {**picked(options, ("accuracy", "law", "mass_correlation", "strict")), **picked(read, READING)}
     runs = [
-        analyse_loaded(one, scene, accuracy=options.accuracy, law=options.law).described(
-            parameters, name=name, time_utc=time_utc
-        )
-        for name, one, scene in zip(names, loaded, scenes, strict=True)
+        Run.of(path, scene, how, name) for path, scene, name in zip(inputs, scenes, distinct_names(inputs), strict=True)
     ]
-    compared = compare_analysed(runs, mass_correlation=options.mass_correlation)
-    result = comparison_json(compared, runs, provenance_of(options.accuracy, parameters, time_utc))
+    compared = compare_runs(runs, mass_correlation=options.mass_correlation)
+    parameters = {**how.parameters, "mass_correlation": options.mass_correlation}
+    result = comparison_json(compared, provenance_of(how.accuracy, parameters, now_utc()))
     if options.json:
         print(json.dumps(result, allow_nan=False), flush=True)
     else:
         every: list[str | Path | None] = [*options.scene] or [None]
-        files = every if len(every) == len(loaded) else every * len(loaded)
-        lines = [law_line(run.analysis, one.path, file) for run, one, file in zip(runs, loaded, files, strict=True)]
+        files = every if len(every) == len(runs) else every * len(runs)
+        lines = [law_line(run, file) for run, file in zip(runs, files, strict=True)]
         for line in dict.fromkeys(line for line in lines if line):
             print(line)
         _print_text(compared, runs)
@@ -136,7 +123,7 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     return OK
 
 
-def _print_text(compared: Compared, runs: list[Analysed]) -> None:
+def _print_text(compared: Compared, runs: list[Run]) -> None:
     from springmass.terminal.printing import comparison_text, findings_text, wrapped
 
     print(comparison_text(compared.comparison, [run.analysis for run in runs]))

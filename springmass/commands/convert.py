@@ -5,19 +5,18 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from pathlib import Path, PurePath
-from typing import Annotated, Any
+from typing import Annotated
 
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
 from springmass.commands.options import PART, File, Overwrite, argument, option, refuse
 from springmass.commands.options import output as output_option
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, suggest, tell
-from springmass.runs.analysing import made_now
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
+from springmass.runs.outputs import save_run
 from springmass.runs.scenes import read_scene
 from storage.atomic import write_whole
-from storage.run_file.writing import write_run
 
 RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
 
@@ -44,7 +43,7 @@ def convert(
     loaded = load(recording, read)
     out = Path(output)
     if out.suffix.lower() in RUN_SUFFIXES:
-        written = write_loaded(out, loaded, loaded.samples_in_blocks(), scene=stated, overwrite=overwrite)
+        written = save_run(out, loaded, scene=stated, overwrite=overwrite)
         tell(f"{written}: {len(loaded.samples)} samples from {loaded.path}")
         suggest(f"springmass analyse {shlex.quote(str(written))}")
         return OK
@@ -100,34 +99,6 @@ def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:
     for target in () if overwrite else targets:
         if target.exists():
             raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite", USAGE)
-
-
-def write_loaded(path: Path, loaded: Loaded, blocks: Any, *, scene: Any = None, overwrite: bool = False) -> Path:
-    """Write a run file of a loaded input's samples, its own bytes inside.
-
-    Parameters
-    ----------
-    path : Path
-    loaded : Loaded
-    blocks : iterable of Block
-        What to write: the samples as they were loaded, or as a replay delivered them.
-    scene : mapping, optional
-    overwrite : bool
-    """
-    return write_run(
-        path,
-        blocks,
-        loaded.info,
-        originals=loaded.originals,
-        scene=scene if scene is not None else loaded.scene,
-        title=loaded.title,
-        channel=loaded.channel,
-        traps=loaded.traps,
-        malformed_rows=loaded.malformed_rows,
-        format=loaded.recorded_format,
-        provenance={**loaded.provenance, **made_now()},
-        overwrite=overwrite,
-    )
 
 
 def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:

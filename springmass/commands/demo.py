@@ -8,15 +8,15 @@ from typing import Annotated
 
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.convert import write_loaded
 from springmass.commands.options import File
 from springmass.commands.options import output as output_option
 from springmass.errors import OK, suggest
 from springmass.report.write import write_report
-from springmass.runs.analysing import Analysed, load_and_analyse, make_folder
-from springmass.runs.comparing import compare_analysed
+from springmass.runs.comparing import compare_runs
 from springmass.runs.loading import load, sample_data
 from springmass.runs.options import ReadOptions
+from springmass.runs.outputs import make_folder, save_run
+from springmass.runs.run import Run
 from springmass.runs.scenes import read_scene
 from springmass.terminal.printing import findings_text
 from springmass.terminal.style import style_of
@@ -31,7 +31,7 @@ def demo(
     """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
     out = make_folder(output)
     analysed = [_one(name, out) for name in RUNS]
-    compared = compare_analysed(analysed)
+    compared = compare_runs(analysed)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
     print(text_table(RUNS, [a.analysis for a in analysed], style_of(sys.stdout)))
     for one in analysed:
@@ -43,7 +43,7 @@ def demo(
     return OK
 
 
-def _one(name: str, out: Path) -> Analysed:
+def _one(name: str, out: Path) -> Run:
     """Replay the old files into a run file, and analyse that run file."""
     data = sample_data()
     velocity = data / f"{name}_simulated_velocity.txt"
@@ -51,5 +51,5 @@ def _one(name: str, out: Path) -> Analysed:
     scene = read_scene(data / f"{name}.scene.toml")
     path = out / f"{name}.h5"
     with Replay(old.samples_in_blocks(), VirtualClock(), info=old.info, speed=None) as source:
-        write_loaded(path, old, source, scene=scene.to_mapping(), overwrite=True)
-    return load_and_analyse(path).described({"command": "demo"}, name=name)
+        save_run(path, old, blocks=source, scene=scene.to_mapping(), overwrite=True)
+    return Run.of(path, name=name)

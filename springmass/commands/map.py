@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from springmass.batch.search import search
 from springmass.commands.options import File, argument, option, output
 from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
-from springmass.runs.analysing import make_folder
+from springmass.runs.outputs import make_folder
 
 COLUMNS = ("run", "disc", "reynolds_number", "keulegan_carpenter_number", "drag_coefficient", "drag_coefficient_u")
 

@@ -29,7 +29,7 @@ from springmass.commands.options import File, PageOptions, converted, flag, opti
 from springmass.commands.ports import name_sensors
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
 from springmass.page.process import PageProcess
-from springmass.runs.analysing import made_now
+from springmass.runs.outputs import made_now
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.operator import Closed, Operator
 from springmass.session.options import RunLimits, RunListeners

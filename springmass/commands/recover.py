@@ -10,7 +10,7 @@ from acquisition.errors import CalibrationError
 from springmass.commands.options import File, Overwrite, argument, option
 from springmass.commands.options import output as output_option
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.runs.analysing import made_now
+from springmass.runs.outputs import made_now
 from springmass.stops import STOPS
 from springmass.values import Positive
 from storage.recovery.recover import recover as build

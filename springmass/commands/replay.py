@@ -7,7 +7,6 @@ import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,12 +14,12 @@ from cyclopts import Parameter, Token
 
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.convert import write_loaded
 from springmass.commands.options import PART, File, Overwrite, PageOptions, Recording, flag, option, refuse
 from springmass.commands.options import output as output_option
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
+from springmass.runs.outputs import save_run
 from springmass.values import Finite
 
 
@@ -74,7 +73,7 @@ def replay(
         if seek is not None:
             source.seek(seek)
         if output is not None:
-            path = write_loaded(Path(output), replace(loaded, info=source.info), source, overwrite=overwrite)
+            path = save_run(output, replace(loaded, info=source.info), blocks=source, overwrite=overwrite)
             tell(f"{path}: replayed from {loaded.path}")
             suggest(f"springmass analyse {shlex.quote(str(path))}")
             return OK

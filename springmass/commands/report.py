@@ -12,7 +12,7 @@ from springmass.batch.reports import REPORTS, find_run, linked, report_name, wri
 from springmass.batch.store import open_course
 from springmass.commands.options import File, argument
 from springmass.errors import OK, suggest, tell
-from springmass.runs.analysing import make_folder
+from springmass.runs.outputs import make_folder
 
 
 def report(

@@ -22,7 +22,7 @@ from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import Figures, File, flag, option, output
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.runs.analysing import load_and_analyse
+from springmass.runs.run import Run
 from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.prepared import Prepared, prepare
@@ -88,7 +88,7 @@ def simulate(*, options: SimulateOptions, read: ReadOptions = ReadOptions()) -> 
     if options.against is not None:
         from springmass.runs.simulating.against import duration_s
 
-        analysis = load_and_analyse(options.against, read, scene).analysis
+        analysis = Run.of(options.against, scene, How.of(read.given())).analysis
         seconds = max(seconds, duration_s(analysis))
     ready = prepare(scene, seconds, analysis=analysis, without=options.without, where=where)
     if ready.from_run:

@@ -15,9 +15,9 @@ from pipeline.errors import DynamicsError
 from springmass import __version__
 from springmass.commands.options import File, argument, flag, option, output
 from springmass.errors import OK, USAGE, ProgramError, manner
-from springmass.runs.analysing import make_folder
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
+from springmass.runs.outputs import make_folder
 from springmass.runs.scenes import read_scene
 from springmass.terminal.progress import TaskProgress, counted
 from springmass.values import Count, NotNegative, Positive, SampleShare

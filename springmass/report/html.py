@@ -23,9 +23,9 @@ from springmass.report.recorded import bench_words, calibration_of, date_words, 
 from springmass.report.summary import summary
 from springmass.report.tables import page_unit, prefixed, pretty, pretty_number, table_rows
 from springmass.report.words import method, typeset
-from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
 from springmass.runs.json_results import picked
+from springmass.runs.run import Run
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -69,7 +69,7 @@ class Figures:
 
 
 def render_html(
-    runs: Sequence[Analysed],
+    runs: Sequence[Run],
     charts: Sequence[Mapping[str, Chart]],
     *,
     compared: Compared | None = None,
@@ -138,7 +138,7 @@ def template(name: str) -> Template:
     return environment.get_template(name)
 
 
-def _tables(runs: Sequence[Analysed]) -> Iterator[dict[str, Any]]:
+def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
     """Yield Table 1 in blocks of as many runs as fit side by side on paper."""
     for first in range(0, len(runs), BESIDE):
         some = runs[first : first + BESIDE]
@@ -149,7 +149,7 @@ def _tables(runs: Sequence[Analysed]) -> Iterator[dict[str, Any]]:
         yield {"names": [run.name for run in some], "rows": rows}
 
 
-def _part(index: int, run: Analysed, charts: Mapping[str, Chart], figures: Figures, stem: str) -> dict[str, Any]:
+def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, stem: str) -> dict[str, Any]:
     """Return everything that the template needs about one run."""
     analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
     motion, title = analysis.motion, str(run.recorded.get("title") or given.get("title") or "")
@@ -194,7 +194,7 @@ def _subtitle(title: str, given: Mapping[str, Any], track: Track, quality: Mappi
     return " · ".join(str(part) for part in parts if part) + "."
 
 
-def _classic_rows(run: Analysed) -> list[tuple[str, Estimate | None, Estimate]] | None:
+def _classic_rows(run: Run) -> list[tuple[str, Estimate | None, Estimate]] | None:
     """Return quantity, value of this analysis and value of the lab report's method."""
     if run.classic is None:
         return None

@@ -16,7 +16,7 @@ from pipeline.registry.quantities import INPUTS
 from springmass.report.advice import by_harm, lab_report_line
 from springmass.report.budgets import budgets_of
 from springmass.report.tables import table_rows
-from springmass.runs.analysing import Analysed
+from springmass.runs.run import Run
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -63,7 +63,7 @@ def budget_tex(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
     return "\n".join(_filled("budget.tex.j2", name=name, rows=budgets_of(analysis)) for name, analysis in runs)
 
 
-def lab_report_tex(run: Analysed, captions: Mapping[str, str], sentences: Sequence[str]) -> str:
+def lab_report_tex(run: Run, captions: Mapping[str, str], sentences: Sequence[str]) -> str:
     """Return a lab report to complete: it contains Table 1, figures, captions, uncertainty, and questions for the rest.
 
     Compile it in the folder of the report, which contains its figures: ``pdflatex lab-report.tex``.

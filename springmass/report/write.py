@@ -20,9 +20,9 @@ from springmass.report.motion_table import motion_csv, smoothed_or_why
 from springmass.report.recorded import notes_of
 from springmass.report.summary import summary as sentences
 from springmass.report.tables import results_csv
-from springmass.runs.analysing import Analysed
 from springmass.runs.comparing import Compared
 from springmass.runs.json_results import plain
+from springmass.runs.run import Run
 from storage.atomic import write_whole
 from storage.folder import whole_folder
 
@@ -34,7 +34,7 @@ OF_LAB_REPORT = ("position", "amplitude", "frequency")
 
 def write_report(
     directory: Path,
-    runs: Sequence[Analysed],
+    runs: Sequence[Run],
     *,
     compared: Compared | None = None,
     summary: Mapping[str, Any] | None = None,
@@ -73,7 +73,7 @@ def _names(stems: Sequence[str]) -> set[str]:
 
 def _write(
     folder: Path,
-    runs: Sequence[Analysed],
+    runs: Sequence[Run],
     stems: Sequence[str],
     compared: Compared | None,
     summary: Mapping[str, Any] | None,
@@ -126,7 +126,7 @@ def _write(
     write_whole(folder / PAGE, page)
 
 
-def _write_lab_report(folder: Path, run: Analysed) -> None:
+def _write_lab_report(folder: Path, run: Run) -> None:
     """Write the document to complete, with the figures for a lab report."""
     charts = charts_of(run.analysis)
     captions = {name: charts[name].caption for name in OF_LAB_REPORT if name in charts}

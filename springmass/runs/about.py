@@ -1,4 +1,4 @@
-"""Notes made on a recording afterwards: scene, remarks and marks in ``NAME.about.toml`` next to it.
+"""Notes made on a recording afterwards: scene, remarks and marks, in ``bob.about.toml`` or ``bob.txt.about.toml``.
 
 Recordings and run files are never changed; the notes may be. Every command that reads the recording uses the notes and
 reports that it does.
@@ -6,36 +6,30 @@ reports that it does.
 
 from __future__ import annotations
 
+import glob
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
+from acquisition.errors import AcquisitionError, UnknownFormat
+from acquisition.recordings.identify import sniff
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.scenes import read_tables
 from storage.atomic import write_whole
 
-__all__ = ["About", "about_of", "about_path", "remember_scene", "write_about"]
+RUNS = (".h5", ".hdf5", ".nxs", ".wire")
+"""Suffixes of run files and logs: the stem names their recording."""
 
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """The notes next to a recording.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the notes file, whether it exists or not.
-    scene : Scene or None
-    notes : tuple of str
-    marks : tuple of (float, str)
-        Times in the record in s, with their texts.
-    """
+    """The notes next to a recording, whose file may not exist; marks are times in the record, s, with their texts."""
 
     path: Path
     scene: Scene | None = None
@@ -56,20 +50,41 @@ class About:
 
 
 def about_path(recording: Path) -> Path:
-    """Return the path of the notes on a recording, whether the file exists or not."""
-    return recording.with_name(f"{recording.stem}.about.toml")
+    """Return the path of the notes on a recording, whether the file exists or not.
+
+    A text has them under its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings. Notes under the stem,
+    as earlier versions wrote them, are those of a text if no other recording has that stem.
+    """
+    by_stem = recording.with_name(f"{recording.stem}.about.toml")
+    by_name = recording.with_name(f"{recording.name}.about.toml")
+    if recording.suffix.lower() in RUNS:
+        return by_stem
+    # Path.exists would raise for a name that is too long.
+    if os.path.exists(by_name) or not os.path.exists(by_stem) or any(map(_is_recording, _namesakes(recording))):
+        return by_name
+    return by_stem
+
+
+def _namesakes(recording: Path) -> Iterator[Path]:
+    for other in sorted(recording.parent.glob(f"{glob.escape(recording.stem)}.*")):
+        if other.stem == recording.stem and other.name != recording.name and other.is_file():
+            yield other
+
+
+def _is_recording(path: Path) -> bool:
+    if path.suffix.lower() in RUNS:
+        return True
+    try:
+        sniff(path)
+    except AcquisitionError as error:
+        return not isinstance(error, UnknownFormat)
+    return True
 
 
 def about_of(recording: Path) -> About:
-    """Read the notes next to a recording; they are empty if there is no such file.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if the file exists and its contents are invalid.
-    """
+    """Read the notes next to a recording; they are empty if there is no such file."""
     path = about_path(recording)
-    if not os.path.exists(path):  # Path.exists would raise for a name that is too long
+    if not os.path.exists(path):
         return About(path)
     tables = read_tables(path)
     if unknown := sorted(set(tables) - {"scene", "notes", "marks"}):
@@ -87,26 +102,7 @@ def about_of(recording: Path) -> About:
 
 
 def remember_scene(recording: Path, own: Mapping[str, Any] | None, used: Scene) -> Path | None:
-    """Note the scene used with a recording next to it, so that the next command uses the scene too.
-
-    Parameters
-    ----------
-    recording : Path
-    own : mapping or None
-        The scene that the recording or the notes next to it state already.
-    used : Scene
-        The scene that was used.
-
-    Returns
-    -------
-    Path or None
-        Path of the notes; None if that scene is stated already.
-
-    Raises
-    ------
-    storage.errors.WriteFailed
-        If the notes cannot be written.
-    """
+    """Note a scene next to its recording for later commands; return the file, or None if it is ``own`` already."""
     if used.to_mapping() == Scene.from_mapping(own or {}, where=str(recording)).to_mapping():
         return None
     return write_about(about_of(recording).with_more(used, (), ()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
@@ -11,19 +11,21 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, ProgramError, internal_error
 from springmass.runs.about import about_of
-from springmass.runs.how import How
+from springmass.runs.options import HOW, How
 from springmass.runs.run import Run
+from springmass.runs.scenes import Amendments, amended
 from storage.errors import StorageError
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A recording to analyse, under a name."""
+    """A recording to analyse, under a name; ``values`` replace those of its scene."""
 
     path: str
     name: str
     scene: Scene | None = None
-    how: How = field(default_factory=How)
+    how: How = HOW
+    values: Amendments = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,8 @@ def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
     for task in tasks:
         try:
             run = Run.of(task.path, task.scene, task.how, task.name)
+            if task.values:
+                run = replace(run, stated=amended(run.scene, task.values, where="the command line"))
             _ = run.analysis
             yield run
         except NeedsAnswer as error:
@@ -69,3 +73,4 @@ def law_line(run: Run, scene_file: str | Path | None) -> str:
         noted = about_of(run.loaded.path)
         scene_file = run.loaded.path if noted.scene is None else noted.path
     return f"damping law {law}: stated in {scene_file}"
+

@@ -71,17 +71,20 @@ def _stated(source: Any, about: Mapping[str, Any], samples: Block) -> Loaded | N
     path = Path(getattr(source, "encoding", {}).get("source", ""))
     if ABOUT in about:
         known = json.loads(about[ABOUT])
-        known |= {"info": SourceInfo(**known["info"]), "traps": tuple(Trap(**trap) for trap in known["traps"])}
-        loaded = Loaded(**known | {"path": Path(known["path"])}, samples=samples, track=Track.from_arrays([0, 1], [0, 0]))
-    elif path.is_file() and kind_of(path) == "run":
+        info, traps = SourceInfo(**known.pop("info")), tuple(Trap(**trap) for trap in known.pop("traps"))
+        path = Path(known.pop("path"))
+        return Loaded(path, info=info, traps=traps, samples=samples, track=_track(samples, info, known), **known)
+    if path.is_file() and kind_of(path) == "run":
         loaded = load(path)
         # Samples at the same times have the same velocities and times of arrival.
         if len(samples) == len(loaded.samples):
             samples = replace(samples, velocity=loaded.samples.velocity, host_ns=loaded.samples.host_ns)
-    else:
-        return None
-    track = to_track(samples, loaded.info, recorded_format=loaded.recorded_format, provenance=loaded.provenance)
-    return replace(loaded, samples=samples, track=track)
+        return replace(loaded, samples=samples, track=_track(samples, loaded.info, vars(loaded)))
+    return None
+
+
+def _track(samples: Block, info: SourceInfo, known: Mapping[str, Any]) -> Track:
+    return to_track(samples, info, recorded_format=known["recorded_format"], provenance=known["provenance"])
 
 
 def about_json(loaded: Loaded, scene: Mapping[str, Any]) -> str:

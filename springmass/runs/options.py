@@ -1,15 +1,19 @@
-"""The options for reading a recording, declared once for the command line, courses, the page and Python."""
+"""How a recording is read and analysed, declared once for the command line, courses, the page and Python."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Self
+from types import EllipsisType
+from typing import Annotated, Any, Literal, Self
 
 from cyclopts import Group, Parameter
 
-from springmass.values import Finite, PartsPerMillion, Positive
+from pipeline.damping.laws import LAWS, Law, find_law
+from pipeline.errors import AnalysisError
+from pipeline.options import ANY_LAW, Options, options_for
+from springmass.values import Finite, LawName, PartsPerMillion, Positive
 
 HOW_READ = Group("How the recording is read", sort_key=2)
 
@@ -92,3 +96,73 @@ class ReadOptions:
 
 READ = ReadOptions()
 """No option given: only the file's own statements are used."""
+
+Accuracy = Literal["fast", "standard", "best"]
+_OPTIONS = Group("Options", sort_key=1)
+
+
+@Parameter(name="*", group=HOW_READ)
+@dataclass(frozen=True, kw_only=True)
+class How(ReadOptions):
+    """The options of reading, and those of the analysis: its accuracy, and what is known about the damping law.
+
+    ``law`` is the law that the results follow, "any" to let the recording choose whatever the scene states; ``laws``
+    are those to try. With ``method`` "classic" the lab report's own method is applied as well.
+    """
+
+    accuracy: Annotated[
+        Accuracy,
+        Parameter(metavar="TIER", group=_OPTIONS, help="how much time to spend on accuracy (default: standard)"),
+    ] = "standard"
+    law: Annotated[
+        LawName | None,
+        Parameter(
+            metavar="NAME",
+            group=_OPTIONS,
+            help="damping law, if known: linear, quadratic ...; any: choose from the data",
+        ),
+    ] = None
+    laws: Annotated[Sequence[str | Law | EllipsisType] | None, Parameter(parse=False)] = None
+    method: Annotated[Literal["classic"] | None, Parameter(parse=False)] = None
+
+    @property
+    def options(self) -> Options:
+        """The options of the pipeline."""
+        chosen = options_for(self.accuracy)
+        if self.laws is not None:
+            chosen = replace(chosen, laws=_laws(self.laws))
+        if self.law is not None:
+            if self.law != ANY_LAW:
+                find_law(self.law)
+            chosen = replace(chosen, stated=self.law)
+        return chosen
+
+    def stated(self) -> dict[str, Any]:
+        """Return every option that is not the default."""
+        return {each.name: value for each in fields(self) if (value := getattr(self, each.name)) != each.default}
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Every option that was given, and the accuracy, as JSON has them."""
+        names = [each.name for each in fields(self) if each.name != "laws"]
+        stated = {name: getattr(self, name) for name in names}
+        laws = None if self.laws is None else [getattr(law, "name", law) for law in _laws(self.laws)]
+        return {**stated, "law": getattr(self.law, "name", self.law), "laws": laws}
+
+
+def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:
+    """Return the requested laws, with ``...`` replaced by all built-in laws that are not named."""
+    if isinstance(wanted, str):
+        raise AnalysisError(f"laws must be a list of names and laws, got the text {wanted!r}")
+    named = [law for law in wanted if not isinstance(law, EllipsisType)]
+    for law in named:
+        find_law(law)
+    others = [name for name in LAWS if name not in named]
+    found: list[str | Law] = []
+    for each in wanted:
+        found += others if isinstance(each, EllipsisType) else [each]
+    return tuple(found)
+
+
+HOW = How()
+"""No option given."""

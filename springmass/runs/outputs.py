@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from acquisition.block import Block
 from springmass import __version__
 from springmass.errors import USAGE, ProgramError
+from springmass.layout import STDIN
 from springmass.runs.loading import Loaded
 from storage.run_file.writing import write_run
+
+if TYPE_CHECKING:
+    from springmass.runs.run import Run
 
 LONGEST_NAME = 255
 
@@ -24,9 +29,14 @@ def distinct_names(paths: Sequence[str]) -> list[str]:
     >>> distinct_names(["a/bob.txt", "b/bob.txt", "disc.h5"])
     ['bob', 'bob-2', 'disc']
     """
+    return numbered([Path(path).stem for path in paths])
+
+
+def numbered(stems: Sequence[str]) -> list[str]:
+    """Return the names in order, with repeated names numbered."""
     counts: dict[str, int] = {}
     names: dict[str, None] = {}
-    for stem in (Path(path).stem for path in paths):
+    for stem in stems:
         count = counts.get(stem, 0) + 1
         while (name := stem if count == 1 else f"{stem}-{count}") in names:
             count += 1
@@ -48,6 +58,22 @@ def in_a_name(name: str, suffix: str) -> str:
         return name + suffix
     digest = hashlib.sha256(whole).hexdigest()[:8]  # keeps names distinct that are identical up to the cut
     return f"{whole[: LONGEST_NAME - len(suffix) - 9].decode(errors='ignore')}-{digest}{suffix}"
+
+
+def results_name(run: Run) -> str:
+    """Return the name of the folder for a run's report.
+
+    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the channel that was chosen
+    follows, because each has its own results.
+    """
+    path, channel = run.loaded.path, run.how.channel
+    name = "stdin" if str(path) == STDIN else path.stem if run.loaded.format in ("run", "wire") else path.name
+    return in_a_name(f"{name}.{safe_name(channel)}" if channel else name, ".results")
+
+
+def safe_name(text: str) -> str:
+    """Return a text of foreign origin as a part of a file's name."""
+    return re.sub(r"[^A-Za-z0-9.+-]+", "_", text).strip("._")[:60]
 
 
 def make_folder(path: str | Path) -> Path:

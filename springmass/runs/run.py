@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,9 +20,9 @@ from springmass.errors import detail
 from springmass.runs.arrays import again, loaded_of
 from springmass.runs.estimates import Value
 from springmass.runs.frames import estimates_frame, run_dataset, samples_dataset
-from springmass.runs.how import How
 from springmass.runs.json_results import result_of, with_traps
 from springmass.runs.loading import Loaded, load, within
+from springmass.runs.options import HOW, How
 from springmass.runs.outputs import now_utc, save_run
 from springmass.runs.scenes import scene_from, stated_keys
 from springmass.runs.showing import html_summary, text_summary
@@ -54,6 +54,8 @@ class Run(Mapping[str, Value]):
         How it was read, and how it is analysed.
     name : str
         Name of the run.
+    time_utc : str
+        Time of the analysis that the result states; empty for the current time.
 
     Examples
     --------
@@ -67,14 +69,15 @@ class Run(Mapping[str, Value]):
 
     loaded: Loaded
     stated: Scene | None = None
-    how: How = field(default_factory=How)
+    how: How = HOW
     name: str = ""
+    time_utc: str = ""
 
     __hash__ = object.__hash__
     __eq__ = object.__eq__
 
     @classmethod
-    def of(cls, source: Any, scene: Any = None, how: How = How(), name: str = "") -> Run:
+    def of(cls, source: Any, scene: Any = None, how: How = HOW, name: str = "") -> Run:
         """Return the run of a path, arrays, or another run; ``scene`` is one, its tables, or the path of its file."""
         if isinstance(source, str | os.PathLike):
             loaded = load(Path(source), how)
@@ -114,7 +117,7 @@ class Run(Mapping[str, Value]):
         """The result as JSON has it: what ``springmass analyse --json`` prints and the report stores."""
         parameters = {**self.how.parameters, "scene": self.scene.to_mapping()}
         accuracy = self.how.method or self.how.accuracy
-        return result_of(self.loaded, self.analysis, self.classic, accuracy, parameters, now_utc())
+        return result_of(self.loaded, self.analysis, self.classic, accuracy, parameters, self.time_utc or now_utc())
 
     @property
     def ok(self) -> bool:
@@ -192,7 +195,7 @@ class Run(Mapping[str, Value]):
         Parameters
         ----------
         chart : str
-            "position", "residual", "spectrum", "amplitude", "frequency", "phase", "energy" or "drag".
+            "position", "amplitude", "frequency", "spectrum", "drag", "energy", "motion" or "phase".
         ax : matplotlib.axes.Axes, optional
 
         Raises
@@ -209,7 +212,9 @@ class Run(Mapping[str, Value]):
         if drawn is None:
             if not isinstance(self.analysis.motion, Oscillation):
                 raise AnalysisError(f"only its position can be drawn, nothing oscillates: {self.analysis.motion.why}")
-            needs = "[bob] mass_kg, [disc] diameter_m and an amplitude that falls" if chart == "drag" else "more periods"
+            needs = (
+                "[bob] mass_kg, [disc] diameter_m and an amplitude that falls" if chart == "drag" else "more periods"
+            )
             raise AnalysisError(f"the chart {chart} needs {needs}; state them in the scene, or record longer")
         if ax is None:
             from matplotlib import pyplot

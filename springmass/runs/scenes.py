@@ -68,17 +68,18 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     try:
         with open_regular(path) as file:
             content = file.read(LONGEST_SCENE + 1) or b""
-        if len(content) > LONGEST_SCENE:
-            raise ProgramError(
-                f"{path}: expected a scene file of at most {LONGEST_SCENE} bytes, got a longer one; "
-                "name the scene, not the recording",
-                USAGE,
-            )
+    except OSError as error:
+        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name", USAGE) from error
+    if len(content) > LONGEST_SCENE:
+        raise ProgramError(
+            f"{path}: expected a scene file of at most {LONGEST_SCENE} bytes, got a longer one; "
+            "name the scene, not the recording",
+            USAGE,
+        )
+    try:
         # On Windows, PowerShell 5 writes `springmass scene > bench.toml` in UTF-16, and editors add a byte order mark.
         utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         return tomllib.loads(content.decode("utf-16" if utf16 else "utf-8-sig"))
-    except OSError as error:
-        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name", USAGE) from error
     # An integer of thousands of digits raises a plain ValueError; thousands of nested brackets, a RecursionError.
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())

@@ -105,7 +105,7 @@ def test_a_damaged_row_is_a_flagged_sample(cli: Cli, write: Write, rows: list[by
     path = write([*rows[:300], b"3.0#0\t1x.500\t0.239", *rows[301:]])
     result = analysed(cli, path)
     assert (result["quality"]["missing"], result["quality"]["malformed_rows"]) == (1, 1)
-    samples = springmass.load(path).samples
+    samples = springmass.load(path).loaded.samples
     assert np.flatnonzero(samples.flags).tolist() == [300]
     assert np.isnan(samples.distance[300])
     assert samples.flags[300] == Flag.MISSING | Flag.MALFORMED
@@ -119,7 +119,7 @@ def test_a_truncated_last_row_is_never_a_value(cli: Cli, write: Write, rows: lis
     assert (result["quality"]["missing"], result["quality"]["malformed_rows"]) == (1, 1)
     assert result["input"]["samples"] == len(rows)
     assert "truncated_row" in {f["code"] for f in result["findings"]}
-    assert np.isnan(springmass.load(path).samples.distance[-1])
+    assert np.isnan(springmass.load(path).loaded.samples.distance[-1])
 
 
 def test_a_last_row_cut_inside_its_time_is_left_out_and_told(cli: Cli, write: Write, rows: list[bytes]) -> None:

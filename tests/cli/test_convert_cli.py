@@ -12,6 +12,9 @@ import pytest
 import springmass
 from acquisition.block import Block
 from acquisition.recordings.recording import Original
+from springmass.runs.scenes import read_scene
+from storage.run_file.reading import open_run
+from storage.run_file.writing import write_run
 
 Cli = Callable[..., Any]
 
@@ -30,9 +33,9 @@ def test_the_original_comes_back_bit_for_bit(cli: Cli, data: Path, tmp_path: Pat
     assert done.complaint.startswith(f"{run}: ")
     assert cli("convert", run, back).code == 0
     assert back.read_bytes() == old.read_bytes()
-    with springmass.open_run(run) as file:
+    with open_run(run) as file:
         file.verify()
-        assert same_samples(file.samples(), springmass.load(old).samples)
+        assert same_samples(file.samples(), springmass.load(old).loaded.samples)
         assert (file.format, file.info.kind) == ("motion-sensor", "simulated")
 
 
@@ -45,7 +48,7 @@ def test_a_pair_comes_back_into_a_folder(cli: Cli, data: Path, tmp_path: Path) -
     assert cli("convert", run, folder).code == 0
     assert sorted(path.name for path in folder.iterdir()) == names
     assert all((folder / name).read_bytes() == (data / name).read_bytes() for name in names)
-    with springmass.open_run(run) as file:
+    with open_run(run) as file:
         velocity = file.samples().velocity
     assert velocity is not None
     assert np.isfinite(velocity).sum() > 900
@@ -53,10 +56,8 @@ def test_a_pair_comes_back_into_a_folder(cli: Cli, data: Path, tmp_path: Path) -
 
 def test_an_original_chooses_no_folder(cli: Cli, recording: Path, tmp_path: Path) -> None:
     """A name from outside that climbs out of the folder keeps its last part alone."""
-    loaded = springmass.load(recording)
-    run = springmass.write_run(
-        tmp_path / "run.h5", [loaded.samples], loaded.info, originals=[Original("../../escaped.txt", b"x")]
-    )
+    loaded = springmass.load(recording).loaded
+    run = write_run(tmp_path / "run.h5", [loaded.samples], loaded.info, originals=[Original("../../escaped.txt", b"x")])
     folder = tmp_path / "deep" / "back"
     folder.mkdir(parents=True)
     assert cli("convert", run, folder).code == 0
@@ -83,8 +84,8 @@ def test_nothing_is_overwritten_unasked(cli: Cli, recording: Path, tmp_path: Pat
 def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp_path: Path) -> None:
     """A scene put in, samples, originals, traps, family and origin survive the way through a second run file."""
     first, second = tmp_path / "first.h5", tmp_path / "second.h5"
-    old = springmass.load(data / "undamped_simulated_position.txt")
-    springmass.write_run(
+    old = springmass.load(data / "undamped_simulated_position.txt").loaded
+    write_run(
         first,
         [old.samples],
         old.info,
@@ -95,21 +96,21 @@ def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp
         provenance={"start_time": "2024-03-12T14:05:00Z", "configuration": {"gain": 2}},
     )
     assert cli("convert", first, second, "--scene", data / "undamped.scene.toml").code == 0
-    with springmass.open_run(first) as a, springmass.open_run(second) as b:
+    with open_run(first) as a, open_run(second) as b:
         assert same_samples(a.samples(), b.samples())
         assert (a.info, a.title, a.traps, a.format) == (b.info, b.title, b.traps, b.format)
         assert a.originals() == b.originals()
         assert dict(b.provenance) | dict(a.provenance) == b.provenance
-        assert b.scene == springmass.read_scene(data / "undamped.scene.toml").to_mapping()
+        assert b.scene == read_scene(data / "undamped.scene.toml").to_mapping()
 
 
 @pytest.mark.parametrize("suffix", [".txt", ".csv"])
 def test_what_is_written_in_another_form_reads_back(cli: Cli, data: Path, tmp_path: Path, suffix: str) -> None:
     """Times, distances, rate, quantum and kind survive the way through MotionSensor.vi and CSV."""
     recording, out = data / "sixty_hz_simulated_position.txt", tmp_path / f"back{suffix}"
-    old = springmass.load(recording)
+    old = springmass.load(recording).loaded
     assert cli("convert", recording, out).code == 0
-    new = springmass.load(out)
+    new = springmass.load(out).loaded
     np.testing.assert_allclose(new.samples.t, old.samples.t, atol=1e-12)
     np.testing.assert_allclose(new.samples.distance, old.samples.distance, atol=1e-12)
     assert (new.info.rate_hz, new.info.kind, new.info.clock) == (old.info.rate_hz, "simulated", "nominal")
@@ -119,7 +120,7 @@ def test_what_is_written_in_another_form_reads_back(cli: Cli, data: Path, tmp_pa
 def test_a_pair_written_is_a_pair_read(cli: Cli, data: Path, tmp_path: Path) -> None:
     """Position and velocity files join again, and each velocity is the difference of its positions."""
     assert cli("convert", data / "undamped_simulated_position.txt", tmp_path / "run_position.txt").code == 0
-    pair = springmass.load(tmp_path / "run_position.txt", velocity=tmp_path / "run_velocity.txt")
+    pair = springmass.load(tmp_path / "run_position.txt", velocity=tmp_path / "run_velocity.txt").loaded
     assert "pair_mismatch" not in {trap.code for trap in pair.traps}
     assert pair.samples.velocity is not None
     expected = np.diff(pair.samples.distance) * 100
@@ -137,13 +138,13 @@ def test_what_a_form_has_no_room_for_is_told(cli: Cli, write: Any, rows: list[by
     assert done.code == 3
     assert not (tmp_path / "b.txt").exists()
     assert cli("convert", fast, tmp_path / "b.csv").code == 0
-    assert springmass.load(tmp_path / "b.csv").info.rate_hz == 10_000.0
+    assert springmass.load(tmp_path / "b.csv").loaded.info.rate_hz == 10_000.0
 
 
 def test_an_empty_run_is_converted_too(cli: Cli, tmp_path: Path, recording: Path) -> None:
     """A run stopped before its first sample still gives back what travels inside; only analysing it fails."""
-    info = springmass.load(recording).info
-    run = springmass.write_run(tmp_path / "run.h5", [], info, originals=[Original("a.txt", b"header\n")])
+    info = springmass.load(recording).loaded.info
+    run = write_run(tmp_path / "run.h5", [], info, originals=[Original("a.txt", b"header\n")])
     assert cli("convert", run, tmp_path / "back.txt").code == 0
     assert (tmp_path / "back.txt").read_bytes() == b"header\n"
     assert cli("formats", run).code == 0
@@ -154,11 +155,11 @@ def test_an_empty_run_is_converted_too(cli: Cli, tmp_path: Path, recording: Path
 
 def test_an_angle_goes_into_run_files_only(cli: Cli, recording: Path, tmp_path: Path) -> None:
     """It comes from one run file into another with its unit; a form that prints metres refuses it."""
-    info = springmass.load(recording).info
+    info = springmass.load(recording).loaded.info
     angle = Block(0, np.arange(8) / 100, np.zeros(8), np.zeros(8, np.uint8), quantity="angle", unit="rad")
-    run = springmass.write_run(tmp_path / "run.h5", [angle], info)
+    run = write_run(tmp_path / "run.h5", [angle], info)
     assert cli("convert", run, tmp_path / "again.h5").code == 0
-    assert springmass.load(tmp_path / "again.h5").samples.unit == "rad"
+    assert springmass.load(tmp_path / "again.h5").loaded.samples.unit == "rad"
     done = cli("convert", run, tmp_path / "angle.csv")
     assert done.code == 2
     assert not (tmp_path / "angle.csv").exists()

@@ -10,6 +10,7 @@ from typing import Any
 import springmass
 from acquisition.clock import VirtualClock
 from storage.recorder import Recorder
+from storage.run_file.reading import open_run
 from storage.wire_log.records import LogHeader, SensorEntry
 
 Cli = Callable[..., Any]
@@ -40,7 +41,7 @@ def test_a_recording_is_described(cli: Cli, data: Path) -> None:
         "60",
         "nominal",
     )
-    loaded = springmass.load(data / "sixty_hz_simulated_position.txt")
+    loaded = springmass.load(data / "sixty_hz_simulated_position.txt").loaded
     assert facts["samples"] == str(len(loaded.samples))
     (exact,) = cli("formats", "--json", data / "sixty_hz_simulated_position.txt").results
     assert (exact["to_s"], exact["quantum_m"]) == (float(loaded.samples.t[-1]), loaded.info.quantum_m)
@@ -55,7 +56,7 @@ def test_a_wire_log_is_an_input(cli: Cli, data: Path, tmp_path: Path) -> None:
     facts = facts_of(cli("formats", log).out)
     assert (facts["format"], facts["kind"], facts["samples"]) == ("wire", "live", "200")
     assert cli("convert", log, tmp_path / "run.h5").code == 0
-    with springmass.open_run(tmp_path / "run.h5") as run:
+    with open_run(tmp_path / "run.h5") as run:
         assert run.originals()[0].data == before == log.read_bytes()
         assert len(run.samples()) == 200
     assert cli("formats", log, "--rate-hz", "100").code == 2

@@ -70,7 +70,7 @@ def test_its_law_and_its_integrator_run(installed: Path, monkeypatch: pytest.Mon
     y = 0.2 + bench_extras.THREE_HALVES.curve(t, np.array([0.05, 0.2]))[0] * np.cos(8 * t)
     y += 1e-4 * np.random.default_rng(1).standard_normal(t.size)
     found = springmass.analyse((t, y), laws=[..., bench_extras.THREE_HALVES])
-    assert found.motion.damping.selected == "three-halves"
+    assert found.law == "three-halves"
     problem = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073), 0.05)
     exact = get_integrator("strang").run(problem, 0.001, 1000)
     assert 0.0 < np.max(np.abs(bench_extras.MIDPOINT.run(problem, 0.001, 1000).y - exact.y)) < 1e-5

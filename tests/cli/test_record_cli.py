@@ -78,7 +78,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_simulated_run_becomes_a_run_file_with_its_truth(recorded: Path) -> None:
     """Samples at 100 Hz, none lost, labelled simulated, with the frequency of the scene."""
-    loaded = load(recorded)
+    loaded = load(recorded).loaded
     assert loaded.info.kind == "simulated"
     assert loaded.info.clock == "device"
     assert len(loaded.samples) >= 100
@@ -107,7 +107,7 @@ def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Callable, tmp
     assert cli("convert", recorded, tmp_path / "run.wire").code == 0
     done = cli("recover", tmp_path / "run.wire", "-o", tmp_path / "warm.h5", "--speed-of-sound", "350")
     assert done.code == 0, done.err
-    first, second = load(recorded).samples, load(tmp_path / "warm.h5").samples
+    first, second = load(recorded).loaded.samples, load(tmp_path / "warm.h5").loaded.samples
     np.testing.assert_allclose(second.distance, first.distance * 350 / 344, rtol=1e-12)
 
 
@@ -161,7 +161,7 @@ def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
         )
     assert done.code == 0, done.err
     for channel, family in enumerate(("line-protocol", "ffhls")):
-        loaded = load(tmp_path / f"run.{channel}.h5")
+        loaded = load(tmp_path / f"run.{channel}.h5").loaded
         assert len(loaded.samples) >= 20, family  # a hundred where the machine has time
         assert np.nanmin(loaded.samples.distance) > 0.3
 
@@ -262,7 +262,7 @@ def test_two_distances_by_the_ruler_set_offset_and_scale(
     monkeypatch.setattr(sys, "stdin", hands)
     done = rulered(cli, tmp_path, hands, "0.2", "0.6")
     assert done.code == 0, done.err
-    np.testing.assert_allclose(load(tmp_path / "run.h5").samples.distance[-10:], 0.4, atol=0.002)
+    np.testing.assert_allclose(load(tmp_path / "run.h5").loaded.samples.distance[-10:], 0.4, atol=0.002)
 
 
 def test_several_distances_need_somebody_who_presses_enter(
@@ -283,10 +283,10 @@ def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable,
         *("--seconds", "1", "-o", tmp_path / "run.h5"),
     )
     assert done.code == 0, done.err
-    distance = load(tmp_path / "run.h5").samples.distance
+    distance = load(tmp_path / "run.h5").loaded.samples.distance
     np.testing.assert_allclose(distance[:10], 0.26, atol=0.002)
     assert distance.max() > 0.3
-    loaded = load(tmp_path / "run.h5")
+    loaded = load(tmp_path / "run.h5").loaded
     assert loaded.track.trigger_s is not None
     # The moment is the host's stamp of that sample, which a busy machine gives late.
     samples = loaded.samples
@@ -408,7 +408,7 @@ def test_lines_of_a_sketch_are_recorded(
             asked = capfd.readouterr().err
             options = re.findall(r"--option (\w+=\w+)", asked)
         assert main([*typed, *(word for option in options for word in ("--option", option))]) == 0
-    loaded = load(tmp_path / "r.h5")
+    loaded = load(tmp_path / "r.h5").loaded
     assert loaded.info.quantum_m == pytest.approx(step_m)
     result = analyse(tmp_path / "r.h5")
     assert abs(result["angular_frequency"].value - OMEGA) < 5.0 * result["angular_frequency"].u

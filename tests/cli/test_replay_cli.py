@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 
 import springmass
+from storage.run_file.reading import open_run
 
 Cli = Callable[..., Any]
 
 
 def test_the_samples_are_those_of_the_recording(cli: Cli, recording: Path, tmp_path: Path) -> None:
     """In a run file bit for bit, and a line each on stdout; nothing is overwritten."""
-    block = springmass.load(recording).samples
+    block = springmass.load(recording).loaded.samples
     out = tmp_path / "run.h5"
     assert cli("replay", recording, "--speed", "max", "-o", out).code == 0
-    with springmass.open_run(out) as run:
+    with open_run(out) as run:
         again, kind = run.samples(), run.info.kind
     assert (again.t.tobytes(), again.distance.tobytes()) == (block.t.tobytes(), block.distance.tobytes())
     assert kind == "replay"

@@ -89,7 +89,7 @@ def test_what_is_noted_beside_a_recording_is_used_and_said(cli: Cli, run: Path, 
     first = cli("scene", run, "--scene", data / "damped.scene.toml", "--mark", '12.5=touched "it"', "--note", "by hand")
     assert first.code == 0
     assert cli("scene", run, "--mark", "3=door").code == 0
-    beside = run.with_name("damped.about.toml")
+    beside = run.with_name("damped.txt.about.toml")
     assert [mark["t_s"] for mark in tomllib.loads(beside.read_text())["marks"]] == [3.0, 12.5]
     done = cli("analyse", run, "--json")
     assert str(beside) in done.complaint
@@ -102,17 +102,20 @@ def test_what_is_noted_beside_a_recording_is_used_and_said(cli: Cli, run: Path, 
     assert run.read_bytes() == before
 
 
-def test_scenes_of_several_are_remembered_and_the_bundled_recordings_left_alone(
-    cli: Cli, data: Path, tmp_path: Path
-) -> None:
-    """A given scene is saved next to each recording, not with --no-report and not next to bundled recordings."""
-    for name in ("a.txt", "b.txt", "damped_simulated_position.txt"):
+def test_scenes_are_saved_on_request_under_the_whole_name(cli: Cli, data: Path, tmp_path: Path) -> None:
+    """Nothing is saved unasked; ``a.txt`` and ``a.csv`` have their own, and one of 0.2 is read where it is alone."""
+    for name in ("a.txt", "b.txt"):
         (tmp_path / name).write_bytes((data / "damped_simulated_position.txt").read_bytes())
     runs = sorted(tmp_path.glob("*.txt"))
-    cli("analyse", *runs, "--scene", data / "damped.scene.toml", "--no-report")
+    scene = ("--scene", data / "damped.scene.toml", "--accuracy", "fast")
+    cli("analyse", *runs, *scene, "--output", tmp_path / "out")
     assert not list(tmp_path.glob("*.about.toml"))
-    cli("analyse", *runs, "--scene", data / "damped.scene.toml", "--accuracy", "fast", "--output", tmp_path / "out")
-    assert sorted(path.name for path in tmp_path.glob("*.about.toml")) == ["a.about.toml", "b.about.toml"]
+    cli("analyse", *runs, *scene, "--no-report", "--save-scene")
+    assert sorted(path.name for path in tmp_path.glob("*.about.toml")) == ["a.txt.about.toml", "b.txt.about.toml"]
+    (tmp_path / "a.txt.about.toml").rename(tmp_path / "a.about.toml")
+    assert "spring_constant" in cli("analyse", tmp_path / "a.txt", "--json").results[0]["estimates"]
+    (tmp_path / "a.csv").write_text("t (s),x (m)\n0,1\n0.1,2\n")
+    assert "spring_constant" not in cli("analyse", tmp_path / "a.txt", "--json").results[0]["estimates"]
 
 
 @pytest.mark.parametrize(
@@ -120,7 +123,7 @@ def test_scenes_of_several_are_remembered_and_the_bundled_recordings_left_alone(
 )
 def test_notes_that_cannot_be_read_are_refused(cli: Cli, run: Path, text: str) -> None:
     """One line that names the file; nothing is guessed from half of it."""
-    beside = run.with_name("damped.about.toml")
+    beside = run.with_name("damped.txt.about.toml")
     beside.write_text(text)
     done = cli("analyse", run, "--json")
     assert done.code == 2

@@ -15,7 +15,6 @@ from acquisition.source import SourceInfo
 from pipeline.dynamics import Equation, Problem, get_integrator
 from springmass import analyse, load
 from springmass.charts.chart import decoded
-from springmass.runs.scenes import read_scene
 from storage.run_file.writing import write_run
 
 LINEAR = """
@@ -62,9 +61,9 @@ def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Callable, 
     run = tmp_path / "run.h5"
     arguments = ("simulate", "--scene", scene, "--seconds", "20", "-o", run, "--noise-m", "2e-4", "--echoes", "0")
     assert cli(*arguments).code == 0
-    loaded = load(run)
+    loaded = load(run).loaded
     assert loaded.info.kind == "simulated"
-    found = analyse(loaded.track, read_scene(scene))
+    found = analyse(run, scene)
     assert found["noise"].value == pytest.approx(2e-4, rel=0.1)
     assert abs(found["spring_constant"].value - 20.0) < 4.0 * found["spring_constant"].u
     assert cli(*arguments).code == 2
@@ -166,7 +165,7 @@ def test_friction_stops_the_simulated_bob(cli: Callable, tmp_path: Path) -> None
     path = tmp_path / "friction.toml"
     path.write_text(LINEAR + "[damping]\nmu_m_per_s = 0.02\n")
     assert cli("simulate", "--scene", path, "--sensor", "ideal", "-o", tmp_path / "run.h5").code == 0
-    assert np.ptp(load(tmp_path / "run.h5").samples.distance[-400:]) == 0.0
+    assert np.ptp(load(tmp_path / "run.h5").loaded.samples.distance[-400:]) == 0.0
 
 
 BENCH = """

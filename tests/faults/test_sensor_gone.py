@@ -71,7 +71,7 @@ def test_a_sensor_that_is_gone_at_the_end_is_said_and_ends_with_4(
 
 def test_strict_rejects_a_run_whose_sensor_was_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A run that is sound but for that: exit code 0, and 5 under --strict."""
-    recording = load(sample_data() / "undamped_simulated_position.txt")
+    recording = load(sample_data() / "undamped_simulated_position.txt").loaded
     out = tmp_path / "run.h5"
     lost = Trap("sensor_lost", "The sensor was gone at the end.")
     write_run(out, [recording.samples], recording.info, traps=[lost])

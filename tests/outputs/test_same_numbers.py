@@ -71,10 +71,10 @@ def compare_all(path: Path, answers: Mapping[str, Any], folder: Path, accuracy: 
     numbers, codes = numbers_of(result["estimates"]), [finding["code"] for finding in result["findings"]]
     assert numbers
 
-    analysis = sm.analyse(path, accuracy=accuracy, **answers)
-    found = {name: (x.value, x.u if math.isfinite(x.u) else None) for name, x in analysis.estimates.items()}
+    analysed = sm.analyse(path, accuracy=accuracy, **answers)
+    found = {name: (x.value, x.u if math.isfinite(x.u) else None) for name, x in analysed.analysis.estimates.items()}
     assert found == numbers
-    assert [finding.code for finding in analysis.findings] == codes
+    assert [finding.code for finding in analysed.findings] == codes
 
     run("analyse", path, "-o", folder, *options)
     (written,) = folder.glob("*.results/results.json")
@@ -98,7 +98,7 @@ def compare_all(path: Path, answers: Mapping[str, Any], folder: Path, accuracy: 
         }
 
     if accuracy == "standard":  # a complete run on the page
-        loaded = sm.load(path, **answers)
+        loaded = sm.load(path, **answers).loaded
         watcher = Watcher(view_of(loaded), loaded.scene, None)
         try:
             message = json.loads(watcher.region(-math.inf, math.inf))
@@ -110,7 +110,7 @@ def compare_all(path: Path, answers: Mapping[str, Any], folder: Path, accuracy: 
         assert {name: shown[name] for name in both} == {name: numbers[name] for name in both}
         grave = [finding["code"] for finding in result["findings"] if finding["severity"] != "info"]
         assert [finding["code"] for finding in message["findings"]] == grave
-        if isinstance(analysis.motion, Oscillation):
+        if isinstance(analysed.analysis.motion, Oscillation):
             assert "period" in both
     return numbers
 

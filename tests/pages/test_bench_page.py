@@ -39,7 +39,7 @@ def test_a_region_of_an_old_run_is_fitted(replay: Page) -> None:
 
 def test_statistics_of_a_selection_are_those_of_its_samples(replay: Page) -> None:
     """Number, mean, standard deviation, least, greatest and the slope of a straight line, by numpy."""
-    samples = springmass.load(OLD_RUN).samples
+    samples = springmass.load(OLD_RUN).loaded.samples
     part = (samples.t >= 10.0) & (samples.t <= 12.5)
     t, y = samples.t[part], samples.distance[part]
     found = replay.evaluate("statistics({ from: 10, to: 12.5 })")
@@ -62,7 +62,7 @@ def test_what_is_in_view_is_saved(replay: Page, tmp_path: Path) -> None:
     download.value.save_as(path)
     with path.open() as file:
         rows = list(csv.reader(file))
-    recorded = springmass.load(OLD_RUN).samples
+    recorded = springmass.load(OLD_RUN).loaded.samples
     assert rows[0] == ["time_s", "distance_m"]
     assert len(rows) == len(recorded) + 1
     np.testing.assert_array_equal([float(row[0]) for row in rows[1:]], recorded.t)

@@ -18,7 +18,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, BrowserContext, Page
 
-from springmass.runs.analysing import load_and_analyse
+from springmass.runs.run import Run
 from tests.pages.bench import FITTED, LIMIT_S, PHASE, SEEN, STAGES, answer, press
 
 WIDTHS = {1366: 768, 768: 1024, 390: 844}
@@ -140,7 +140,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     answer(page)
     assert program.ended() == 0
 
-    analysed = load_and_analyse(program.out)
+    analysed = Run.of(program.out)
     stated = {name: [x.value, x.u] for name, x in analysed.analysis.estimates.items()}
     same = shown.keys() & stated.keys()
     assert {"period", "damping_rate", "noise", "offset", "spring_constant", "quality_factor"} <= same

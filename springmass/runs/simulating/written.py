@@ -18,7 +18,7 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem, Trajectory, effective_mass_kg
 from pipeline.dynamics.band import LEVELS, Band
 from pipeline.track import F8
-from springmass.runs.analysing import in_a_name, made_now, make_folder
+from springmass.runs.outputs import in_a_name, made_now, make_folder
 from springmass.runs.simulating.prepared import Prepared
 from springmass.runs.simulating.readings import plain_block, readings, rest_m
 from springmass.runs.simulating.simulation import FINE, Against, Simulation, count_of, solve

@@ -17,7 +17,8 @@ from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
 from pipeline.options import options_for
 from pipeline.track import Track
-from springmass.runs.analysing import load_and_analyse
+from springmass.runs.options import How
+from springmass.runs.run import Run
 from tests.trials.troubles.record import Kind, Record
 
 __all__ = ["LIMIT", "Given", "Verdict", "clean_seconds", "try_one"]
@@ -140,7 +141,7 @@ def _analysed(record: Record, tier: str) -> tuple[Analysis, tuple[Finding, ...]]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial_position.txt"
         path.write_bytes(record.text)
-        found = load_and_analyse(path, scene=scene, accuracy=tier).analysis
+        found = Run.of(path, scene, How(accuracy=tier)).analysis
         return found, found.findings
 
 

@@ -11,7 +11,6 @@ import pytest
 import xarray as xr
 
 import springmass as sm
-from pipeline.analyse import Analysis as Found
 from pipeline.errors import AnalysisError, TrackError
 from springmass.errors import ProgramError
 
@@ -27,21 +26,18 @@ def record(gamma: float = 0.05) -> tuple[Any, Any]:
 def damped_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a run file of the damped recording with its scene inside."""
     data = sm.sample_data()
-    loaded = sm.load(data / "damped_simulated_position.txt")
-    scene = sm.read_scene(data / "damped.scene.toml").to_mapping()
-    path = tmp_path_factory.mktemp("runs") / "damped.h5"
-    return sm.write_run(path, [loaded.samples], loaded.info, scene=scene)
+    run = sm.load(data / "damped_simulated_position.txt", data / "damped.scene.toml")
+    return run.save(tmp_path_factory.mktemp("runs") / "damped.h5")
 
 
 def test_every_way_to_hand_over_arrays_gives_the_same_numbers() -> None:
     """A pair, a track, a dataset, a data array, a frame, a series and a mapping, by name or by index."""
     t, y = record()
-    expected = sm.analyse(sm.Track.from_arrays(t, y)).estimates
+    expected = sm.analyse((t, y)).analysis.estimates
     frame = pd.DataFrame({"time": t, "distance": y})
     array = xr.DataArray(y, {"time": t}, ["time"], attrs={"units": "m"})
     elapsed = pd.to_timedelta(t, unit="s")
     for source in (
-        (t, y),
         [t.tolist(), y.tolist()],
         {"time": t, "distance": y},
         frame,
@@ -50,7 +46,7 @@ def test_every_way_to_hand_over_arrays_gives_the_same_numbers() -> None:
         array,
         xr.Dataset({"distance": array}),
     ):
-        assert sm.analyse(source).estimates == expected
+        assert sm.analyse(source).analysis.estimates == expected
     for source in (pd.Series(y, elapsed), pd.Series(y, pd.Timestamp("2026-11-22") + elapsed)):
         found = sm.analyse(source)["period"]
         assert abs(found.value - expected["period"].value) < 1e-6 * found.value
@@ -70,9 +66,8 @@ def test_a_path_brings_what_its_reader_saw() -> None:
     found = sm.analyse(path, scene=data / "damped.scene.toml")
     assert "stated_error_is_not_noise" in {finding.code for finding in found.findings}
     assert found.name == path.name
-    again = sm.analyse(sm.load(path), sm.read_scene(data / "damped.scene.toml"))
-    assert again.estimates == found.estimates
-    assert isinstance(again, Found)
+    again = sm.analyse(sm.load(path), data / "damped.scene.toml")
+    assert again.analysis.estimates == found.analysis.estimates
 
 
 def test_the_scene_is_given_or_beside_the_file_or_in_it(damped_run: Path, tmp_path: Path) -> None:
@@ -97,9 +92,9 @@ def test_laws_are_chosen_by_name_or_given() -> None:
         return A0 * np.exp(-c * t)
 
     law = sm.make_law("mine", mine, {"c": (0, -1)}, sm.LAWS["linear"].guess)
-    assert list(sm.analyse((t, y), laws=["linear", "none"]).motion.damping.fits) == ["linear", "none"]
+    assert list(sm.analyse((t, y), laws=["linear", "none"]).analysis.motion.damping.fits) == ["linear", "none"]
     found = sm.analyse((t, y), laws=["linear", ..., law])
-    assert set(found.motion.damping.fits) == {*sm.LAWS, "mine"}
+    assert set(found.analysis.motion.damping.fits) == {*sm.LAWS, "mine"}
     assert found["mine.c"].value == pytest.approx(found["linear.gamma"].value, rel=1e-5)
     with pytest.raises(AnalysisError, match="got 'cubic'"):
         sm.analyse((t, y), laws=["cubic"])
@@ -111,13 +106,14 @@ def test_range_accuracy_and_options_go_by_name() -> None:
     """Seconds, tiers and options, and what is unknown lists what there is."""
     t, y = record()
     part = sm.analyse((t, y), from_s=5.0, to_s=12.0)
-    assert (part.track.t[0], part.track.t[-1]) == (5.0, 12.0)
-    assert sm.analyse((t, y), accuracy="best").options.rows == "samples"
-    assert not sm.analyse((t, y), options=sm.Options(modes=False)).options.modes
+    assert (part.analysis.track.t[0], part.analysis.track.t[-1]) == (5.0, 12.0)
+    assert sm.analyse((t, y), accuracy="best").how.options.rows == "samples"
     with pytest.raises(ProgramError, match="50"):
         sm.analyse((t, y), from_s=50.0)
     with pytest.raises(AnalysisError, match="accuracy"):
-        sm.analyse((t, y), options=sm.Options(), accuracy="fast")
+        sm.analyse((t, y), accuracy="quick")  # type: ignore[arg-type]
+    with pytest.raises(TrackError, match="channel"):
+        sm.analyse(sm.load((t, y)), channel="x")
     with pytest.raises(TrackError, match="channel"):
         sm.analyse((t, y), channel="x")
 
@@ -125,7 +121,7 @@ def test_range_accuracy_and_options_go_by_name() -> None:
 def test_runs_are_compared(damped_run: Path) -> None:
     """Paths and analyses together, with a scene for each or their own."""
     data = sm.sample_data()
-    scene = sm.read_scene(data / "undamped.scene.toml")
+    scene = data / "undamped.scene.toml"
     undamped = sm.analyse(data / "undamped_simulated_position.txt", scene)
     found = sm.compare([undamped, damped_run])
     frame = found.to_dataframe()
@@ -135,8 +131,8 @@ def test_runs_are_compared(damped_run: Path) -> None:
     assert frame.loc["damped", "period"] == found.runs["damped"]["period"].value
     assert "agree on k = 14.00" in repr(found)
     heavier = {"bob": {"mass_kg": 0.3}, "spring": {"mass_kg": {"value": 0.01, "u": 0.0005}}}
-    other = sm.compare([undamped, undamped.track], [None, heavier])
-    assert list(other.runs) == ["undamped_simulated_position", "run"]
+    other = sm.compare([undamped, undamped.dataset()], [None, heavier])
+    assert list(other.runs) == ["undamped_simulated_position", "undamped_simulated_position-2"]
     assert not other.comparison.agree
     assert np.isnan(other.to_dataframe().loc["together", "spring_constant"])
     with pytest.raises(AnalysisError, match="got 1"):

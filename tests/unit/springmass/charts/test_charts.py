@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import springmass as sm
-from pipeline.analyse import Oscillation
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import CYCLES, classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import F8
@@ -43,26 +43,26 @@ class Drawn:
 
 
 @pytest.fixture(scope="module")
-def damped() -> sm.Analysis:
+def damped() -> Analysis:
     """Two minutes of a damped bob with false echoes in a known scene."""
-    return sm.analyse(DATA / "damped_simulated_position.txt", scene=DATA / "damped.scene.toml")
+    return sm.analyse(DATA / "damped_simulated_position.txt", scene=DATA / "damped.scene.toml").analysis
 
 
 @pytest.fixture(scope="module")
-def motion(damped: sm.Analysis) -> Oscillation:
+def motion(damped: Analysis) -> Oscillation:
     """Its motion."""
     assert isinstance(damped.motion, Oscillation)
     return damped.motion
 
 
 @pytest.fixture(scope="module")
-def charts(damped: sm.Analysis) -> dict[str, Drawn]:
+def charts(damped: Analysis) -> dict[str, Drawn]:
     """Its charts."""
     made = charts_of(damped, [Note(2.0, "door", "mark")], classic(damped.track, damped.scene))
     return {name: Drawn(chart) for name, chart in made.items()}
 
 
-def test_position(charts: dict[str, Drawn], damped: sm.Analysis, motion: Oscillation) -> None:
+def test_position(charts: dict[str, Drawn], damped: Analysis, motion: Oscillation) -> None:
     """Samples, those left out with their reasons, marks, fit and residuals over the noise."""
     t, y = charts["position"].xy("samples used")
     np.testing.assert_allclose(t, damped.track.t, atol=1e-6)
@@ -78,14 +78,14 @@ def test_position(charts: dict[str, Drawn], damped: sm.Analysis, motion: Oscilla
     np.testing.assert_allclose(np.interp(t[used], x, fit), 1e3 * motion.waveform.position[used], atol=1.0)
     _, residual = charts["position"].xy("residual", 1)
     assert np.nanstd(residual) == pytest.approx(1.0, abs=0.1)
-    expected = (damped.track.y - motion.waveform.position) / damped["noise"].value
+    expected = (damped.track.y - motion.waveform.position) / damped.estimates["noise"].value
     np.testing.assert_allclose(residual[used], expected[used], atol=1e-3)
 
 
-def test_amplitude(charts: dict[str, Drawn], damped: sm.Analysis, motion: Oscillation) -> None:
+def test_amplitude(charts: dict[str, Drawn], damped: Analysis, motion: Oscillation) -> None:
     """The selected law begins at the amplitude of Table 1; every law that was fitted is a curve."""
     x, law = charts["amplitude"].xy(motion.damping.selected)
-    assert law[0] == pytest.approx(1e3 * damped["amplitude"].value, rel=1e-5)
+    assert law[0] == pytest.approx(1e3 * damped.estimates["amplitude"].value, rel=1e-5)
     assert x[0] == pytest.approx(motion.damping.t0)
     curves = [s for s in charts["amplitude"].json["panels"][0]["series"] if s["line"]]
     assert len(curves) == len(motion.damping.fits)
@@ -102,52 +102,52 @@ def test_amplitude(charts: dict[str, Drawn], damped: sm.Analysis, motion: Oscill
     assert np.mean(residual**2) == pytest.approx(motion.damping.best.reduced_chi2, rel=0.3)
 
 
-def test_frequency_and_spectrum(charts: dict[str, Drawn], damped: sm.Analysis) -> None:
+def test_frequency_and_spectrum(charts: dict[str, Drawn], damped: Analysis) -> None:
     """The frequency of the stretches is that of Table 1, and the highest peak stands there."""
     _, shift = charts["frequency"].xy("a stretch of the run")
     u = decoded(charts["frequency"].series("a stretch of the run")["u"])
     assert abs(np.average(shift, weights=u**-2.0)) < 4.0 * np.sum(u**-2.0) ** -0.5
     f, whole = charts["spectrum"].xy("recording")
-    assert f[np.argmax(whole)] == pytest.approx(damped["frequency"].value, abs=1.0 / 120.0)
+    assert f[np.argmax(whole)] == pytest.approx(damped.estimates["frequency"].value, abs=1.0 / 120.0)
     peaks, _ = charts["spectrum"].xy("peaks")
-    assert peaks[0] == pytest.approx(damped["frequency"].value, abs=1.0 / 120.0)
+    assert peaks[0] == pytest.approx(damped.estimates["frequency"].value, abs=1.0 / 120.0)
 
 
-def test_drag_and_energy(charts: dict[str, Drawn], damped: sm.Analysis) -> None:
+def test_drag_and_energy(charts: dict[str, Drawn], damped: Analysis) -> None:
     """The energy begins at k A²/2, kinetic and potential are half of it each; the drag is above its quadratic part."""
-    start = 0.5e3 * damped["spring_constant"].value * damped["amplitude"].value ** 2
+    start = 0.5e3 * damped.estimates["spring_constant"].value * damped.estimates["amplitude"].value ** 2
     t, law = charts["energy"].xy("law")
     assert law[0] == pytest.approx(start, rel=1e-3)
     for part in ("kinetic", "potential"):
         at, mean = charts["energy"].xy(part)
         np.testing.assert_allclose(mean, 0.5 * np.interp(at, t, law), rtol=0.02)
     _, drag = charts["drag"].xy("law")
-    assert drag.min() > damped["drag_coefficient"].value
+    assert drag.min() > damped.estimates["drag_coefficient"].value
 
 
-def test_motion_and_phase(charts: dict[str, Drawn], damped: sm.Analysis) -> None:
+def test_motion_and_phase(charts: dict[str, Drawn], damped: Analysis) -> None:
     """Velocity and acceleration follow from amplitude and angular frequency; the phase plot is an ellipse of ω."""
-    omega, size = damped["angular_frequency"].value, damped["amplitude"].value
+    omega, size = damped.estimates["angular_frequency"].value, damped.estimates["amplitude"].value
     _, velocity = charts["motion"].xy("velocity")
-    assert np.sqrt(np.mean(velocity**2)) == pytest.approx(damped["velocity_rms"].value, rel=0.01)
+    assert np.sqrt(np.mean(velocity**2)) == pytest.approx(damped.estimates["velocity_rms"].value, rel=0.01)
     _, acceleration = charts["motion"].xy("acceleration", 1)
     assert np.max(acceleration) == pytest.approx(omega**2 * size, rel=0.02)
     x, v = charts["phase"].xy("fitted motion")
     assert np.nanmax(np.abs(v)) / np.nanmax(np.abs(x)) == pytest.approx(1e-3 * omega, rel=0.02)
 
 
-def test_classic_method(charts: dict[str, Drawn], damped: sm.Analysis) -> None:
+def test_classic_method(charts: dict[str, Drawn], damped: Analysis) -> None:
     """The picked maxima are seven of its periods apart."""
     t, _ = charts["classic"].xy("picked maxima")
     assert np.ptp(t) == pytest.approx(CYCLES * classic(damped.track, damped.scene).estimates["period"].value)
 
 
-def test_several_runs(damped: sm.Analysis, motion: Oscillation) -> None:
+def test_several_runs(damped: Analysis, motion: Oscillation) -> None:
     """Positions from rest, spring constants and their pulls, and a quantity of a course by run."""
     over = overlay(["a", "b"], [damped, damped])
     assert over is not None
     _, y = Drawn(over).xy("a")
-    assert np.max(np.abs(y)) == pytest.approx(1e3 * damped["amplitude"].value, rel=0.1)
+    assert np.max(np.abs(y)) == pytest.approx(1e3 * damped.estimates["amplitude"].value, rel=0.1)
     runs = [SpringRun.of(name, motion.derived, clock=damped.track.clock) for name in ("a", "b")]
     found = compare_springs(runs, spring_mass_kg=damped.scene.spring_mass_kg, mass_correlation=0.0)
     chart = Drawn(comparison(found))

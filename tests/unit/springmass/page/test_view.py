@@ -72,7 +72,7 @@ def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
 
 def test_the_motion_of_a_run_is_that_of_an_analysis() -> None:
     """The same numbers as ``analyse`` at ``fast``, with the law's curve through the amplitudes."""
-    loaded = springmass.load(springmass.sample_data() / "damped_simulated_position.txt")
+    loaded = springmass.load(springmass.sample_data() / "damped_simulated_position.txt").loaded
     view = view_of(loaded)
     assert len(view.series[0]) == len(loaded.samples)
     message = motion_of(loaded.track, Scene(), 20e-6)
@@ -131,7 +131,7 @@ def test_marks_and_triggers_wait_for_the_first_sample(tmp_path: Path) -> None:
             feed.poll()
         assert feed.view.notes == ["Zero 300.0 mm, noise 0.20 mm", "Trigger at 10 mm, 2 s kept"]
         assert feed.view.zero == {"rest_m": 0.3, "noise_m": 2e-4}
-    loaded = springmass.load(path)
+    loaded = springmass.load(path).loaded
     assert feed.view.marks == [(mark["t_s"], mark["text"]) for mark in loaded.provenance["marks"]]
     assert feed.view.track().trigger_s == loaded.track.trigger_s == pytest.approx(3.0, abs=0.01)
     assert view_of(loaded).zero == feed.view.zero
@@ -149,7 +149,7 @@ def test_a_log_that_has_ended_is_analysed_on_the_page_as_anywhere_else(tmp_path:
     feed = LogFeed(path)
     feed.poll()
     assert feed.view.ended
-    shown, loaded = feed.view.track(), springmass.load(path).track
+    shown, loaded = feed.view.track(), springmass.load(path).loaded.track
     for each in dataclasses.fields(Track):
         np.testing.assert_array_equal(getattr(shown, each.name), getattr(loaded, each.name), err_msg=each.name)
     assert shown.trigger_s is not None

@@ -28,7 +28,7 @@ TABLES = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv
 def reported(recording: Path, out: Path, *options: str) -> Path:
     """Analyse a recording; return the folder of its report."""
     main(["analyse", str(recording), "--output", str(out), *options])
-    return out / f"{recording.stem}.results"
+    return out / f"{recording.name}.results"
 
 
 def files_in(folder: Path) -> set[str]:
@@ -120,7 +120,7 @@ def test_the_charts_of_the_page_are_those_of_the_analysis(page: str) -> None:
     """Each figure has its chart as JSON in the page, byte by byte what the charts of the analysis are."""
     (text,) = re.findall(r'<script type="application/json" id="charts">(.*?)</script>', page, re.DOTALL)
     shown = {chart.pop("file"): chart for chart in json.loads(text)}
-    analysis = springmass.analyse(DATA / "damped_simulated_position.txt", scene=DATA / "damped.scene.toml")
+    analysis = springmass.analyse(DATA / "damped_simulated_position.txt", scene=DATA / "damped.scene.toml").analysis
     expected = {name: json.loads(json.dumps(to_json(chart))) for name, chart in charts_of(analysis).items()}
     assert shown == expected
     assert len(re.findall("<figure ", page)) == len(shown) == 8
@@ -140,7 +140,7 @@ def test_the_tables_hold_every_number_of_the_analysis(folder: Path, result: dict
 
 def test_the_motion_is_written_at_every_sample(folder: Path, result: dict[str, Any]) -> None:
     """motion.csv has a row for each sample; its velocity is the derivative of its position."""
-    samples = springmass.load(DATA / "damped_simulated_position.txt").samples
+    samples = springmass.load(DATA / "damped_simulated_position.txt").loaded.samples
     rows = rows_of(folder / "motion.csv")
     t, y, used, position, velocity = (
         np.array([float(row[name]) for row in rows])
@@ -186,10 +186,10 @@ def test_hostile_text_is_escaped_everywhere(tmp_path: Path) -> None:
 def test_a_run_without_oscillation_gives_a_report_too(folder: Path, tmp_path: Path) -> None:
     """Its report says why, and removes the files of an earlier report that it does not have."""
     recording = table(tmp_path / "still.csv", 0.3 + 1e-4 * np.random.default_rng(3).standard_normal(800))
-    shutil.copytree(folder, tmp_path / "still.results")
+    shutil.copytree(folder, tmp_path / "still.csv.results")
     left = files_in(reported(recording, tmp_path))
     assert not [name for name in left if name.startswith("figures/")]
     assert "motion.csv" not in left
-    page = (tmp_path / "still.results" / "report.html").read_text("utf-8")
+    page = (tmp_path / "still.csv.results" / "report.html").read_text("utf-8")
     assert "<code>no_oscillation</code>" in page
     assert "simulated, not measured" not in page

@@ -9,10 +9,10 @@ import h5py
 import numpy as np
 import pytest
 
-import springmass
 from acquisition.block import Block
 from acquisition.recordings.recording import Original
 from acquisition.source import SourceInfo
+from springmass.runs.loading import load
 from storage.errors import RunDamaged
 from storage.run_file.layout import CHUNK
 from storage.run_file.writing import write_run
@@ -49,7 +49,7 @@ def spoil(path: Path, number: int, *, to: bytes | None) -> None:
 
 def test_the_digest_and_the_originals_are_those_of_the_file(path: Path) -> None:
     """Computed later, they are what they would have been immediately."""
-    loaded = springmass.load(path)
+    loaded = load(path)
     assert loaded.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert loaded.originals == (ORIGINAL,)
 
@@ -58,19 +58,19 @@ def test_a_flipped_bit_is_an_error_on_loading(path: Path) -> None:
     """The checksum of the chunk tells it."""
     spoil(path, 1, to=None)
     with pytest.raises(RunDamaged, match="distance"):
-        springmass.load(path)
+        load(path)
 
 
 def test_a_lost_chunk_is_an_error_on_loading(path: Path) -> None:
     """A chunk of zeros has the checksum zero; its column's digest tells it."""
     spoil(path, 2, to=b"\0")
     with pytest.raises(RunDamaged, match="distance"):
-        springmass.load(path)
+        load(path)
 
 
 def test_a_chunk_of_true_zeros_loads(tmp_path: Path) -> None:
     """A rangefinder that read nothing but zeros is no damaged file."""
-    loaded = springmass.load(write(tmp_path / "run.h5", np.zeros(CHUNK + 9)))
+    loaded = load(write(tmp_path / "run.h5", np.zeros(CHUNK + 9)))
     assert not loaded.samples.distance.any()
 
 
@@ -79,4 +79,4 @@ def test_a_rewritten_array_is_an_error_on_loading(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file[DISTANCE][7] = 0.25
     with pytest.raises(RunDamaged, match="distance"):
-        springmass.load(path)
+        load(path)

@@ -31,7 +31,7 @@ def test_python_is_answered_with_the_call_that_reads_the_file(path: Path, name: 
         getattr(sm, name)(path, unit="cm")
     call = f'springmass.{name}("{path}", unit="cm", channel="x")'
     assert str(caught.value).endswith(f"? {call}")
-    assert eval(call.replace("analyse", "load"), {"springmass": sm}).channel == "x"
+    assert eval(call.replace("analyse", "load"), {"springmass": sm}).loaded.channel == "x"
 
 
 def test_an_answer_that_fits_nothing_is_not_repeated(path: Path) -> None:

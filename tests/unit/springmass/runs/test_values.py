@@ -11,7 +11,7 @@ import uncertainties
 from uncertainties import UFloat, umath, unumpy
 
 from pipeline.numerics.estimate import Estimate
-from springmass.api.values import Value
+from springmass.runs.estimates import Value
 
 
 @pytest.fixture

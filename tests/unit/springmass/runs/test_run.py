@@ -1,9 +1,10 @@
-"""An analysis in a notebook: estimates by name, summaries, figures, frames and datasets."""
+"""A run in a notebook: values by name, summaries, figures, frames and datasets; nothing is lost on the way."""
 
 from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -16,14 +17,14 @@ import springmass as sm
 
 
 @pytest.fixture(scope="module")
-def damped() -> sm.Analysis:
+def damped() -> sm.Run:
     """Return the analysis of the damped recording with its scene."""
     data = sm.sample_data()
     return sm.analyse(data / "damped_simulated_position.txt", scene=data / "damped.scene.toml")
 
 
 @pytest.fixture(scope="module")
-def still() -> sm.Analysis:
+def still() -> sm.Run:
     """Return the analysis of a record in which nothing moves."""
     rng = np.random.default_rng(1)
     return sm.analyse((np.arange(1000) / 100, 0.2 + 1e-4 * rng.standard_normal(1000)))
@@ -39,17 +40,17 @@ def pyplot(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     pyplot.close("all")
 
 
-def test_estimates_go_by_name_and_by_symbol(damped: sm.Analysis) -> None:
+def test_estimates_go_by_name_and_by_symbol(damped: sm.Run) -> None:
     """Estimates, the selected law's coefficients, and the parameters of any law."""
     assert damped["k"] == damped["spring_constant"]
     assert damped["T"] == damped["period"]
     assert damped["C_d"] == damped["drag_coefficient"]
     assert damped["gamma"].value == pytest.approx(0.0065, rel=0.01)
-    fitted = damped.motion.damping.fits["quadratic"].joint["beta"]
+    fitted = damped.analysis.motion.damping.fits["quadratic"].joint["beta"]
     # The fit's own uncertainty, and the scale of the distances.
     assert damped["quadratic.beta"].value == pytest.approx(fitted.value, rel=1e-12)
     assert fitted.u < damped["quadratic.beta"].u < 1.01 * fitted.u
-    assert damped["k"].value == damped.estimates["spring_constant"].value
+    assert damped["k"].value == damped.analysis.estimates["spring_constant"].value
     assert list(damped) == list(damped.keys()) == list(dict(damped.items()))
     assert len(damped) == len(damped.values())
     assert damped.get("T") == damped["T"]
@@ -61,7 +62,7 @@ def test_estimates_go_by_name_and_by_symbol(damped: sm.Analysis) -> None:
         damped["mu"]
 
 
-def test_estimates_calculate_with_their_correlations(damped: sm.Analysis) -> None:
+def test_estimates_calculate_with_their_correlations(damped: sm.Run) -> None:
     """A product of estimates of one run is as certain as what they share allows."""
     assert (damped["period"] * damped["frequency"]).std_dev < 1e-12
     assert (damped["period"] * 2).std_dev == pytest.approx(2 * damped["period"].u)
@@ -69,7 +70,7 @@ def test_estimates_calculate_with_their_correlations(damped: sm.Analysis) -> Non
     assert ((2 * np.pi / damped["T"]) - damped["omega"]).std_dev < 1e-9
 
 
-def test_the_summary_fits_a_terminal(damped: sm.Analysis, still: sm.Analysis) -> None:
+def test_the_summary_fits_a_terminal(damped: sm.Run, still: sm.Run) -> None:
     """At most 15 lines of at most 79 characters, the period first, whatever the record."""
     for analysis in (damped, still):
         lines = repr(analysis).splitlines()
@@ -103,7 +104,7 @@ class Elements(HTMLParser):
         self.text += data
 
 
-def test_the_notebooks_summary_is_whole(damped: sm.Analysis, still: sm.Analysis) -> None:
+def test_the_notebooks_summary_is_whole(damped: sm.Run, still: sm.Run) -> None:
     """Every element is closed; all quantities, laws and findings are in it, and no script."""
     for analysis, tables in ((damped, 2), (still, 1)):
         page = Elements()
@@ -115,7 +116,7 @@ def test_the_notebooks_summary_is_whole(damped: sm.Analysis, still: sm.Analysis)
         assert all(finding.code in page.text for finding in analysis.findings)
         if analysis is damped:
             assert "0.790066 ± 0.000023 s" in page.text
-            assert all(name in page.text for name in damped.motion.damping.fits)
+            assert all(name in page.text for name in damped.analysis.motion.damping.fits)
 
 
 def test_names_from_outside_are_escaped(tmp_path: Path) -> None:
@@ -127,35 +128,30 @@ def test_names_from_outside_are_escaped(tmp_path: Path) -> None:
     assert "<b onload" not in page
 
 
-def test_figures_go_into_axes_of_ones_own(damped: sm.Analysis, pyplot: Any) -> None:
+def test_figures_go_into_axes_of_ones_own(damped: sm.Run, pyplot: Any) -> None:
     """Each draws into the axes given and no others, and returns them, with labels on both."""
-    for draw in (damped.plot, damped.plot.amplitude, damped.plot.phase, damped.plot.energy, damped.plot.drag):
+    for chart in ("position", "amplitude", "phase", "energy", "drag"):
         figure, (one, other) = pyplot.subplots(1, 2)
-        assert draw(ax=one) is one
+        assert damped.plot(chart, ax=one) is one
         assert one.get_xlabel()
         assert one.get_ylabel()
         assert one.has_data()
         assert not other.has_data()
         pyplot.close(figure)
-    axes = damped.plot.amplitude(laws=["linear", "linear+quadratic"])
+    axes = damped.plot("amplitude")
     assert pyplot.get_fignums() == [axes.figure.number]
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert sorted(label.split(" (")[0] for label in labels if "(" in label) == [
-        "exponential, linear drag",
-        "linear+quadratic",
-    ]
-    position = damped.plot.position(from_s=5.0, to_s=8.0)
-    assert position.get_xlim() == (5.0, 8.0)
+    with pytest.raises(sm.Error, match="no chart 'colour'"):
+        damped.plot("colour")
 
 
-def test_the_frame_of_estimates(damped: sm.Analysis, still: sm.Analysis) -> None:
+def test_the_frame_of_estimates(damped: sm.Run, still: sm.Run) -> None:
     """A row an estimate and coefficient with what the budget says, and correlations where they are asked for."""
     frame = damped.to_dataframe()
     assert list(frame.index) == list(damped)
     assert frame.loc["gamma", "u"] == damped["gamma"].u
     assert frame.loc["period", "symbol"] == "T"
     np.testing.assert_allclose(frame.expanded, frame.coverage_factor * frame.u)
-    assert frame.loc["gamma", "dof"] == damped.motion.derived.budgets["gamma"].dof < 200.0
+    assert frame.loc["gamma", "dof"] == damped.analysis.motion.derived.budgets["gamma"].dof < 200.0
     wide = damped.to_dataframe(correlations=True)
     matrix = wide[[f"r({name})" for name in wide.index]].to_numpy()
     np.testing.assert_array_equal(matrix, matrix.T)
@@ -164,29 +160,79 @@ def test_the_frame_of_estimates(damped: sm.Analysis, still: sm.Analysis) -> None
     assert still.to_dataframe().coverage_factor.isna().all()
 
 
-def test_the_dataset_holds_the_run_and_goes_into_a_file(
-    damped: sm.Analysis, still: sm.Analysis, tmp_path: Path
-) -> None:
+def test_the_dataset_holds_the_run_and_goes_into_a_file(damped: sm.Run, still: sm.Run, tmp_path: Path) -> None:
     """Samples, windows, laws and estimates by name; netCDF gives back the same."""
     found = damped.to_dataset()
-    np.testing.assert_array_equal(found.distance, damped.track.y)
-    np.testing.assert_array_equal(found.quality, damped.flags)
-    used = found.quality == 0
+    np.testing.assert_array_equal(found.distance, damped.analysis.track.y)
+    np.testing.assert_array_equal(found.quality, damped.loaded.samples.flags)
+    np.testing.assert_array_equal(found.left_out, damped.analysis.flags)
+    used = found.left_out == 0
     assert float(np.std((found.distance - found.fit)[used])) < 1e-4
     assert found.period.item() == damped["period"].value
     assert found.period.attrs == {"u": damped["period"].u, "units": "s"}
-    best = found.law_amplitude.sel(law=damped.motion.damping.selected)
+    best = found.law_amplitude.sel(law=damped.analysis.motion.damping.selected)
     assert float(abs(best - found.amplitude_of_window)[found.kept].max()) < 2e-4
-    assert {"velocity", "u_velocity", "acceleration"} <= set(found)
+    assert {"smoothed_velocity", "u_smoothed_velocity", "smoothed_acceleration"} <= set(found)
     for analysis, name in ((damped, "damped.nc"), (still, "still.nc")):
         analysis.to_dataset().to_netcdf(tmp_path / name, engine="h5netcdf")
         with xr.open_dataset(tmp_path / name, engine="h5netcdf", decode_times=False) as again:
             xr.testing.assert_equal(again.load(), analysis.to_dataset())
 
 
-def test_an_analysis_travels_between_processes(damped: sm.Analysis) -> None:
+def test_an_analysis_travels_between_processes(damped: sm.Run) -> None:
     """Pickled and back it is the same, its estimates still correlated."""
     again = pickle.loads(pickle.dumps(damped))
-    assert again.estimates == damped.estimates
+    assert again.analysis.estimates == damped.analysis.estimates
     assert (again["period"] * again["frequency"]).std_dev < 1e-12
     assert repr(again) == repr(damped)
+
+
+@pytest.fixture(scope="module")
+def full(damped: sm.Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a run file with calibration, scene and the original inside, as a recorder writes it."""
+    path = tmp_path_factory.mktemp("runs") / "full.h5"
+    sensor = {"family": "line-protocol", "calibration": {"speed_of_sound_m_per_s": 345.0, "u_scale": 2e-4}}
+    loaded = replace(damped.loaded, provenance={**damped.loaded.provenance, "sensor": sensor})
+    return sm.Run(loaded, damped.scene).save(path)
+
+
+def test_nothing_is_lost_on_the_way(full: Path, tmp_path: Path) -> None:
+    """Saved again, and by way of xarray and netCDF, every number stays the same to the last digit."""
+    expected = sm.analyse(full)
+    assert expected["A0"].u > 1e-5  # the uncertainty of the scale
+    saved = sm.load(full).save(tmp_path / "again.h5")
+    expected.dataset().to_netcdf(tmp_path / "samples.nc", engine="h5netcdf")
+    expected.to_dataset().to_netcdf(tmp_path / "all.nc", engine="h5netcdf")
+    files = [xr.open_dataset(path, engine="h5netcdf") for path in (full, tmp_path / "samples.nc", tmp_path / "all.nc")]
+    for source in (saved, expected.loaded.path, *files, expected.dataset(), expected.to_dataset(), expected):
+        found = sm.analyse(source)
+        assert found.result["estimates"] == expected.result["estimates"]
+        assert found.scene == expected.scene
+        assert [f.code for f in found.findings] == [f.code for f in expected.findings]
+    assert sm.load(saved).loaded.originals == sm.load(full).loaded.originals != ()
+    for file in files:
+        file.close()
+
+
+def test_a_part_of_a_dataset_is_a_part_of_the_run(full: Path) -> None:
+    """Selected by xarray or by from_s and to_s, the same samples give the same numbers."""
+    part = sm.analyse(sm.load(full).dataset().sel(time=slice(10.0, 60.0)))
+    assert part.result["estimates"] == sm.analyse(full, from_s=10.0, to_s=60.0).result["estimates"]
+
+
+def test_a_run_without_oscillation_says_so(still: sm.Run) -> None:
+    """It is not ok, and a result that it lacks is a KeyError with the reason."""
+    assert not still.ok
+    assert still.law is None
+    with pytest.raises(KeyError, match="no estimate"):
+        still["T"]
+
+
+def test_loading_is_no_analysis(full: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run is analysed when a result is asked for."""
+    run = sm.load(full)
+    assert run.loaded.title
+    monkeypatch.setattr("springmass.runs.run.analyse", lambda *_: pytest.fail("analysed"))
+    assert run.scene.bob_mass_kg is not None
+    with pytest.raises(BaseException, match="analysed"):
+        run["T"]
