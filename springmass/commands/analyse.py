@@ -10,19 +10,31 @@ import filecmp
 import json
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.analyse import Oscillation, Overdamped
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
-from springmass.commands.options import Figures, File, Scenes, StatedLaw, Strict, Tier, argument, flag, option, output
+from springmass.commands.options import (
+    BenchOptions,
+    Figures,
+    File,
+    Scenes,
+    StatedLaw,
+    Strict,
+    Tier,
+    argument,
+    flag,
+    option,
+    output,
+)
 from springmass.errors import (
     INTERNAL,
     NO_MEMORY,
@@ -47,16 +59,13 @@ from springmass.runs.analysing import (
     in_a_name,
     law_line,
     make_folder,
-    scene_of,
 )
 from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import Loaded, load, sample_data
 from springmass.runs.options import ReadOptions
-from springmass.runs.questions import for_command, option_of
-from springmass.runs.scenes import Amendments, amended, read_scenes
-from springmass.terminal.asking import ask_for_bench
-from springmass.values import Finite, NotNegative
+from springmass.runs.questions import for_command
+from springmass.runs.scenes import Amendments, read_scenes
 from storage.errors import StorageError, WriteFailed
 
 if TYPE_CHECKING:
@@ -66,6 +75,7 @@ READING = ("velocity", "channel", "rate_hz", "unit", "from_s", "to_s", "clock_pp
 RESOLVED = ("accuracy", "method", "law", "strict")
 TOGETHER = "together.results"
 STDIN_NAME = "stdin"
+MOST_TOGETHER = 20  # inputs in one report: their samples are in memory together; batch is for more
 LONGEST_INPUTS = 48  # maximum length of input names repeated in a suggested command
 
 
@@ -83,6 +93,7 @@ class _Task:
     alone: bool
     writes: bool = False  # whether files may be written at all
     report: Path | None = None  # folder for the report
+    together: bool = True  # whether one report shows all inputs
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +106,7 @@ class _Done:
     result: Mapping[str, Any] = field(default_factory=dict)
     table: Mapping[TableKey, Estimate] = field(default_factory=dict)
     numbers: Mapping[str, Estimate] = field(default_factory=dict)
-    page: Path | None = None
+    analysed: Analysed | None = None  # if few enough for one report
     remembered: bool = False  # whether the scene was noted next to the recording
     law: str = ""  # line that names the damping law stated by the scene
 
@@ -112,40 +123,13 @@ class AnalyseOptions:
         Literal["classic"] | None, option("NAME", "also apply the lab report's classic method, for comparison")
     ] = None
     output: Annotated[File | None, output("DIR", "output folder (default: here; with --json: none)")] = None
-    report: Annotated[bool, flag("with several inputs, also write a report for each")] = False
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
     full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
-    budget: Annotated[bool, flag("print the sources of uncertainty")] = False
-    ask: Annotated[bool, flag("ask for the masses and the disc, and save them next to the recording")] = False
     template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None
     figures: Figures = ()
     si: Annotated[bool, flag("print SI units without prefixes")] = False
     json: Annotated[bool, flag("print one JSON object per input on standard output")] = False
     strict: Strict = False
-
-
-@Parameter(name="*", group=Group("The bench, instead of the values in the scene", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
-class BenchOptions:
-    """Values of the bench, each with its standard uncertainty."""
-
-    mass_kg: Annotated[Finite | None, option("X", "total mass that hangs on the spring, kg")] = None
-    mass_u_kg: Annotated[NotNegative | None, option("U", "its standard uncertainty (default: exact)")] = None
-    spring_mass_kg: Annotated[Finite | None, option("X", "mass of the spring, kg")] = None
-    spring_mass_u_kg: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
-    disc_diameter_m: Annotated[Finite | None, option("X", "diameter of the disc, m")] = None
-    disc_diameter_u_m: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
-    temperature_c: Annotated[Finite | None, option("X", "temperature of the air, degrees Celsius")] = None
-    temperature_u_c: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
-
-
-BENCH = {
-    ("bob", "mass_kg"): ("mass_kg", "mass_u_kg"),
-    ("spring", "mass_kg"): ("spring_mass_kg", "spring_mass_u_kg"),
-    ("disc", "diameter_m"): ("disc_diameter_m", "disc_diameter_u_m"),
-    ("air", "temperature_c"): ("temperature_c", "temperature_u_c"),
-}
-"""Table and key of the scene, mapped to the fields of :class:`BenchOptions` for the value and its uncertainty."""
 
 
 def analyse(
@@ -158,22 +142,15 @@ def analyse(
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
     inputs = [str(each) for each in recordings]
-    if options.report and options.no_report:
-        raise ProgramError("--report and --no-report exclude each other, got both; leave one out", USAGE)
     if read.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself", USAGE)
-    if options.ask and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
-        raise ProgramError("--ask is about one recording; analyse the others by themselves", USAGE)
-    if options.ask and inputs == [STDIN]:
-        raise ProgramError("--ask reads answers from standard input, which is the recording; give --mass-kg", USAGE)
     scenes = read_scenes(options.scene, len(inputs))
-    values = _values(bench)
+    values = bench.values()
     found, folders = files_of(inputs)
-    out = make_folder(options.output or ".") if _writes(options) else None
+    out = Path(options.output or ".") if _writes(options) else None
     for line in folders:
         tell(line)
-    every = len(found) == 1 or options.report
     tasks = [
         _Task(
             one,
@@ -185,7 +162,8 @@ def analyse(
             values,
             inputs == [one.path],
             out is not None,
-            out / in_a_name(name, ".results") if out is not None and every else None,
+            None if out is None else out / in_a_name(name, ".results"),
+            len(found) <= MOST_TOGETHER,
         )
         for one, name in zip(
             found, distinct_names([STDIN_NAME if one.path == STDIN else one.path for one in found]), strict=True
@@ -195,7 +173,7 @@ def analyse(
 
 
 def _writes(options: AnalyseOptions) -> bool:
-    return not options.no_report and (options.report or options.output is not None or not options.json)
+    return not options.no_report and (options.output is not None or not options.json)
 
 
 def _one(task: _Task) -> int:
@@ -212,26 +190,21 @@ def _one(task: _Task) -> int:
         _print_text(analysed, task.options)
     if noted is not None:
         tell(f"bench data saved for this file: {noted}")
-    if task.report is not None:
-        page = _write(analysed, task)
-        tell(f"report: {page}")
     code, complaints = _judged(analysed, task)
     for line in complaints:
         complain(line)
-    return code
+    return code if task.report is None else max(code, _write(task.report, [analysed], task.options))
 
 
 def _several(tasks: Sequence[_Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:
-    """Analyse many inputs: one Table 1, one file of numbers."""
+    """Analyse several inputs: one Table 1, one report."""
     from springmass.terminal.progress import counted
 
     everything: list[_Done] = []
-    for done in counted(map(_work, tasks), len(tasks), "reports" if options.report else "runs", quiet=manner()[0]):
+    for done in counted(map(_work, tasks), len(tasks), "runs", quiet=manner()[0]):
         everything.append(done)
         if options.json and done.result:
             print(json.dumps(done.result, allow_nan=False), flush=True)
-        if done.page is not None:
-            tell(f"report: {done.page}")
         for line in done.complaints:
             complain(line)
     analysed = [done for done in everything if done.result]
@@ -239,28 +212,33 @@ def _several(tasks: Sequence[_Task], inputs: Sequence[str], options: AnalyseOpti
         tell(f"bench data saved for {noted} recordings, each in NAME.about.toml")
     if analysed and not options.json:
         _print_together(analysed, options)
+    written = OK
     if analysed and out is not None:
-        tell(f"written: {_write_together(analysed, out / TOGETHER)}")
+        runs = [done.analysed for done in analysed if done.analysed is not None]
+        if runs:
+            written = _write(out / TOGETHER, runs, options)
+        else:
+            written = _written(lambda: f"written: {_write_together(analysed, out / TOGETHER)}", out)
     if len(analysed) > 1:
         named = shlex.join(inputs)
         suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     codes = [done.code for done in everything]
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
-    return max(codes)
+    return max(*codes, written)
 
 
 def _work(task: _Task) -> _Done:
-    """Analyse one of several inputs, and write its report; a defect met on one does not keep the others from theirs."""
+    """Analyse one of several inputs, a defect met on one does not keep the others from theirs."""
     try:
-        return _analyse_and_report(task)
+        return _analysed_alone(task)
     except MemoryError:
         return _Done(task.name, UNREADABLE, (f"{task.file.path}: {NO_MEMORY}",))
     except Exception as error:
         return _Done(task.name, INTERNAL, (f"{task.file.path}: {internal_error(error)}",))
 
 
-def _analyse_and_report(task: _Task) -> _Done:
+def _analysed_alone(task: _Task) -> _Done:
     from springmass.report.tables import every_number, table_estimates
 
     attempted = _attempt(task)
@@ -268,26 +246,18 @@ def _analyse_and_report(task: _Task) -> _Done:
         return attempted
     analysed, noted = attempted
     code, complaints = _judged(analysed, task)
-    page = None
-    if task.report is not None:
-        try:
-            page = _write(analysed, task)
-        except WriteFailed as error:
-            code, complaints = USAGE, (*complaints, str(error))
     analysis = analysed.analysis
     table, numbers = table_estimates(analysis), every_number(analysis)
     law = law_line(analysis, Path(task.file.path), task.scene_file)
-    return _Done(task.name, code, complaints, analysed.result, table, numbers, page, noted is not None, law)
+    kept = analysed if task.together else None
+    return _Done(task.name, code, complaints, analysed.result, table, numbers, kept, noted is not None, law)
 
 
 def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
     """Analyse an input; return the analysis, and where its scene was saved."""
     try:
         options, read = task.options, task.read
-        loaded, bench = load(task.file.path, read), dict(task.bench)
-        if options.ask:
-            known = amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else None
-            bench |= ask_for_bench(known or scene_of(loaded, task.scene), loaded.path.name)
+        loaded, bench = load(task.file.path, read), task.bench
         run = analyse_loaded(
             loaded,
             task.scene,
@@ -302,7 +272,9 @@ def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
             "strict": options.strict,
         }
         scene = run.analysis.scene if task.scene is not None or bench else None
-        return run.described(parameters), _remembered(loaded, scene) if task.writes or options.ask else None
+        return run.described(parameters, name=None if task.alone else task.name), _remembered(
+            loaded, scene
+        ) if task.writes else None
     except ProgramError as error:
         return _Done(task.name, error.exit_code, (str(error),))
     except NeedsAnswer as question:
@@ -340,20 +312,6 @@ def _bundled(path: Path) -> bool:
     return own.is_file() and filecmp.cmp(own, path, shallow=False)
 
 
-def _values(bench: BenchOptions) -> dict[tuple[str, str], dict[str, float]]:
-    """Return the values of the bench that were given, by table and key of the scene."""
-    values = {}
-    for place, (of_value, of_u) in BENCH.items():
-        value, u = getattr(bench, of_value), getattr(bench, of_u)
-        if value is not None:
-            values[place] = {"value": value, "u": u or 0.0}
-        elif u is not None:
-            raise ProgramError(
-                f"{option_of(of_u)} does nothing without {option_of(of_value)}; name both or neither", USAGE
-            )
-    return values
-
-
 def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:
     """Return the exit code of an analysis, and the message for it."""
     path, motion = analysed.result["input"]["path"], analysed.analysis.motion
@@ -376,7 +334,7 @@ def _print_text(analysed: Analysed, options: AnalyseOptions) -> None:
     print(text_table([analysed.name], [analysed.analysis], style))
     if analysed.classic is not None:
         print(f"{classic_text(analysed.classic)}\n")
-    elif (options.full or options.budget) and (budget := budget_text(analysed.analysis)):
+    elif options.full and (budget := budget_text(analysed.analysis)):
         print(f"{fitted(budget, style.width) if style.terminal else budget}\n")
     if sentence := damping_sentence(analysed.analysis):
         print(f"{wrapped(sentence, '', 80)}\n")
@@ -398,11 +356,24 @@ def _print_together(analysed: Sequence[_Done], options: AnalyseOptions) -> None:
     print(shared_findings_text(findings, typeset if style.unicode else str))
 
 
-def _write(analysed: Analysed, task: _Task) -> Path:
+def _write(folder: Path, runs: Sequence[Analysed], options: AnalyseOptions) -> int:
     from springmass.report.write import write_report
 
-    assert task.report is not None
-    return write_report(task.report, [analysed], figures=task.options.figures, template=task.options.template)
+    template = options.template if len(runs) == 1 else None
+    return _written(
+        lambda: f"report: {write_report(folder, runs, figures=options.figures, template=template)}", folder.parent
+    )
+
+
+def _written(write: Callable[[], str], folder: Path) -> int:
+    """Write files, and return an exit code: a folder that takes none costs one line, and not the result."""
+    try:
+        make_folder(folder)
+        tell(write())
+    except (ProgramError, WriteFailed) as error:
+        complain(f"{error}; --no-report writes no files")
+        return USAGE
+    return OK
 
 
 def _write_together(analysed: Sequence[_Done], folder: Path) -> Path:
