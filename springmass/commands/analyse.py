@@ -272,9 +272,8 @@ def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
             "strict": options.strict,
         }
         scene = run.analysis.scene if task.scene is not None or bench else None
-        return run.described(parameters, name=None if task.alone else task.name), _remembered(
-            loaded, scene
-        ) if task.writes else None
+        name = "" if task.alone else task.name
+        return run.described(parameters, name=name), _remembered(loaded, scene) if task.writes else None
     except ProgramError as error:
         return _Done(task.name, error.exit_code, (str(error),))
     except NeedsAnswer as question:
