@@ -1,8 +1,7 @@
-"""Measure the analysis of twenty records of two minutes: one joint table, and their reports.
+"""Measure the analysis of twenty records of two minutes: one joint table and one report.
 
 Run ``python benchmarks/many.py``. It prints the wall and processor time of ``springmass analyse`` over twenty files,
-warm (after a first call in this process) and without reports. It also prints the time per run and core with reports,
-which are made by one process per core.
+warm (after a first call in this process), without the report and with it.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 from springmass.cli import main
-from springmass.runs.processes import cores
 
 RUNS = 20
 SECONDS = 120
@@ -75,8 +73,6 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         files = recordings(Path(name))
         analysed(files[:1], Path(name))
-        joint = min((analysed(files, Path(name)) for _ in range(3)), key=lambda taken: taken.wall_s)
-        print(f"{RUNS} runs, one table: {joint.wall_s:.2f} s, {joint.processor_s:.2f} s of processor")
-        reports = analysed(files, Path(name), "--report")
-        share = reports.wall_s * cores() / RUNS
-        print(f"with reports: {reports.wall_s:.1f} s, {share:.2f} s a run and core of {cores()}")
+        for what, options in (("one table", ["--no-report"]), ("and one report", [])):
+            taken = min((analysed(files, Path(name), *options) for _ in range(3)), key=lambda each: each.wall_s)
+            print(f"{RUNS} runs, {what}: {taken.wall_s:.2f} s, {taken.processor_s:.2f} s of processor")

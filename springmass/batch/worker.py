@@ -13,7 +13,7 @@ import numpy as np
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.analyse import Analysis, Oscillation, Overdamped
-from pipeline.bench.scene import PLACES, Scene
+from pipeline.bench.scene import PLACES
 from pipeline.errors import AnalysisError, PipelineError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.threads import one_thread

@@ -9,15 +9,26 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from pipeline.numerics.estimate import Estimate
-from springmass.commands.options import Figures, File, Json, Scenes, Strict, argument, flag, option, output
+from springmass.commands.options import (
+    BenchOptions,
+    Figures,
+    File,
+    Json,
+    Scenes,
+    Strict,
+    argument,
+    flag,
+    option,
+    output,
+)
 from springmass.errors import (
     OK,
     REJECTED,
@@ -37,17 +48,16 @@ from springmass.runs.inputs import files_of
 from springmass.runs.json_results import rejected
 from springmass.runs.options import How
 from springmass.runs.outputs import distinct_names, make_folder, results_name
-from springmass.runs.questions import for_command, option_of
+from springmass.runs.questions import for_command
 from springmass.runs.run import Run
 from springmass.runs.scenes import read_scenes
-from springmass.values import Finite, NotNegative
 from storage.errors import WriteFailed
 
 if TYPE_CHECKING:
     from springmass.report.tables import TableKey
 
 TOGETHER = "together.results"
-MOST_IN_A_REPORT = 20  # runs of which one report shows every chart
+MOST_TOGETHER = 20  # inputs in one report: their samples are in memory together; batch is for more
 LONGEST_INPUTS = 48  # maximum length of input names repeated in a suggested command
 
 
@@ -82,30 +92,6 @@ class AnalyseOptions:
     strict: Strict = False
 
 
-@Parameter(name="*", group=Group("The bench, instead of the values in the scene", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
-class BenchOptions:
-    """Values of the bench, each with its standard uncertainty."""
-
-    mass_kg: Annotated[Finite | None, option("X", "total mass that hangs on the spring, kg")] = None
-    mass_u_kg: Annotated[NotNegative | None, option("U", "its standard uncertainty (default: exact)")] = None
-    spring_mass_kg: Annotated[Finite | None, option("X", "mass of the spring, kg")] = None
-    spring_mass_u_kg: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
-    disc_diameter_m: Annotated[Finite | None, option("X", "diameter of the disc, m")] = None
-    disc_diameter_u_m: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
-    temperature_c: Annotated[Finite | None, option("X", "temperature of the air, degrees Celsius")] = None
-    temperature_u_c: Annotated[NotNegative | None, option("U", "its standard uncertainty")] = None
-
-
-BENCH = {
-    ("bob", "mass_kg"): ("mass_kg", "mass_u_kg"),
-    ("spring", "mass_kg"): ("spring_mass_kg", "spring_mass_u_kg"),
-    ("disc", "diameter_m"): ("disc_diameter_m", "disc_diameter_u_m"),
-    ("air", "temperature_c"): ("temperature_c", "temperature_u_c"),
-}
-"""Table and key of the scene, mapped to the fields of :class:`BenchOptions` for the value and its uncertainty."""
-
-
 def analyse(
     *recordings: Annotated[
         File, argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True)
@@ -119,11 +105,12 @@ def analyse(
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself", USAGE)
-    scenes, values = read_scenes(options.scene, len(inputs)), _values(bench)
+    scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
     found, folders = files_of(inputs)
     for line in folders:
         tell(line)
-    names = distinct_names(["stdin" if one.path == STDIN else one.path for one in found])
+    alone = len(found) == 1
+    names = [""] if alone else distinct_names(["stdin" if one.path == STDIN else one.path for one in found])
     how = replace(how, method=options.method)
     tasks = [
         Task(
@@ -133,7 +120,7 @@ def analyse(
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
     files = [options.scene[one.of if len(options.scene) > 1 else 0] if options.scene else None for one in found]
-    if len(tasks) > 1:
+    if not alone:
         return _several(tasks, files, inputs, options, out)
     (run,) = analyse_all(tasks)
     if isinstance(run, Failed):
@@ -148,9 +135,8 @@ def analyse(
         _print_text(run, options)
     if options.save_scene:
         _save_scene(run)
-    if out is not None:
-        _write(out / results_name(run), [run], options)
-    return _judged(run, options)
+    written = OK if out is None else _write(out / results_name(run), [run], options)
+    return max(_judged(run, options), written)
 
 
 def _several(
@@ -179,21 +165,21 @@ def _several(
         codes.append(_judged(run, options))
         table, numbers = table_estimates(run.analysis), every_number(run.analysis)
         done.append(_Done(run.name, run.result, table, numbers, law_line(run, file)))
-        if len(tasks) <= MOST_IN_A_REPORT:
+        if len(tasks) <= MOST_TOGETHER:
             runs.append(run)
     if done and not options.json:
         _print_together(done, options)
-    if done and out is not None:
-        if runs:
-            _write(out / TOGETHER, runs, options)
-        else:
-            _write_numbers(out / TOGETHER, done)
+    written = OK
+    if runs and out is not None:
+        written = _write(out / TOGETHER, runs, options)
+    elif done and out is not None:
+        written = _written(lambda: f"written: {_write_numbers(out / TOGETHER, done)}", out)
     if len(done) > 1:
         named = shlex.join(inputs)
         suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
-    return max(codes)
+    return max(*codes, written)
 
 
 def _failed(failed: Failed) -> int:
@@ -233,20 +219,6 @@ def _save_scene(run: Run) -> None:
         complain(error)
 
 
-def _values(bench: BenchOptions) -> dict[tuple[str, str], dict[str, float]]:
-    """Return the values of the bench that were given, by table and key of the scene."""
-    values = {}
-    for place, (of_value, of_u) in BENCH.items():
-        value, u = getattr(bench, of_value), getattr(bench, of_u)
-        if value is not None:
-            values[place] = {"value": value, "u": u or 0.0}
-        elif u is not None:
-            raise ProgramError(
-                f"{option_of(of_u)} does nothing without {option_of(of_value)}; name both or neither", USAGE
-            )
-    return values
-
-
 def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.budgets import budget_text
@@ -280,30 +252,34 @@ def _print_together(done: Sequence[_Done], options: AnalyseOptions) -> None:
     print(shared_findings_text(findings, typeset if style.unicode else str))
 
 
-def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> None:
-    """Write the report; a folder that cannot be written costs a line and not the results, which are printed."""
+def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> int:
     from springmass.report.write import write_report
 
+    template = options.template if len(runs) == 1 else None
+    return _written(
+        lambda: f"report: {write_report(folder, runs, figures=options.figures, template=template)}", folder.parent
+    )
+
+
+def _written(write: Callable[[], str], folder: Path) -> int:
+    """Write files, and return an exit code: a folder that takes none costs one line, and not the result."""
     try:
-        make_folder(folder.parent)
-        page = write_report(folder, runs, figures=options.figures, template=options.template)
-        tell(f"report: {page}")
+        make_folder(folder)
+        tell(write())
     except (ProgramError, WriteFailed) as error:
-        complain(error)
+        complain(f"{error}; --no-report writes no files")
+        return USAGE
+    return OK
 
 
-def _write_numbers(folder: Path, done: Sequence[_Done]) -> None:
+def _write_numbers(folder: Path, done: Sequence[_Done]) -> Path:
     """Write the numbers of all runs: results.csv for a table, results.json for programs."""
     from springmass.report.tables import results_csv
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 
     text = json.dumps([one.result for one in done], indent=2, allow_nan=False, ensure_ascii=False)
-    try:
-        make_folder(folder.parent)
-        with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
-            write_whole(part / "results.json", f"{text}\n".encode("utf-8", "backslashreplace"))
-            write_whole(part / "results.csv", results_csv([one.name for one in done], [one.numbers for one in done]))
-        tell(f"written: {folder / 'results.csv'}")
-    except (ProgramError, WriteFailed) as error:
-        complain(error)
+    with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
+        write_whole(part / "results.json", f"{text}\n".encode("utf-8", "backslashreplace"))
+        write_whole(part / "results.csv", results_csv([one.name for one in done], [one.numbers for one in done]))
+    return folder / "results.csv"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,6 +78,69 @@ StatedLaw = Annotated[
 Json = Annotated[bool, Parameter(name="--json", help="print JSON on standard output")]
 Overwrite = Annotated[bool, flag("replace an existing output")]
 Strict = Annotated[bool, flag("exit with code 5 if a finding is an error")]
+
+
+def measured(text: str) -> float | dict[str, float]:
+    """Return a number that was typed, as a scene states it: with the standard uncertainty that was typed with it.
+
+    >>> measured("0.2007"), measured("0.2007+/-0.0001"), measured("0.2007(1)")
+    (0.2007, {'value': 0.2007, 'u': 0.0001}, {'value': 0.2007, 'u': 0.0001})
+    """
+    from uncertainties import ufloat_fromstr
+    from uncertainties.core import NegativeStdDev
+
+    try:
+        return float(text)  # a number alone is exact, while the library would take its last digit for uncertain
+    except ValueError:
+        try:
+            number = ufloat_fromstr(text)
+        except (ValueError, NegativeStdDev):
+            raise ValueError(
+                "must be a number, with its standard uncertainty as 0.2007+/-0.0001 or 0.2007(1)"
+            ) from None
+    return {"value": number.nominal_value, "u": number.std_dev}
+
+
+def _measured(_: Any, tokens: Sequence[Token]) -> float | dict[str, float]:
+    return measured(tokens[0].value)
+
+
+def _setting(text: str) -> tuple[tuple[str, str], Any]:
+    """Return table and key of the scene, and the value."""
+    found = re.fullmatch(r"\s*(\w+)\.(\w+)\s*=\s*(.+)", text)
+    if found is None:
+        raise ValueError("must be TABLE.KEY=VALUE as in a scene, for example spring.mass_kg=0.0104+/-0.0001")
+    table, key, value = found.groups()
+    try:
+        return (table, key), measured(value)
+    except ValueError:
+        if value[:1] in "+-.0123456789":
+            raise
+        return (table, key), value.strip()
+
+
+@Parameter(name="*", group=Group("The bench, instead of the values in the scene", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class BenchOptions:
+    """Values of the bench, each with its standard uncertainty."""
+
+    mass_kg: Annotated[
+        Any,
+        Parameter(
+            metavar="M",
+            help="all that hangs on the spring, kg: 0.2007+/-0.0001",
+            converter=_measured,
+            n_tokens=1,
+        ),
+    ] = None
+    set: Annotated[
+        tuple[tuple[tuple[str, str], Any], ...],
+        converted("KEY=X", "any value of a scene: spring.mass_kg=0.0104+/-0.0001; may be repeated", _setting),
+    ] = ()
+
+    def values(self) -> dict[tuple[str, str], Any]:
+        """Return the given values by table and key of the scene."""
+        return ({} if self.mass_kg is None else {("bob", "mass_kg"): self.mass_kg}) | dict(self.set)
 
 
 @Parameter(name="*", group=THE_PAGE)

@@ -73,4 +73,3 @@ def law_line(run: Run, scene_file: str | Path | None) -> str:
         noted = about_of(run.loaded.path)
         scene_file = run.loaded.path if noted.scene is None else noted.path
     return f"damping law {law}: stated in {scene_file}"
-

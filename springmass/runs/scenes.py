@@ -15,8 +15,8 @@ from springmass.errors import USAGE, ProgramError, complain
 
 __all__ = ["Amendments", "amended", "ask_about", "read_scene", "read_scenes", "read_tables", "stated_keys"]
 
-Amendments = Mapping[tuple[str, str], Mapping[str, float]]
-"""Mapping of a scene's (table, key) to the value and its standard uncertainty."""
+Amendments = Mapping[tuple[str, str], Any]
+"""Mapping of a scene's (table, key) to a value as a scene file states it."""
 LONGEST_SCENE = 1 << 14  # maximum size of a scene file in bytes; some longer files take seconds to parse
 
 
@@ -101,7 +101,7 @@ def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
     ----------
     scene : Scene
     values : mapping
-        ``{"value": ..., "u": ...}`` for each (table, key).
+        A number, ``{"value": ..., "u": ...}`` or a text for each (table, key).
     where : str
         Source of the values, named in errors.
 
@@ -112,7 +112,7 @@ def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
     """
     tables = scene.to_mapping()
     for (table, key), value in values.items():
-        tables.setdefault(table, {})[key] = dict(value)
+        tables.setdefault(table, {})[key] = value
     try:
         return Scene.from_mapping(tables, where=where)
     except SceneError as error:

@@ -117,12 +117,13 @@ def test_json_writes_no_files(cli: Cli, recording: Path, tmp_path: Path, monkeyp
     assert list(here.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_made_costs_a_line_and_not_the_results(cli: Cli, recording: Path) -> None:
-    """A file stands where the results should go."""
-    done = cli("analyse", recording, "--output", recording)
-    assert done.code == 0
-    assert "period" in done.out
-    assert "cannot make the folder" in done.complaint
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_folder_that_cannot_be_made_costs_one_line(cli: Cli, recording: Path, count: int) -> None:
+    """A file stands where the results should go: the results are printed, one line says so, exit code 2."""
+    done = cli("analyse", *[recording] * count, "--output", recording)
+    assert done.code == 2
+    assert "0.7585" in done.out
+    assert str(recording) in done.complaint
 
 
 def test_the_module_runs_as_a_program(recording: Path, tmp_path: Path) -> None:

@@ -170,10 +170,8 @@ def test_runs_csv_gives_scenes_and_tags(runs, cli):
     assert [row["group"] for row in table][:3] == ["", "A", "B"]
     assert table[1]["bob_mass_kg_u"] == "5e-05"
     assert {row["spring_mass_kg"] for row in table} == {"0.01"}
-    (alone,) = cli(
-        "analyse", "--json", "runs/run001.txt", "--accuracy", "fast", "--mass-kg", "0.2176", "--mass-u-kg", "0.00005",
-        "--spring-mass-kg", "0.01",
-    ).results  # fmt: skip
+    bench = ("--mass-kg", "0.2176+/-0.00005", "--set", "spring.mass_kg=0.01")
+    (alone,) = cli("analyse", "--json", "runs/run001.txt", "--accuracy", "fast", *bench).results
     assert float(table[1]["spring_constant"]) == alone["estimates"]["spring_constant"]["value"]
 
 

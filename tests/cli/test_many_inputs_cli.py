@@ -1,4 +1,4 @@
-"""Several inputs: one Table 1, one file of numbers, reports on request; folders of recordings."""
+"""Several inputs: one Table 1 and one report; folders of recordings."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def bench(tmp_path: Path, data: Path) -> Path:
     return folder
 
 
-def test_several_inputs_share_one_table_and_one_file_of_numbers(cli: Cli, bench: Path, tmp_path: Path) -> None:
-    """A column a run, a row a run and quantity, and no report unasked."""
+def test_several_inputs_share_one_table_and_one_report(cli: Cli, bench: Path, tmp_path: Path) -> None:
+    """A column a run, a row a run and quantity, one page that shows both."""
     runs = [bench / f"{name}_simulated_position.txt" for name in ("undamped", "damped")]
     done = cli("analyse", *runs, "--output", tmp_path / "out")
     assert done.code == 0
@@ -37,6 +37,8 @@ def test_several_inputs_share_one_table_and_one_file_of_numbers(cli: Cli, bench:
     assert "0.7585" in period
     assert "0.7900" in period
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["together.results"]
+    page = (tmp_path / "out" / "together.results" / "report.html").read_text("utf-8")
+    assert all(run.stem in page for run in runs)
     with (tmp_path / "out" / "together.results" / "results.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     results = json.loads((tmp_path / "out" / "together.results" / "results.json").read_text())
@@ -67,8 +69,7 @@ def test_a_folder_without_a_recording_is_refused(cli: Cli, bench: Path) -> None:
     assert "readme.md" in done.complaint
 
 
-def test_velocity_and_report_options_that_contradict_are_refused(cli: Cli, bench: Path) -> None:
-    """One velocity file does not complete a folder, and no report is not a report."""
+def test_one_velocity_file_does_not_complete_a_folder(cli: Cli, bench: Path) -> None:
+    """Exit code 2, and one line."""
     done = cli("analyse", bench, "--velocity", bench / "damped_simulated_velocity.txt", "--json")
     assert done.code == 2
-    assert cli("analyse", bench, "--report", "--no-report").code == 2

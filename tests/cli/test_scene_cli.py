@@ -58,8 +58,8 @@ def test_a_check_asks_about_values_and_refuses_what_cannot_be(cli: Cli, tmp_path
 
 def test_values_of_the_bench_on_the_command_line_stand_for_a_scene(cli: Cli, run: Path, data: Path) -> None:
     """Masses with their uncertainties give the spring constant that the scene gives; one amends a scene."""
-    masses = ("--mass-kg", "0.2176", "--mass-u-kg", "0.00005", "--spring-mass-kg", "0.01", "--spring-mass-u-kg")
-    bench = (*masses, "0.0005", "--disc-diameter-m", "0.102", "--disc-diameter-u-m", "0.0005", "--temperature-c", "20")
+    masses = ("--mass-kg", "0.2176+/-0.00005", "--set", "spring.mass_kg=0.0100(5)")
+    bench = (*masses, "--set", "disc.diameter_m=0.102+/-0.0005", "--set", "air.temperature_c=20")
     (typed,) = cli("analyse", run, "--json", *bench).results
     (filed,) = cli("analyse", run, "--json", "--scene", data / "damped.scene.toml").results
     for name in ("value", "u"):
@@ -73,7 +73,10 @@ def test_values_of_the_bench_on_the_command_line_stand_for_a_scene(cli: Cli, run
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--mass-u-kg", "0.1"), "--mass-u-kg"),
+        (("--mass-kg", "200 g"), "--mass-kg"),
+        (("--mass-kg", "0.2+/--0.1"), "--mass-kg"),
+        (("--set", "bob.mass=0.2"), "mass_kg"),
+        (("--set", "mass_kg"), "--set"),
         (("--mass-kg", "-1"), "mass_kg"),
     ],
 )

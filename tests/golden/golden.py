@@ -44,6 +44,14 @@ STANDARDISED = ("pull", "chi2", "excess_chi2")
 """Numbers in units of a standard uncertainty, or squares of such: ten thousandths of it are rounding."""
 COURSE_LEFT_OUT = ("path", "error", "messages", "correlations", "drag_points")
 
+BENCH = {
+    "--mass-kg": ("--mass-u-kg", "bob.mass_kg"),
+    "--spring-mass-kg": ("--spring-mass-u-kg", "spring.mass_kg"),
+    "--disc-diameter-m": ("--disc-diameter-u-m", "disc.diameter_m"),
+    "--temperature-c": ("--temperature-u-c", "air.temperature_c"),
+}
+"""Options of 0.2.0 for a value of the bench and its uncertainty, and the key that ``--set`` takes instead."""
+
 Table = dict[str, list[Any]]
 
 
@@ -84,10 +92,26 @@ def frozen() -> dict[str, Table]:
     return dict(json.loads(FROZEN.read_text("utf-8")))
 
 
+def translated(words: list[str]) -> list[str]:
+    """Return a command line of 0.2.0 in today's options."""
+    words = list(words)
+    for option, (of_u, key) in BENCH.items():
+        if option in words:
+            value = words[words.index(option) + 1]
+            if of_u in words:
+                at_u = words.index(of_u)
+                value += f"+/-{words[at_u + 1]}"
+                del words[at_u : at_u + 2]
+            at = words.index(option)
+            words[at : at + 2] = ["--set", f"{key}={value}"]
+    return words
+
+
 def run(words: list[str]) -> tuple[int, str, str]:
     """Run one command line in this process: exit code, stdout, stderr."""
     from springmass.cli import main
 
+    words = translated(words)
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(words)
