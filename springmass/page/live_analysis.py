@@ -174,6 +174,7 @@ def _latest_fit(motion: Oscillation) -> dict[str, Any]:
     decay: F8 = np.clip(np.nan_to_num(curve / now), 0.0, None) if now > 0.0 else np.ones(after.size)
     return {
         "decay": {"from": -FIT_BEFORE_S, "step": float(after[1] - after[0]), "value": np.round(decay, 6).tolist()},
+        "start": damping.t0,
         "moment": float(windows.t[-1]),
         "amplitude": float(windows.amplitude[-1]),
         "phase": float(windows.phase[-1]),

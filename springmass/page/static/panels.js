@@ -51,13 +51,15 @@ const is_over = () => run.source === "REPLAY" || state.ended;
 function last_time() { const all = samples[0]; return all && all.count ? all.t[all.count - 1] : 0; }
 const now_s = () => last_time() + (!state || is_over() ? 0 : (performance.now() - came_at) / 1e3);
 
+const label_of = (name) => (name === "amplitude_now" && is_over() ? "amplitude at the end" : LABELS[name]);
+
 function show_motion() {
   if (!motion) return;
   $("why").textContent = motion.why || "";
   const fresher = now && !is_over() && now.t_s > (motion.t_s || 0) ? now.estimates : {};
   const estimates = { ...motion.estimates, ...(motion.estimates ? fresher : {}) };
   $("estimates").replaceChildren(...Object.keys(LABELS).filter((name) => estimates[name]).map((name) => {
-    const group = pair(LABELS[name] + (OF_LAW.has(name) && motion.stated_law ? `, law ${motion.stated_law}` : ""), short(estimates[name])), detail = group.lastChild, age = document.createElement("span");
+    const group = pair(label_of(name) + (OF_LAW.has(name) && motion.stated_law ? `, law ${motion.stated_law}` : ""), short(estimates[name])), detail = group.lastChild, age = document.createElement("span");
     detail.title = estimates[name].text;
     group.dataset.name = name;
     group.dataset.t = fresher[name] ? now.t_s : motion.t_s;
@@ -126,8 +128,8 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if
 const LEAST_SWING_PX = 6;
 function draw_fits(plot) {
   const { min, max } = plot.scales.x;
-  if (motion && motion.fit) draw_fit(plot, motion.fit, Math.max(min, motion.fit.moment - 20), Math.min(max, end_time()), ["flagged", 0]);
-  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, selection.from, region.fit.moment - 20), Math.min(max, selection.to), ["other", 0]);
+  if (motion && motion.fit) draw_fit(plot, motion.fit, Math.max(min, motion.fit.start, motion.fit.moment - 20), Math.min(max, end_time()), ["flagged", 0]);
+  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, region.fit.start, region.fit.moment - 20), Math.min(max, selection.to), ["other", 0]);
 }
 
 function draw_fit(plot, fit, from, to, name) {

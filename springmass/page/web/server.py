@@ -7,9 +7,16 @@ import contextlib
 import json
 import logging
 import socket
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from springmass.errors import complain
 from springmass.page.state import PageState
@@ -18,10 +25,6 @@ from springmass.page.web.security import ACT, REPORT, Access, guarded
 from springmass.page.web.sharing import code_svg
 from springmass.session.failures import raised_at
 from storage.errors import one_line
-
-if TYPE_CHECKING:
-    from starlette.applications import Starlette
-    from starlette.websockets import WebSocket
 
 LOG = logging.getLogger("springmass.page")
 STATIC = Path(__file__).parents[1] / "static"
@@ -137,8 +140,6 @@ class Server:
 
         New data are taken from the view whenever the browser has received the previous data.
         """
-        from starlette.websockets import WebSocketDisconnect
-
         client = browser.client.host if browser.client else ""
         await browser.accept()
         self._viewers += 1
@@ -160,8 +161,6 @@ class Server:
                 await browser.close(1011)
 
     async def _receive(self, browser: WebSocket) -> None:
-        from starlette.websockets import WebSocketDisconnect
-
         while True:
             message = await browser.receive()
             if message["type"] == "websocket.disconnect":
@@ -215,11 +214,6 @@ def application(page: PageState, share: str = "", polled: Callable[[int], None] 
     ``share`` is the address for viewers, if they are admitted; ``polled`` is called after every read of the log, with
     the number of viewers.
     """
-    from starlette.applications import Starlette
-    from starlette.responses import FileResponse, PlainTextResponse, Response
-    from starlette.routing import Mount, Route, WebSocketRoute
-    from starlette.staticfiles import StaticFiles
-
     server = Server(page, share, polled)
 
     async def main(_: Any) -> Response:
@@ -254,8 +248,6 @@ def serve(
     empty, only this computer may open the page. ``opened`` is called once the page answers, with its address and that
     for viewers; ``over`` returns whether the recording has ended.
     """
-    import uvicorn
-
     with socket.create_server(("0.0.0.0" if network else "127.0.0.1", port)) as listener:
         port = listener.getsockname()[1]
         access = Access(port, viewers=bool(network))
@@ -285,8 +277,9 @@ def serve(
             timeout_graceful_shutdown=2,
         )
         server = uvicorn.Server(config)
-        with log_to_stderr():
-            server.run(sockets=[listener])
+        logging.getLogger().addHandler(_Lines())
+        logging.captureWarnings(True)
+        server.run(sockets=[listener])
 
 
 class _Lines(logging.Handler):
@@ -310,16 +303,3 @@ class _Lines(logging.Handler):
             text += f" ({self._left_out} earlier messages were left out)"
             self._left_out = 0
         complain(f"page: {text}")
-
-
-@contextlib.contextmanager
-def log_to_stderr() -> Iterator[None]:
-    """Write this process's log and Python's warnings to stderr, in few lines, until the ``with`` block ends."""
-    handler, root = _Lines(), logging.getLogger()
-    root.addHandler(handler)
-    logging.captureWarnings(True)
-    try:
-        yield
-    finally:
-        logging.captureWarnings(False)
-        root.removeHandler(handler)
