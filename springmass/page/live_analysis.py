@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -57,23 +57,20 @@ def motion_of(
 ) -> dict[str, Any]:
     """Analyse samples and return the message about their motion; None wants u(T) to reach 40 ppm of the period."""
     options = with_law(options_for(accuracy), law)
-    return _message(lambda: analyse_track(track, scene, options, traps), track, accuracy, wanted_u_s, charts=charts)
-
-
-def _message(
-    analyse: Callable[[], Analysis], track: Track, accuracy: str, wanted_u_s: float | None, *, charts: bool
-) -> dict[str, Any]:
-    """Return the message about an analysis, or about the reason why there is none."""
-    message: dict[str, Any] = {
-        "type": "motion",
-        "why": "",
-        "accuracy": accuracy,
-        "t_s": float(np.nanmax(track.t)) if np.isfinite(track.t).any() else None,
-    }
     try:
-        analysis = analyse()
+        analysis = analyse_track(track, scene, options, traps)
     except PipelineError as error:
-        return {**message, "why": str(error)}
+        return {"type": "motion", "why": str(error), "accuracy": accuracy, "t_s": _end(track)}
+    return _message(analysis, accuracy, wanted_u_s, charts=charts)
+
+
+def _end(track: Track) -> float | None:
+    return float(np.nanmax(track.t)) if np.isfinite(track.t).any() else None
+
+
+def _message(analysis: Analysis, accuracy: str, wanted_u_s: float | None, *, charts: bool) -> dict[str, Any]:
+    track = analysis.track
+    message: dict[str, Any] = {"type": "motion", "why": "", "accuracy": accuracy, "t_s": _end(track)}
     message["findings"] = [
         {"code": f.code, "severity": f.severity, "message": f.message, "advice": f.advice}
         for f in analysis.findings
@@ -238,7 +235,7 @@ class Watcher:
         except (AcquisitionError, StorageError, ProgramError, PipelineError) as error:
             return {"type": "motion", "why": str(error), "accuracy": WHOLE_TIER}
         self._run = run
-        return _message(lambda: run.analysis, run.loaded.track, WHOLE_TIER, self._wanted_u_s, charts=True)
+        return _message(run.analysis, WHOLE_TIER, self._wanted_u_s, charts=True)
 
     def _now(self, swing_s: float) -> dict[str, Any]:
         """Analyse only the last seconds, and return the message about their amplitude."""

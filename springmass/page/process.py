@@ -15,7 +15,7 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from springmass.session.failures import Failures
 from springmass.stops import EndReason, Stops
@@ -49,19 +49,21 @@ class PageProcess:
         self._phase = "waiting"
         self._over = self._gone = False
         self._process: subprocess.Popen[bytes] | None = None
-        self._listener = threading.Thread(target=self._listen, name="springmass-page", daemon=True)
 
     def __enter__(self) -> PageProcess:
         try:
             # In a separate session, because Ctrl-C is meant for the recording, which ends the page later.
-            self._process = subprocess.Popen(
-                self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-            )
+            pipe = subprocess.PIPE
+            self._process = subprocess.Popen(self._command, stdin=pipe, stdout=pipe, start_new_session=True)
         except OSError as error:
             self._lost(error)
             return self
+        self._listener = threading.Thread(
+            target=self._listen, args=(self._process,), name="springmass-page", daemon=True
+        )
         self._listener.start()
-        threading.Thread(target=self._write, name="springmass-page-states", daemon=True).start()
+        writing = (self._process.stdin,)
+        threading.Thread(target=self._write, args=writing, name="springmass-page-states", daemon=True).start()
         return self
 
     def tell(self, phase: str, **facts: Any) -> None:
@@ -91,25 +93,19 @@ class PageProcess:
             self._process.kill()
             self._process.wait()
 
-    def _write(self) -> None:
-        assert self._process is not None
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError):  # the page has ended
+    def _write(self, page: IO[bytes]) -> None:
+        with contextlib.suppress(OSError), page:  # an error means that the page has ended
             while (line := self._lines.get()) is not None:
-                self._process.stdin.write(json.dumps(line).encode() + b"\n")
-                self._process.stdin.flush()
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
+                page.write(json.dumps(line).encode() + b"\n")
+                page.flush()
 
-    def _listen(self) -> None:
-        assert self._process is not None
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
+    def _listen(self, process: subprocess.Popen[bytes]) -> None:
+        for line in process.stdout or ():
             try:
                 self._take(json.loads(line))
             except (ValueError, KeyError, TypeError) as error:
                 self._failures.note("page", error)
-        code = self._process.wait()
+        code = process.wait()
         if not self._over:
             self._lost(RuntimeError(f"its process ended with {code}"))
 

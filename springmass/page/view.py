@@ -21,8 +21,7 @@ from storage.wire_log.wire_samples import Origin
 
 VERSION = 2  # of the messages
 MOST_PER_MESSAGE = 50_000
-SAMPLES = 1
-"""First number of a binary message that contains samples."""
+SAMPLES = 1  # first number of a binary message that contains samples
 _HEAD = struct.Struct("<4I")
 
 

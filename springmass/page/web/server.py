@@ -141,18 +141,18 @@ class Server:
         New data are taken from the view whenever the browser has received the previous data.
         """
         client = browser.client.host if browser.client else ""
-        await browser.accept()
-        self._viewers += 1
-        tasks = [asyncio.create_task(each(browser)) for each in (self._receive, self._send)]
-        try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            self._viewers -= 1
-            for task in tasks:
-                task.cancel()
-            ends = await asyncio.gather(*tasks, return_exceptions=True)
-        error = next(end for end in ends if not isinstance(end, asyncio.CancelledError))
         with contextlib.suppress(WebSocketDisconnect):
+            await browser.accept()
+            self._viewers += 1
+            tasks = [asyncio.create_task(each(browser)) for each in (self._receive, self._send)]
+            try:
+                await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                self._viewers -= 1
+                for task in tasks:
+                    task.cancel()
+                ends = await asyncio.gather(*tasks, return_exceptions=True)
+            error = next(end for end in ends if not isinstance(end, asyncio.CancelledError))
             if isinstance(error, Refused):
                 LOG.warning("%s sent %s; its connection is closed", client, error)
                 await browser.close(1003)
@@ -183,29 +183,30 @@ class Server:
                 view = self._page.view
                 sent, texts = [0] * len(view.series), {}
                 await browser.send_text(json_of(self._hello(view, acts=ACT in browser.auth.scopes)))
-            for number, series in enumerate(() if view is None else view.series):
-                while sent[number] < len(series):
-                    frame = self._frame(view, number, sent[number])
-                    sent[number] += (len(frame) - 16) // 16
-                    await browser.send_bytes(frame)
-            for kind in ("state", "motion", "now"):
-                # If the view was replaced meanwhile, data of the next one must wait for its hello message.
-                text = self._texts.get(kind, "") if view is self._page.view is not None else ""
-                if text and text is not texts.get(kind):
-                    texts[kind] = text
-                    await browser.send_text(text)
+            if view is not None:
+                for number, series in enumerate(view.series):
+                    while sent[number] < len(series):
+                        frame = self._frame(view, number, sent[number])
+                        sent[number] += (len(frame) - 16) // 16
+                        await browser.send_bytes(frame)
+                for kind in ("state", "motion", "now"):
+                    if view is not self._page.view:
+                        break  # it was replaced meanwhile; texts about the next one must wait for its hello message
+                    text = self._texts.get(kind, "")
+                    if text and text is not texts.get(kind):
+                        texts[kind] = text
+                        await browser.send_text(text)
             await self._turned.wait()
 
-    def _frame(self, view: View | None, number: int, first: int) -> bytes:
+    def _frame(self, view: View, number: int, first: int) -> bytes:
         key = (id(view), number, first)
         if key not in self._frames:
-            assert view is not None
             self._frames[key] = view.series[number].message(number, first)
         return self._frames[key]
 
     def _hello(self, view: View, *, acts: bool) -> dict[str, Any]:
-        role = "controller" if acts else "viewer"
-        return {**view.hello(controls=acts and self._page.controls is not None), "role": role, "share": self._share}
+        hello = view.hello(controls=acts and self._page.controls is not None)
+        return {**hello, "role": "controller" if acts else "viewer", "share": self._share}
 
 
 def application(page: PageState, share: str = "", polled: Callable[[int], None] = lambda _: None) -> Starlette:
