@@ -140,7 +140,7 @@ def _sockets(bench: Bench) -> dict[str, object]:
     cookie = str(connection.getresponse().headers["Set-Cookie"]).split(";")[0]
     connection.close()
     return {
-        "uri": f"ws://{parts.netloc}/v1/run",
+        "uri": f"ws://{parts.netloc}/v2/run",
         "origin": f"http://{parts.netloc}",
         "additional_headers": {"Cookie": cookie},
         "max_size": None,

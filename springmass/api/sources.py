@@ -25,7 +25,8 @@ if TYPE_CHECKING:
         """A frame or a series of pandas."""
 
         @property
-        def index(self) -> Any: ...
+        def index(self) -> Any:
+            """Times, or numbers of rows."""
 
     Path: TypeAlias = str | os.PathLike[str]
     Arrays: TypeAlias = tuple[ArrayLike, ArrayLike] | Mapping[str, ArrayLike] | xr.Dataset | xr.DataArray | Indexed

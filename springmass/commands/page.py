@@ -6,7 +6,7 @@ import json
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,8 +14,7 @@ from springmass.commands.options import PART, PageOptions, Recording, flag, refu
 from springmass.errors import OK, USAGE, ProgramError, manner, tell
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
-from springmass.page.web.log_lines import log_to_stderr
-from springmass.page.web.server import Opening, serve
+from springmass.page.web.server import serve
 from springmass.page.web.sharing import address_in_network, code_for_terminal
 from springmass.runs.loading import kind_of, load
 from springmass.runs.options import ReadOptions
@@ -33,80 +32,56 @@ def page(
     """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""
     refuse("page", read, *PART)
     path = Path(recording)
-    wanted_u_s = None if page.want_us is None else page.want_us * 1e-6
     over = threading.Event()
-    opening = Opening(page.page_port, network=address_in_network() if page.lan else "")
+    network = address_in_network() if page.lan else ""
+    wanted_u_s = None if page.want_us is None else page.want_us * 1e-6
+    state = PageState(
+        wanted_u_s,
+        _to_recorder if recorder else None,
+        name=path.with_suffix(".h5").name if recorder else "",
+        law=page.law,
+    )
     if recorder:
-        page_state = PageState(wanted_u_s, _say, name=path.with_suffix(".h5").name, law=page.law)
-        opening = _from_recorder(opening, page_state, over)
+        threading.Thread(target=_listen, args=(state, over), name="springmass-page-recorder", daemon=True).start()
+    elif kind_of(path) == "wire":
+        state.follow(path)
     else:
-        page_state = PageState(wanted_u_s, law=page.law)
-        _look_at(page_state, path, read)
-    opening.opened = _ready(page, opening)
+        loaded = load(path, read)
+        state.show(view_of(loaded), loaded.scene, loaded.path)
+
+    def opened(address: str, share: str) -> None:
+        lines = [f"page: {address}"]
+        if share:
+            lines.append(f"viewers in this network: {share}")
+            lines += code_for_terminal(share).splitlines() if sys.stderr.isatty() else []
+        for line in lines:
+            # For the page of a recording, the recorder prints these lines, because its progress would overwrite them.
+            if not recorder:
+                tell(line)
+            elif not manner()[0]:
+                _to_recorder({"type": "line", "text": line})
+        if not page.no_browser:
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+
     try:
         STOPS.end()  # the server handles signals itself
-        with log_to_stderr():
-            serve(page_state, opening, until=over.is_set)
+        serve(state, port=page.page_port, network=network, opened=opened, over=over.is_set)
     except KeyboardInterrupt:
         tell("the page is closed")
     except OSError as error:
         reason = error.strerror or str(error)
-        raise ProgramError(f"--page-port {opening.port}: {reason}; name another, or 0 for any", USAGE) from error
+        raise ProgramError(f"--page-port {page.page_port}: {reason}; name another, or 0 for any", USAGE) from error
     finally:
-        page_state.close()
+        state.close()
     return OK
 
 
-def _look_at(page_state: PageState, path: Path, read: ReadOptions) -> None:
-    if kind_of(path) == "wire":
-        page_state.follow(path)
-    else:
-        loaded = load(path, read)
-        page_state.show(view_of(loaded), loaded.scene, loaded.path)
+def _listen(state: PageState, over: threading.Event) -> None:
+    """Pass on the recorder's messages from stdin; the recorder has ended when stdin ends."""
+    for line in sys.stdin:
+        state.recorder_states.put(json.loads(line))
+    over.set()
 
 
-def _ready(options: PageOptions, opening: Opening) -> Callable[[int, str | None, str], None]:
-    def ready(port: int, address: str | None, network: str) -> None:
-        """Say where the page is; to the recorder, too, so that one that is started again is found at the same place."""
-        if opening.secret:
-            _say({"type": "open", "port": port})
-        if address is None:
-            return  # a restarted page: its browsers know the address
-        # For the page of a recording, the recorder prints these lines, because its progress would overwrite them here.
-        say = _say_line if opening.secret else tell
-        say(f"page: {address}")
-        if network:
-            say(f"viewers in this network: {network}")
-            if sys.stderr.isatty():
-                for line in code_for_terminal(network).splitlines():
-                    say(line)
-        if not options.no_browser:
-            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
-
-    return ready
-
-
-def _from_recorder(opening: Opening, page_state: PageState, over: threading.Event) -> Opening:
-    """Read the recorder's messages from stdin, that of the gate first; the recorder has ended when stdin ends."""
-    first = json.loads(sys.stdin.readline() or "{}").get("gate", {})
-    opening.port = first.get("port") or opening.port
-    opening.secret, opening.used = str(first.get("secret", "")), bool(first.get("used"))
-    opening.was_used = lambda: _say({"type": "used"})
-
-    def listen() -> None:
-        for line in sys.stdin:
-            page_state.put_recorder_state(json.loads(line))
-        over.set()
-
-    threading.Thread(target=listen, name="springmass-page-recorder", daemon=True).start()
-    return opening
-
-
-def _say_line(text: str) -> None:
-    if not manner()[0]:
-        _say({"type": "line", "text": text})
-
-
-def _say(message: Mapping[str, Any]) -> None:
-    """Send messages to the recorder, one JSON line each."""
+def _to_recorder(message: Mapping[str, Any]) -> None:
     print(json.dumps(message), file=sys.stdout, flush=True)

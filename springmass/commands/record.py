@@ -78,7 +78,7 @@ class RecordOptions:
     ] = None
     seconds: Annotated[Positive | None, option("N", "length of the recording, s (default: until Ctrl-C)")] = None
     page: Annotated[bool, flag("show the recording in a browser, with buttons for marks and stop")] = False
-    ready: Annotated[bool, flag("set zero, calibrate, arm and record from the page; needs --page")] = False
+    ready: Annotated[bool, flag("set zero, arm and record from the page; needs --page")] = False
     scene: Annotated[
         File | None, option("FILE", "scene file to store with the run; its air sets the speed of sound")
     ] = None

@@ -22,7 +22,7 @@ from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import Figures, File, flag, option, output
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
-from springmass.runs.options import ReadOptions
+from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.prepared import Prepared, prepare

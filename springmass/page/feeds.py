@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -10,7 +9,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from acquisition.block import Block
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from springmass.page.view import Series, View
@@ -22,8 +20,6 @@ from storage.wire_log.records import Kind, Record, event_content
 from storage.wire_log.scanning import read_log
 from storage.wire_log.wire_samples import LogDecoder, chain_of
 
-__all__ = ["LogFeed", "view_of"]
-
 AT_ONCE = 10_000
 """Maximum number of records per call: 100 s of a sensor at 100 Hz. A long log is therefore shown piece by piece."""
 MOST_NOTES = 1000
@@ -32,27 +28,19 @@ NOT_LISTED = frozenset({"calibration", "ended"})
 
 
 class LogFeed:
-    """Fills a view from a log that is being written.
-
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    NotALog
-        If the file is not a wire log.
-    """
+    """Fills a view from a log that is being written; raises NotALog if the file is not a wire log."""
 
     def __init__(self, path: Path) -> None:
         self._log = read_log(path)
         header = self._log.header
         if header is None:
             raise NotALog(path, "expected a wire log with a header, got none", "name the log of a recording")
+        self.scene = header.scene
         self._scan = self._log.scan()
         self._sensors = {sensor.channel: sensor for sensor in header.sensors}
         self._series: dict[Part, Series] = {}
-        self._shown: list[Part] = [Part(channel, 1) for channel in self._sensors]
+        self._shown = [Part(channel, 1) for channel in self._sensors]
+        self._timed: list[Record] = []
         self.view = View(
             "LIVE",
             path.with_suffix(".h5").name,
@@ -66,8 +54,6 @@ class LogFeed:
         self._decoder = LogDecoder(self._sensors, self._begin, self._note)
         self.view.rate_hz = self._decoder.chains[self._shown[0]].timebase.rate_hz
         self._take(())
-        self.scene = header.scene
-        self._timed: list[Record] = []
 
     def poll(self) -> None:
         """Read what was added since the last call; an error that prevents this is shown in the view."""
@@ -79,6 +65,10 @@ class LogFeed:
             self.view.error = str(error)
         self._place_marks()
         self.view.ended = self._scan.damage.ended
+
+    def close(self) -> None:
+        """Close the log."""
+        self._log.close()
 
     def _take(self, records: Iterable[Record]) -> None:
         for part, block in self._decoder.blocks(records):
@@ -102,10 +92,6 @@ class LogFeed:
             self.view = replace(self.view, series=series, session=secrets.token_hex(8))
         return chain_of(self._sensors[part.sensor])
 
-    def close(self) -> None:
-        """Close the log."""
-        self._log.close()
-
     def _note(self, record: Record, content: dict[str, Any]) -> None:
         if record.kind is Kind.MARK:
             self._timed.append(record)
@@ -118,20 +104,13 @@ class LogFeed:
                 self.view.notes.append(_in_words(content["kind"], content["facts"]))
 
     def _place_marks(self) -> None:
-        """Give marks and triggers the times that the run file will give them.
-
-        The first sample determines t = 0, and each of the first thousand improves it, so earlier times are replaced.
-        """
-        marks, events = [], []
-        for record in self._timed:
-            t_s = self.view.series[0].time_of(record.mono_ns)
-            if math.isnan(t_s):
-                continue
-            if record.kind is Kind.EVENT:
-                events.append({"t_s": t_s, **event_content(record.payload)})
-            else:
-                marks.append((t_s, record.text()))
-        self.view.marks = marks
+        """Give marks and triggers the times that the run file will give them, which the first samples improve."""
+        origin_ns = self.view.series[0].origin.ns
+        if origin_ns is None:
+            return
+        timed = [((record.mono_ns - origin_ns) * 1e-9, record) for record in self._timed]
+        self.view.marks = [(t_s, record.text()) for t_s, record in timed if record.kind is Kind.MARK]
+        events = [{"t_s": t_s, **event_content(record.payload)} for t_s, record in timed if record.kind is Kind.EVENT]
         self.view.provenance = {**self.view.provenance, "events": events}
 
 
@@ -146,16 +125,13 @@ def _in_words(kind: str, facts: Mapping[str, Any]) -> str:
             return f"Note: {facts['text']}"
     except (KeyError, TypeError, ValueError):  # a log by another program may state other facts
         pass
-    named = ", ".join(
-        f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}" for name, value in facts.items()
-    )
+    named = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in facts.items())
     return f"{kind}: {named}" if named else kind
 
 
 def _zero_of(event: Mapping[str, Any]) -> dict[str, float]:
     """Return rest position and noise in m from an event of kind still; empty if it does not state both."""
-    facts = event["facts"]
-    numbers = {name: facts.get(name) for name in ("rest_m", "noise_m")}
+    numbers = {name: event["facts"].get(name) for name in ("rest_m", "noise_m")}
     return numbers if all(isinstance(value, float) for value in numbers.values()) else {}
 
 
@@ -170,25 +146,24 @@ def _calibration(numbers: Mapping[str, Any] | None) -> str:
 
 def view_of(loaded: Loaded) -> View:
     """Return a view of a saved run."""
-    block: Block = loaded.samples
     view = View(
         "REPLAY",
         loaded.path.name,
         loaded.title,
         loaded.info.rate_hz,
         [loaded.channel or loaded.format],
-        block.quantity,
-        block.unit,
+        loaded.samples.quantity,
+        loaded.samples.unit,
         loaded.info.clock,
         simulated=loaded.info.kind == "simulated",
         recorded=loaded.track,
         traps=loaded.traps,
+        ended=True,
     )
-    view.series[0].push(block)
+    view.series[0].push(loaded.samples)
     view.marks += [(float(mark["t_s"]), str(mark["text"])) for mark in loaded.provenance.get("marks", ())]
     view.notes += [trap.message for trap in loaded.traps]
     for event in loaded.provenance.get("events", ()):
         if event.get("kind") == "still":
             view.zero = _zero_of(event)
-    view.ended = True
     return view

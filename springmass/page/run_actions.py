@@ -10,8 +10,6 @@ from typing import Any
 
 from springmass.runs.about import about_of, write_about
 
-__all__ = ["ASIDE", "Afterwards"]
-
 ASIDE = "discarded"
 """Folder next to the runs for discarded runs."""
 
@@ -19,45 +17,27 @@ ASIDE = "discarded"
 class Afterwards:
     """Works on one run; its path comes from the recorder or the command line, never from the network.
 
-    Parameters
-    ----------
-    run : Path
-    ours : bool
-        Whether the run was recorded just now; no other run can be discarded.
-    law : str or None
-        Stated damping law, for the report.
+    ``ours`` is whether the run was recorded just now; no other run can be discarded. ``report`` is the path of the
+    report; None until it is made.
     """
 
     def __init__(self, run: Path, *, ours: bool, law: str | None = None) -> None:
         self._run, self.ours, self._law = run, ours, law
-        self._report: Path | None = None
+        self.report: Path | None = None
         self._making = False
-        self._notes: tuple[str, ...] = ()
-        self._aside = ""
-        self._failed = ""
+        self._notes: list[str] = []
+        self._aside = self._failed = ""
 
     def state(self) -> dict[str, Any]:
         """Return the state of the actions for the page."""
-        report = "making" if self._making else "" if self._report is None else "ready"
-        return {"report": report, "noted": list(self._notes), "discarded": self._aside, "failed": self._failed}
-
-    @property
-    def report(self) -> Path | None:
-        """The path of the report; None until it is made."""
-        return self._report
-
-    def make_report(self) -> None:
-        """Start a process that analyses the run, unless one is already running."""
-        if self._making:
-            return
-        self._making, self._failed, self._report = True, "", None
-        threading.Thread(target=self._analyse, name="springmass-page-report", daemon=True).start()
+        report = "making" if self._making else "" if self.report is None else "ready"
+        return {"report": report, "noted": self._notes, "discarded": self._aside, "failed": self._failed}
 
     def note(self, text: str) -> None:
         """Add a note to the file next to the run."""
         try:
             write_about(about_of(self._run).with_more(None, (text,), ()))
-            self._notes = (*self._notes, text)
+            self._notes = [*self._notes, text]
         except Exception as error:
             self._failed = f"not noted ({error})"
 
@@ -80,6 +60,12 @@ class Afterwards:
         except OSError as error:
             self._failed = f"not set aside ({error.strerror or error})"
 
+    def make_report(self) -> None:
+        """Start a process that analyses the run, unless one is already running."""
+        if not self._making:
+            self._making, self._failed, self.report = True, "", None
+            threading.Thread(target=self._analyse, name="springmass-page-report", daemon=True).start()
+
     def _analyse(self) -> None:
         command = [sys.executable, "-m", "springmass", "-q", "analyse", str(self._run), "-o", str(self._run.parent)]
         command += [] if self._law is None else ["--law", self._law]
@@ -87,7 +73,7 @@ class Afterwards:
             done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, errors="replace")
             page = self._run.parent / f"{self._run.stem}.results" / "report.html"
             if done.returncode == 0 and page.is_file():
-                self._report = page
+                self.report = page
             else:
                 lines = done.stderr.strip().splitlines()
                 self._failed = f"no report ({lines[-1] if lines else f'exit code {done.returncode}'})"

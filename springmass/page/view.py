@@ -1,4 +1,4 @@
-"""The contents of the page: samples, marks and notes of the log, stored once for all viewers."""
+"""What the page shows of a recording: samples, marks and notes, stored once for all viewers."""
 
 from __future__ import annotations
 
@@ -10,34 +10,29 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.block import Block
 from acquisition.recordings.recording import Trap
 from acquisition.source import ClockKind, SourceInfo
-from pipeline.track import F8, U8, Track
+from pipeline.track import Track
 from springmass.runs.tracks import to_track
+from storage.wire_log.wire_samples import Origin
 
-__all__ = ["VERSION", "Series", "View", "json_of"]
-
-VERSION = 1
-"""Version of the messages."""
+VERSION = 2  # of the messages
 MOST_PER_MESSAGE = 50_000
-_HEAD, _F8 = struct.Struct("<4I"), np.dtype("<f8")
-FIRST_SAMPLES = 1000
-"""Number of samples whose time stamps determine t = 0; later ones would add the difference of the clocks' rates."""
-SAMPLES = 1
-"""First number of a binary message that contains samples."""
+SAMPLES = 1  # first number of a binary message that contains samples
+_HEAD = struct.Struct("<4I")
 
 
 class Series:
-    """One sensor's samples; the storage grows by doubling, so that the cost per sample stays constant."""
+    """One sensor's samples; the room grows by doubling, so that the cost per sample stays constant."""
 
     def __init__(self) -> None:
-        self._t, self._y, self._flags = np.empty(1024), np.empty(1024), np.empty(1024, np.uint8)
-        self._host_ns = np.empty(1024, np.int64)
+        self._columns: list[NDArray[Any]] = [np.empty(1024, kind) for kind in (float, float, np.uint8, np.int64)]
         self._count = 0
-        self._missing = self._looked_at = 0
-        self._moment_ns: float | None = None
+        self.missing = 0
+        self.origin = Origin()
 
     def __len__(self) -> int:
         return self._count
@@ -45,39 +40,21 @@ class Series:
     def push(self, block: Block) -> None:
         """Append samples."""
         stop = self._count + len(block)
-        if stop > self._t.size:
-            room = max(stop, 2 * self._t.size) - self._count
-            self._t, self._y = (np.concatenate([c[: self._count], np.empty(room)]) for c in (self._t, self._y))
-            self._flags = np.concatenate([self._flags[: self._count], np.empty(room, np.uint8)])
-            self._host_ns = np.concatenate([self._host_ns[: self._count], np.empty(room, np.int64)])
-        new = slice(self._count, stop)
-        self._t[new], self._y[new], self._flags[new] = block.t, block.distance, block.flags
-        self._host_ns[new] = -1 if block.host_ns is None else block.host_ns
-        early = min(len(block), FIRST_SAMPLES - self._count)
-        if block.host_ns is not None and early > 0:
-            # A time stamp may be late, but never early.
-            moment_ns = float((block.host_ns[:early] - 1e9 * block.t[:early]).min())
-            self._moment_ns = moment_ns if self._moment_ns is None else min(self._moment_ns, moment_ns)
-        self._count = stop
-
-    def missing(self) -> int:
-        """Return the number of missing samples."""
-        self._missing += int(np.count_nonzero(np.isnan(self._y[self._looked_at : self._count])))
-        self._looked_at = self._count
-        return self._missing
-
-    def columns(self) -> tuple[F8, F8, U8]:
-        """Return times in s, distances in m and flags, (n,) each, as they are now."""
-        return self._t[: self._count], self._y[: self._count], self._flags[: self._count]
+        if stop > self._columns[0].size:
+            room = max(stop, 2 * self._columns[0].size) - self._count
+            self._columns = [np.concatenate([c[: self._count], np.empty(room, c.dtype)]) for c in self._columns]
+        host_ns = -1 if block.host_ns is None else block.host_ns
+        for column, new in zip(self._columns, (block.t, block.distance, block.flags, host_ns), strict=True):
+            column[self._count : stop] = new
+        self.missing += int(np.count_nonzero(np.isnan(block.distance)))
+        self.origin.push(block)
+        self._count = stop  # last, because the analysis reads in another thread
 
     def block(self) -> Block:
         """Return all samples as they are now."""
-        t, y, flags = self.columns()
-        return Block(0, t, y, flags, self._host_ns[: self._count])
-
-    def time_of(self, host_ns: int) -> float:
-        """Convert a time of the host's clock in ns to a time of the record in s; NaN before the first sample."""
-        return float("nan") if self._moment_ns is None else (host_ns - self._moment_ns) * 1e-9
+        count = self._count
+        t, distance, flags, host_ns = (column[:count] for column in self._columns)
+        return Block(0, t, distance, flags, host_ns)
 
     def message(self, sensor: int, first: int) -> bytes:
         """Return at most 50,000 samples, starting at index ``first``, as a binary message.
@@ -86,51 +63,17 @@ class Series:
         ``count`` values as 64-bit floats; a missing sample is NaN.
         """
         stop = min(self._count, first + MOST_PER_MESSAGE)
-        t, y = (column[first:stop].astype(_F8, copy=False).tobytes() for column in (self._t, self._y))
+        t, y = (column[first:stop].astype("<f8", copy=False).tobytes() for column in self._columns[:2])
         return _HEAD.pack(SAMPLES, sensor, first, stop - first) + t + y
 
 
 @dataclass(eq=False)
 class View:
-    """A run as the page shows it.
+    """A run as the page shows it, with one series per sensor.
 
-    Parameters
-    ----------
-    source : {"LIVE", "REPLAY"}
-    name, title : str
-    rate_hz : float
-        Nominal sampling rate.
-    sensors : list of str
-    quantity, unit : str
-        Quantity and unit of the values.
-    clock : {"nominal", "device", "host"}
-        Source of the times.
-    simulated : bool
-        Whether the data are simulated; such data are always marked as simulated.
-    calibration : str
-        How distances were calibrated, in words; empty if unknown.
-    series : list of Series
-        One series per sensor.
-    session : str
-        Identifier that differs between starts, so that a page that reconnects to another run begins anew.
-    marks : list of (float, str)
-        Time in s and text.
-    notes : list of str
-        Events of the recording, in words.
-    ended : bool
-    error : str
-        Why no further samples are shown; empty without an error.
-    recorded : Track or None
-        For a saved run: the first sensor's samples in the form for an analysis.
-    info : SourceInfo or None
-        For a run that is being recorded: properties of its first sensor.
-    provenance : mapping
-        The provenance from the log so far, in the form of a run file: sensor, events and, after the end, how the log
-        was decoded.
-    traps : tuple of Trap
-        Traps that the reader found in the file.
-    zero : mapping
-        ``rest_m`` and ``noise_m`` as measured before the run; empty if they were not measured.
+    ``session`` differs between runs, so that a page that reconnects to another run begins anew. ``zero`` has the rest
+    position and noise measured before the run. ``recorded`` is the track of a saved run; ``info`` and ``provenance``
+    are those of a run that is being recorded.
     """
 
     source: Literal["LIVE", "REPLAY"]
@@ -155,6 +98,9 @@ class View:
     traps: tuple[Trap, ...] = ()
     zero: dict[str, float] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self.series = self.series or [Series() for _ in self.sensors]
+
     def track(self) -> Track:
         """Return the first sensor's samples so far, in the form for an analysis."""
         if self.recorded is not None:
@@ -162,22 +108,18 @@ class View:
         info = self.info or SourceInfo("live", self.name, self.rate_hz, clock=self.clock)
         return to_track(self.series[0].block(), info, recorded_format="wire", provenance=self.provenance)
 
-    def __post_init__(self) -> None:
-        self.series = self.series or [Series() for _ in self.sensors]
-
     def hello(self, *, controls: bool) -> dict[str, Any]:
         """Return the first message to a viewer."""
         names = ("session", "source", "name", "title", "rate_hz", "sensors", "quantity", "unit", "simulated", "clock")
-        fields = {name: getattr(self, name) for name in names}
-        more = {"calibration": self.calibration, "controls": controls}
-        return {"type": "hello", "version": VERSION, **fields, **more}
+        fields = {name: getattr(self, name) for name in (*names, "calibration")}
+        return {"type": "hello", "version": VERSION, **fields, "controls": controls}
 
     def state(self) -> dict[str, Any]:
         """Return the state of the run according to its log."""
         return {
             "type": "state",
             "samples": [len(series) for series in self.series],
-            "missing": sum(series.missing() for series in self.series),
+            "missing": sum(series.missing for series in self.series),
             "marks": [[t, text] for t, text in self.marks],
             "notes": self.notes[-20:],
             "ended": self.ended,

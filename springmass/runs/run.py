@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from acquisition.recordings.recording import Trap
 from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic, classic
+from pipeline.track import Track
 from springmass.errors import detail
 from springmass.runs.arrays import again, loaded_of
 from springmass.runs.estimates import Value
@@ -103,9 +105,8 @@ class Run(Mapping[str, Value]):
     @cached_property
     def analysis(self) -> Analysis:
         """The analysis; its findings include those of the reader."""
-        found = analyse(self.loaded.track, self.scene, self.how.options)
         detail(f"analysed: {self.name} at {self.how.accuracy}, with a scene that states {stated_keys(self.scene)}")
-        return replace(found, findings=with_traps(found.findings, self.loaded.traps))
+        return analyse_track(self.loaded.track, self.scene, self.how, self.loaded.traps)
 
     @cached_property
     def classic(self) -> Classic | None:
@@ -278,6 +279,12 @@ class Run(Mapping[str, Value]):
 
     def _repr_html_(self) -> str:
         return html_summary(self)
+
+
+def analyse_track(track: Track, scene: Scene, how: How, traps: Sequence[Trap]) -> Analysis:
+    """Analyse samples; the findings include what their reader noticed."""
+    found = analyse(track, scene, how.options)
+    return replace(found, findings=with_traps(found.findings, traps))
 
 
 class _NoValue(KeyError):

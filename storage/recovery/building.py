@@ -17,9 +17,7 @@ from storage.wire_log.notes import Survey
 from storage.wire_log.parts import Part
 from storage.wire_log.records import SensorEntry
 from storage.wire_log.scanning import Damage, LogContents
-
-FIRST_SAMPLES = 1000
-"""Number of initial samples that determine the host time of t = 0; later ones would add the sensor's clock error."""
+from storage.wire_log.wire_samples import Origin
 
 
 class RunBuilder:
@@ -27,16 +25,13 @@ class RunBuilder:
 
     def __init__(self, writer: RunWriter, part: Part, sensor: SensorEntry, chain: SensorChain) -> None:
         self._writer, self._part, self._sensor, self._chain = writer, part, sensor, chain
-        self._first_ns: list[int] = []
+        self._origin = Origin()
         self._samples = 0
         self._losses = LossCount(chain.timebase.rate_hz)
 
     def append(self, block: Block) -> None:
         """Append the next samples."""
-        assert block.host_ns is not None
-        if (missing := FIRST_SAMPLES - self._samples) > 0:
-            pairs = zip(block.t[:missing].tolist(), block.host_ns[:missing].tolist(), strict=True)
-            self._first_ns += [host_ns - round(t * 1e9) for t, host_ns in pairs]
+        self._origin.push(block)
         self._samples += len(block)
         self._losses.push(block)
         self._writer.append(block)
@@ -49,8 +44,7 @@ class RunBuilder:
         last = self._part == parts[-1]
         end_ns = survey.end_ns if last else survey.spans[parts[self._part.number]].begin_ns
         losses = self._losses.losses(survey.events_of(self._part), begin_ns, end_ns, last=last)
-        # A host time may be late but never early, so the earliest estimate is the best.
-        origin = min(self._first_ns, default=begin_ns)
+        origin = begin_ns if self._origin.ns is None else self._origin.ns
         self._writer.keep([(log.path.name, log.size, log.pieces())])
         self._writer.finish(
             self._chain.info(self._sensor.port, header.kind),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+import numpy as np
+
 from acquisition.block import Block
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
@@ -18,6 +20,25 @@ HELD_READS = 4096
 """Number of reads decoded at a time; more would take more memory, fewer would give many small arrays."""
 HELD_BYTES = 1 << 18
 """Number of bytes at which fewer reads are decoded, because a read may contain many readings."""
+FIRST_SAMPLES = 1000
+"""Number of initial samples that determine the host time of t = 0; later ones would add the sensor's clock error."""
+
+
+class Origin:
+    """The host time of a part's t = 0; ``ns`` is None before its first sample."""
+
+    def __init__(self) -> None:
+        self.ns: int | None = None
+        self._needed = FIRST_SAMPLES
+
+    def push(self, block: Block) -> None:
+        """Take the part's next samples."""
+        if self._needed > 0 and block.host_ns is not None and len(block):
+            early = slice(self._needed)
+            # A host time may be late but never early, so the earliest estimate is the best.
+            found = int((block.host_ns[early] - np.rint(1e9 * block.t[early]).astype(np.int64)).min())
+            self.ns = found if self.ns is None else min(found, self.ns)
+            self._needed -= len(block)
 
 
 def chain_of(sensor: SensorEntry) -> SensorChain:

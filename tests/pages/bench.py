@@ -92,7 +92,7 @@ class Client:
         """Open the page's socket."""
         origin: Any = f"http://{self.netloc}"
         return connect(
-            f"ws://{self.netloc}/v1/run",
+            f"ws://{self.netloc}/v2/run",
             origin=origin,
             additional_headers={"Cookie": self.cookie},
             ping_interval=None,

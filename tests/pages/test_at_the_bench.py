@@ -20,7 +20,6 @@ from playwright.sync_api import Browser, BrowserContext, Page
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from springmass.page.run_actions import ASIDE
 from storage.run_file.reading import open_run
 from tests.pages.bench import FITTED, LIMIT_S, MOVES, PHASE, SEEN, STAGES, Client, answer, press
 
@@ -91,9 +90,9 @@ def test_notes_and_putting_aside(bench: tuple[Any, Page]) -> None:
     answer(page)
     assert program.ended() == 0
     assert not program.out.exists()
-    with open_run(program.out.parent / ASIDE / "run.h5") as run:
+    with open_run(program.out.parent / "discarded" / "run.h5") as run:
         assert {"text": "new spring"} in [event["facts"] for event in run.provenance["events"]]
-    assert "table was pushed" in (program.out.parent / ASIDE / "run.about.toml").read_text()
+    assert "table was pushed" in (program.out.parent / "discarded" / "run.about.toml").read_text()
 
 
 def test_nothing_is_recorded_where_the_page_is_closed_before(bench: tuple[Any, Page]) -> None:
@@ -183,7 +182,7 @@ def test_messages_are_the_samples(record: Callable[..., Any]) -> None:
     program = record()
     with Client(program.address).socket() as run:
         hello = json.loads(run.recv())
-        assert (hello["type"], hello["version"], hello["simulated"]) == ("hello", 1, True)
+        assert (hello["type"], hello["version"], hello["simulated"]) == ("hello", 2, True)
         count = 0
         while count < 50:
             message = run.recv()
@@ -218,20 +217,42 @@ def test_the_client_of_the_documentation(record: Callable[..., Any]) -> None:
 
 
 @pytest.mark.trials
-def test_a_killed_page_ends_no_recording(record: Callable[..., Any]) -> None:
-    """The page's process is gone; the recording goes on until Ctrl-C, and lacks no reading."""
+def test_a_killed_page_ends_no_recording(record: Callable[..., Any], start: Callable[..., Any]) -> None:
+    """The recording goes on and lacks no reading; a sentence says how to open the page, which shows the rest."""
     program = record()
     log = program.out.with_suffix(".wire")
-    found = subprocess.run(["pgrep", "-f", f"springmass page --recorder.* {log}"], capture_output=True, text=True)
-    os.kill(int(found.stdout), signal.SIGKILL)
+    kill_page_of(program)
     size = log.stat().st_size
     while log.stat().st_size < size + 4096:
         assert program.process.poll() is None, "".join(program.messages)
+    (said,) = [line for line in program.messages if "the page has ended" in line]
+    assert f"`springmass page {log}`" in said
+    again = start("page", str(log))
+    with Client(again.address).socket() as watching:
+        assert json.loads(watching.recv())["name"] == "run.h5"
     assert program.end() == 130
+    assert again.end() == 0
     with open_run(program.out) as run:
         samples = run.samples()
     assert np.isfinite(samples.distance).all()
     assert np.diff(samples.t).max() < 0.015
+
+
+@pytest.mark.trials
+def test_a_killed_page_ends_a_bench_that_waits_for_it(bench: tuple[Any, Page]) -> None:
+    """Nothing could begin the recording any more: the program says so, and ends."""
+    program, _ = bench
+    kill_page_of(program)
+    assert program.ended() == 0
+    assert "the page has ended" in "".join(program.messages)
+    assert not program.out.exists()
+
+
+def kill_page_of(program: Any) -> None:
+    """Kill the process of a recording's page."""
+    command = f"springmass page --recorder.* {program.out.with_suffix('.wire')}"
+    found = subprocess.run(["pgrep", "-f", command], capture_output=True, text=True)
+    os.kill(int(found.stdout), signal.SIGKILL)
 
 
 @pytest.mark.trials
@@ -275,7 +296,7 @@ def test_the_first_minute(bench: tuple[Any, Page]) -> None:
     answer(page)
     page.wait_for_function(PHASE.format(phase="built"))
     press(page, "o")
-    page.wait_for_url("**/v1/report")
+    page.wait_for_url("**/v2/report")
     assert "period" in page.inner_text("body").lower()
     page.go_back()
     press(page, "q")
@@ -310,10 +331,10 @@ def test_a_stranger_sees_nothing(record: Callable[..., Any], browser: Browser, c
     for page in (first, second):
         page.wait_for_function(SEEN.format(count=50))
     stranger = browser.new_context()
-    answered = stranger.new_page().goto(program.address)
+    answered = stranger.new_page().goto(program.address.partition("?")[0])
     assert answered is not None
     assert answered.status == 403
     stranger.close()
     netloc = program.address.split("/")[2]
     with pytest.raises(InvalidStatus):
-        connect(f"ws://{netloc}/v1/run", origin="http://evil.example", open_timeout=LIMIT_S)  # type: ignore[arg-type]
+        connect(f"ws://{netloc}/v2/run", origin="http://evil.example", open_timeout=LIMIT_S)  # type: ignore[arg-type]

@@ -134,7 +134,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     look_at(page, "3-saved")
     shown, marks = page.evaluate(NUMBERS), page.evaluate("state.marks")
     press(page, "o")
-    page.wait_for_url("**/v1/report")
+    page.wait_for_url("**/v2/report")
     page.go_back()
     press(page, "q")
     answer(page)

@@ -1,4 +1,4 @@
-"""Who watches the page and stops when he likes is told the truth: intervals, and how much longer to record."""
+"""Who watches the page is told the truth about how much longer to record."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ import pytest
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from springmass.page.live_analysis import motion_of
-from springmass.page.stopping import widening
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "12"))
 CRYSTAL = 50e-6
@@ -72,18 +71,6 @@ def bench(synthetic: ModuleType, seed: int, laws: tuple[str, ...]) -> Bench:
     return Bench(truth, rng.uniform(0.3e-3, 1e-3), rng.uniform(-CRYSTAL, CRYSTAL), rng.spawn(1)[0], synthetic)
 
 
-def stopped(messages: list[tuple[float, dict[str, Any]]], wish_s: float) -> dict[str, Any] | None:
-    """Return what stands on the page where somebody stops who wishes for a value and for a small uncertainty."""
-    stop = None
-    for _, message in messages:
-        if "stop" not in message:
-            continue
-        stop, value = message["stop"], message["estimates"]["period"]["value"]
-        if stop["u_s"] <= stop["wanted_u_s"] or abs(value - wish_s) <= 0.3 * stop["u_s"]:
-            return {**stop, "value": value}
-    return None if stop is None else {**stop, "value": value}
-
-
 def foretold(messages: list[tuple[float, dict[str, Any]]]) -> tuple[float, float] | None:
     """Return how much longer it was said to take for the wanted u, once no longer than so far, and how much it was."""
     shown = [(t, m["stop"]) for t, m in messages if "stop" in m]
@@ -101,31 +88,19 @@ def foretold(messages: list[tuple[float, dict[str, Any]]]) -> tuple[float, float
     return None
 
 
-def test_intervals_hold_for_those_who_stop_when_they_like(synthetic: ModuleType) -> None:
-    """95 % intervals cover at the stop, with the clock and without it; the time foretold for u(T) comes true."""
-    held, held_samples, two_u, times = [], [], [], []
+def test_the_time_foretold_comes_true(synthetic: ModuleType) -> None:
+    """It is right within 20 % on 95 % of the benches, from when it is no longer than the recording so far."""
+    times = []
     for seed in range(TRIALS):
         each = bench(synthetic, seed, ("linear", "quadratic", "linear+quadratic"))
         messages = each.looks(LOOKS_S, lambda stop: stop["more_s"] == 0.0)
-        seen = each.truth.period * (1.0 + each.clock)  # the clock runs fast: it counts more seconds a swing
-        wish = seen * (1.0 + 1e-4 * np.random.default_rng((19, seed)).standard_normal())
-        stop = stopped(messages, wish)
-        assert stop is not None
-        held.append(stop["low"] <= each.truth.period <= stop["high"])
-        wanted = math.sqrt(stop["wanted_u_s"] ** 2 - stop["u_clock_s"] ** 2)
-        error = abs(stop["value"] - seen)
-        held_samples.append(error <= widening(stop["u_samples_s"], wanted) * stop["u_samples_s"])
-        two_u.append(error <= 2.0 * stop["u_samples_s"])
         if (pair := foretold(messages)) is not None:
             times.append(pair)
     predicted, took = np.array(times).T
     right = np.abs(predicted / took - 1.0) <= 0.2
     print(
-        f"{TRIALS} benches: at the stop the interval covers {np.mean(held):.4f}, that of the samples alone "
-        f"{np.mean(held_samples):.4f}, two u of them {np.mean(two_u):.4f}; of {right.size} times foretold "
-        f"{right.mean():.3f} within 20 %, ratio {np.quantile(predicted / took, [0.025, 0.5, 0.975])}"
+        f"{TRIALS} benches: of {right.size} times foretold {right.mean():.3f} within 20 %, "
+        f"ratio {np.quantile(predicted / took, [0.025, 0.5, 0.975])}"
     )
-    assert np.mean(held) >= within(0.94)
-    assert np.mean(held_samples) >= within(0.94)
     assert right.size >= 0.5 * TRIALS
     assert right.mean() >= within(0.95)

@@ -5,17 +5,17 @@ function label(button, text) { $(button).firstChild.textContent = `${text} `; }
 function show_window() { const s = WINDOWS[window_index]; label("window", s === Infinity ? "all" : `${s} s`); }
 
 // Requests that the controller can make in each phase of the recorder; viewers can make none.
-const ALLOWED = { ready: ["zero", "ruler", "arm", "record", "close"], armed: ["arm", "record", "close"], recording: ["mark", "note", "stop"], built: ["report", "note", "discard", "close"], replay: ["report", "note"] };
+const ALLOWED = { ready: ["zero", "arm", "record", "close"], armed: ["arm", "record", "close"], recording: ["mark", "note", "stop"], built: ["report", "note", "discard", "close"], replay: ["report", "note"] };
 
 function show_actions() {
   const allowed = run.role === "controller" ? ALLOWED[bench().phase] || [] : [];
-  for (const id of ["zero", "ruler", "arm", "record", "mark", "note", "stop", "report", "discard", "close"]) $(id).hidden = !allowed.includes(id);
+  for (const id of ["zero", "arm", "record", "mark", "note", "stop", "report", "discard", "close"]) $(id).hidden = !allowed.includes(id);
   if (bench().phase === "replay" && run.source !== "REPLAY") $("report").hidden = $("note").hidden = true;
   if (bench().discarded) $("discard").hidden = true;
   $("report").classList.toggle("primary", bench().phase === "built");
   label("arm", bench().phase === "armed" ? "Disarm" : "Arm trigger");
   $("share").hidden = !run.share;
-  if (bench().report === "ready" && report_asked) { report_asked = false; location.assign("/v1/report"); }
+  if (bench().report === "ready" && report_asked) { report_asked = false; location.assign("/v2/report"); }
 }
 
 // The recorder may change its phase while a dialog is open; a request that it no longer accepts is reported.
@@ -113,10 +113,6 @@ function scrub(to) {
 let report_asked = false;
 const ACTIONS = {
   zero() { ask_server({ type: "zero" }); },
-  async ruler() {
-    const given = await question("Calibrate with a ruler: hold the target still", [["known_m", "Its distance from the sensor by the ruler, for example 250 mm, 25 cm or 0.25 m", "250 mm", length_between(0.01, 20, "250 mm, 25 cm or 0.25 m")]], "Measure");
-    if (given) request("ruler", { type: "ruler", known_m: given.known_m });
-  },
   async arm() {
     if (bench().phase === "armed") { ask_server({ type: "disarm" }); return; }
     const given = await question("Record when the bob leaves its rest", [["threshold", "Threshold", "10 mm", length_between(1e-4, 1, "10 mm or 1 cm")], ["keep", "Pre-trigger time", "2 s", seconds_between(0, 60)]], "Arm");
@@ -133,7 +129,7 @@ const ACTIONS = {
   },
   async stop() { if (await question("Stop and save?", [], "Stop")) ask_server({ type: "stop" }); },
   report() {
-    if (bench().report === "ready") { location.assign("/v1/report"); return; }
+    if (bench().report === "ready") { location.assign("/v2/report"); return; }
     report_asked = true;
     ask_server({ type: "report" });
   },
@@ -167,14 +163,8 @@ const ACTIONS = {
     URL.revokeObjectURL(link.href);
     say("Samples in view saved as CSV");
   },
-  voice() {
-    const message = shown_message(), e = message && { ...message.estimates, ...(now && !is_over() ? now.estimates : {}) };
-    const words = e && e.period ? `Period ${e.period.value.toFixed(3)} seconds` + (e.amplitude_now ? `, amplitude ${(e.amplitude_now.value * scale()).toFixed(1)} ${unit() === "mm" ? "millimetres" : unit()}` : "") : "No motion yet";
-    say(words);
-    if (window.speechSynthesis) { speechSynthesis.cancel(); speechSynthesis.speak(new SpeechSynthesisUtterance(words)); }
-  },
   share() {
-    $("code").src = "/v1/code.svg";
+    $("code").src = "/v2/code.svg";
     $("code").hidden = false;
     $("address").textContent = run.share;
     $("viewers").showModal();

@@ -2,8 +2,8 @@
 // The page shows only samples in the recording's log, and only states that the recorder has acknowledged.
 const $ = (id) => document.getElementById(id);
 let run = null, samples = [], state = null, socket = null, wait_ms = 250, dirty = true, came_at = 0;
-// The last messages about all samples, about the last seconds, and about the moment that is played.
-let motion = null, now = null, moment = null;
+// The last messages about all samples and about the last seconds.
+let motion = null, now = null;
 
 const scale = () => (run.unit === "m" ? 1e3 : 1);
 const unit = () => (run.unit === "m" ? "mm" : run.unit);
@@ -17,7 +17,7 @@ function show_status(text, bad) { $("told").textContent = text; $("told").classN
 function ask_server(message) { if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message)); }
 
 function connect() {
-  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/v1/run`);
+  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/v2/run`);
   socket.binaryType = "arraybuffer";
   socket.onopen = () => { wait_ms = 250; trouble(""); };
   socket.onmessage = (event) => (typeof event.data === "string" ? receive(JSON.parse(event.data)) : receive_samples(event.data));
@@ -32,7 +32,7 @@ function lost() {
     return;
   }
   const network = run && run.role === "viewer" ? " Is this device still in the same network? Guest networks often separate their members." : "";
-  trouble(`The connection to the page's server is lost; the recording continues. Reconnecting ...${network}`);
+  trouble(`The connection to the page's server is lost; a recording continues. Reconnecting ... If the page has ended, the terminal says how to open it again.${network}`);
   setTimeout(connect, wait_ms);
   wait_ms = Math.min(2 * wait_ms, 5000);
 }
@@ -40,22 +40,20 @@ function lost() {
 function receive(message) {
   if (message.type === "hello") hello(message);
   else if (message.type === "state") { state = message; show_state(); }
-  else if (message.type === "motion") { motion = message; show_motion(); }
+  else if (message.type === "motion") { motion = message; Object.values(motion.charts || {}).forEach(decoded); show_motion(); }
   else if (message.type === "now") { now = message; show_motion(); }
-  else if (message.type === "moment") { moment = message; moment_asked = null; show_motion(); }
   else if (message.type === "region") show_region(message);
   dirty = true;
 }
 
 function hello(message) {
-  if (message.version !== 1) { trouble(`This page reads version 1 of the messages and its server sends version ${message.version}; reload the page.`); return; }
+  if (message.version !== 2) { trouble(`This page reads version 2 of the messages and its server sends version ${message.version}; reload the page.`); return; }
   // After a reconnection, all samples are sent again from the first; only another run resets the page.
   samples = message.sensors.map(() => new Samples());
   const other = !run || run.session !== message.session;
   run = message;
-  moment_asked = null;
   came_at = performance.now();
-  if (other) { motion = now = moment = null; begin_anew(); }
+  if (other) { motion = now = null; begin_anew(); }
   document.title = `${run.title || run.name} · springmass`;
   $("name").textContent = run.title ? `${run.title} (${run.name})` : run.name;
   $("source").textContent = run.simulated ? `SIMULATED${run.source === "REPLAY" ? " · REPLAY" : ""}` : run.source;

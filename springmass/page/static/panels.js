@@ -23,7 +23,8 @@ function begin_anew() {
   phase = make("phase", `velocity / (${unit()}/s)`, what, still, { equal: true });
   spectrum = make("spectrum", `amplitude / ${unit()}`, "frequency / Hz", still, { log: true });
   forget_selection();
-  if (motion) show_motion();
+  [amplitude, spectrum].forEach(name_series);
+  show_motion();
   dirty = true;
 }
 
@@ -45,60 +46,48 @@ function short(estimate) {
   return signed(`${value.toFixed(digits)}(${bracket}) ${name}`);
 }
 
-// Time advances between messages during a recording, but not after it; a replay is at the moment that is played.
+// Time advances between messages during a recording, but not after it.
 const is_over = () => run.source === "REPLAY" || state.ended;
-const is_played = () => run.source === "REPLAY" && play_time !== null && play_time < last_time() - 1e-9;
 function last_time() { const all = samples[0]; return all && all.count ? all.t[all.count - 1] : 0; }
-function now_s() {
-  if (is_played()) return play_time;
-  return last_time() + (!state || is_over() ? 0 : (performance.now() - came_at) / 1e3);
-}
-// The message whose numbers are shown: that about the moment that is played, or else that about all samples.
-const shown_message = () => (is_played() && moment ? moment : motion);
+const now_s = () => last_time() + (!state || is_over() ? 0 : (performance.now() - came_at) / 1e3);
+
+const label_of = (name) => (name === "amplitude_now" && is_over() ? "amplitude at the end" : LABELS[name]);
 
 function show_motion() {
-  const message = shown_message();
-  if (!message) return;
-  $("why").textContent = message.why || "";
-  const fresher = now && !is_over() && now.t_s > (message.t_s || 0) ? now.estimates : {};
-  const estimates = { ...message.estimates, ...(message.estimates ? fresher : {}) };
+  if (!motion) return;
+  $("why").textContent = motion.why || "";
+  const fresher = now && !is_over() && now.t_s > (motion.t_s || 0) ? now.estimates : {};
+  const estimates = { ...motion.estimates, ...(motion.estimates ? fresher : {}) };
   $("estimates").replaceChildren(...Object.keys(LABELS).filter((name) => estimates[name]).map((name) => {
-    const group = pair(LABELS[name] + (OF_LAW.has(name) && message.stated_law ? `, law ${message.stated_law}` : ""), short(estimates[name])), detail = group.lastChild, age = document.createElement("span");
+    const group = pair(label_of(name) + (OF_LAW.has(name) && motion.stated_law ? `, law ${motion.stated_law}` : ""), short(estimates[name])), detail = group.lastChild, age = document.createElement("span");
     detail.title = estimates[name].text;
     group.dataset.name = name;
-    group.dataset.t = fresher[name] ? now.t_s : message.t_s;
+    group.dataset.t = fresher[name] ? now.t_s : motion.t_s;
     age.className = "age";
     detail.append(age);
     return group;
   }));
   show_ages();
-  $("findings").replaceChildren(...(message.findings || []).map((f) => item(f.advice ? `${f.message.replace(/\.$/, "")}. ${f.advice}` : f.message, f.severity)));
-  if (!(message.findings || []).length) $("findings").replaceChildren(item(message.count || message.type === "moment" ? "No warnings." : "No analysis yet."));
-  if (message.amplitude) {
-    const k = scale(), grown = (values) => values.map((x) => x * k), { t, value, u } = message.amplitude;
-    const laws = message.laws.map((law) => ({ label: law.name === message.stated_law ? `${law.name} (stated)` : law.name, role: law.name === message.law ? "law" : "other", line: true, x: law.t, y: grown(law.value) }));
-    amplitude.show({ ...amplitude.panel, range: around(grown(value)), series: [...laws, { label: "amplitude", role: "data", x: t, y: grown(value), u: grown(u) }] });
-    name_series(amplitude);
-  }
-  if (message.spectrum && message.spectrum.f.length) show_spectrum(message.spectrum);
+  const findings = (motion.findings || []).map((f) => item(f.advice ? `${f.message.replace(/\.$/, "")}. ${f.advice}` : f.message, f.severity));
+  $("findings").replaceChildren(...(findings.length ? findings : [item(motion.count ? "No warnings." : "No analysis yet.")]));
+  for (const [shown, name] of [[amplitude, "amplitude"], [spectrum, "spectrum"]]) if (motion.charts && motion.charts[name]) show_chart(shown, motion.charts[name].panels[0]);
   if (selection) show_region_fits();
 }
 
 // Numbers older than two seconds are grey and show their age; this is updated four times a second.
 function show_ages() {
-  const message = shown_message(), at = run && state && message ? now_s() : null;
-  if (at === null) return;
+  if (!run || !state || !motion) return;
+  const at = now_s();
   for (const group of $("estimates").children) {
-    const age = Math.abs(at - Number(group.dataset.t)), old = age > FRESH_S;
+    const age = at - Number(group.dataset.t), old = age > FRESH_S;
     group.classList.toggle("stale", old);
-    group.querySelector(".age").textContent = old ? (is_played() ? `at ${Number(group.dataset.t).toFixed(1)} s` : `${age.toFixed(0)} s old`) : "";
+    group.querySelector(".age").textContent = old ? `${age.toFixed(0)} s old` : "";
   }
-  const whole = message.accuracy === "standard";
-  $("tier").textContent = !message.accuracy ? "" : whole ? "Standard accuracy, whole run." : is_played() ? `Fast accuracy, samples up to ${message.t_s === null ? "" : message.t_s.toFixed(1)} s.` : "Fast accuracy while the run goes on; the report uses standard accuracy.";
-  const forecast = message.stop && !is_over() && bench().phase === "recording" && message.t_s !== undefined;
-  $("stopping").textContent = forecast ? stopping(message.stop, at - message.t_s) : "";
-  $("stopping").classList.toggle("stale", forecast && at - message.t_s > FRESH_S);
-  $("why").classList.toggle("stale", !is_over() && at - message.t_s > FRESH_S);
+  $("tier").textContent = !motion.accuracy ? "" : motion.accuracy === "standard" ? "Standard accuracy, whole run." : "Fast accuracy while the run goes on; the report uses standard accuracy.";
+  const forecast = motion.stop && !is_over() && bench().phase === "recording" && motion.t_s !== undefined;
+  $("stopping").textContent = forecast ? stopping(motion.stop, at - motion.t_s) : "";
+  $("stopping").classList.toggle("stale", forecast && at - motion.t_s > FRESH_S);
+  $("why").classList.toggle("stale", !is_over() && at - motion.t_s > FRESH_S);
 }
 setInterval(() => { if (run && state) { show_ages(); show_rate(); } }, 250);
 
@@ -106,12 +95,19 @@ const seconds = (s) => (s < 10 ? s.toFixed(1) : s.toFixed(0));
 
 function stopping(stop, age_s) {
   const wanted = `u(T) = ${(stop.wanted_u_s * 1e6).toFixed(0)} µs`;
-  const interval = `If you stop now: T between ${stop.low.toFixed(6)} and ${stop.high.toFixed(6)} s (${(100 * stop.covers).toFixed(0)} %).`;
-  if (stop.more_s === 0) return `${interval} ${wanted} is reached.`;
-  if (stop.u_clock_s >= stop.wanted_u_s) return `${interval} ${wanted} is out of reach: the uncertainty of the sensor's clock alone is ${(stop.u_clock_s * 1e6).toFixed(0)} µs.`;
-  if (stop.more_s === null) return `${interval} ${wanted} is out of reach for this swing.`;
+  if (stop.more_s === 0) return `${wanted} is reached.`;
+  if (stop.u_clock_s >= stop.wanted_u_s) return `${wanted} is out of reach: the uncertainty of the sensor's clock alone is ${(stop.u_clock_s * 1e6).toFixed(0)} µs.`;
+  if (stop.more_s === null) return `${wanted} is out of reach for this swing.`;
   const left = stop.more_s - age_s;
-  return left > 0 ? `${interval} About ${seconds(left)} s more for ${wanted}.` : interval;
+  return left > 0 ? `About ${seconds(left)} s more for ${wanted}.` : "";
+}
+
+// A chart of the report; its label names the unit, which the analysis chooses.
+function show_chart(shown, panel) {
+  const label = shown.panel.label;
+  shown.show(panel);
+  if (panel.label !== label) shown.build();
+  name_series(shown);
 }
 
 // The names of a panel's series under it.
@@ -126,27 +122,14 @@ function name_series(chart) {
   $(`${chart.box.id}-names`).replaceChildren(...names);
 }
 
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (amplitude) name_series(amplitude); });
-
-// The highest peaks are at the low end of the spectrum; frequencies far above them are cut off.
-function show_spectrum({ f, value, peaks }) {
-  const highest = Math.max(...peaks.map((peak) => peak.f), 0), end = Math.max(10, 4 * highest), k = scale();
-  const stop = f.findIndex((x) => x > end), upto = stop < 0 ? f.length : stop;
-  const text = (peak) => `${peak.f.toFixed(Math.max(0, Math.ceil(-Math.log10(peak.step))))} Hz`;
-  const ordered = [...peaks].sort((a, b) => b.value - a.value);
-  const size = value.slice(1, upto).map((x) => x * k);
-  spectrum.show({ ...spectrum.panel, range: around(size, true), series: [
-    { label: "amplitude", role: "data", line: true, x: f.slice(1, upto), y: size },
-    { label: "peaks", role: "mark", x: ordered.map((peak) => peak.f), y: ordered.map((peak) => peak.value * k), why: ordered.map(text) },
-  ] });
-}
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (amplitude) [amplitude, spectrum].forEach(name_series); });
 
 // The fits are thin lines below the samples, with two points per pixel.
 const LEAST_SWING_PX = 6;
 function draw_fits(plot) {
-  const message = shown_message(), { min, max } = plot.scales.x;
-  if (message && message.fit) draw_fit(plot, message.fit, Math.max(min, message.fit.moment - 20), Math.min(max, end_time()), ["flagged", 0]);
-  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, selection.from, region.fit.moment - 20), Math.min(max, selection.to), ["other", 0]);
+  const { min, max } = plot.scales.x;
+  if (motion && motion.fit) draw_fit(plot, motion.fit, Math.max(min, motion.fit.start, motion.fit.moment - 20), Math.min(max, end_time()), ["flagged", 0]);
+  if (region && region.fit && selection) draw_fit(plot, region.fit, Math.max(min, region.fit.start, region.fit.moment - 20), Math.min(max, selection.to), ["other", 0]);
 }
 
 function draw_fit(plot, fit, from, to, name) {
@@ -182,31 +165,21 @@ function step_play() {
   play_time += ((at - play_moment) / 1e3) * Number($("speed").value);
   play_moment = at;
   if (play_time > last) {
-    if ($("loop").checked) play_time = all.t[0]; else { play_time = last; play(); show_motion(); }
+    if ($("loop").checked) play_time = all.t[0]; else { play_time = last; play(); }
   }
   $("time").value = (play_time - all.t[0]) / (last - all.t[0]);
-}
-
-// Request the numbers of the moment that is played, after the last answer has arrived and if the moment has changed.
-let moment_asked = null;
-function ask_moment() {
-  if (!is_played()) { if (moment) { moment = null; show_motion(); } return; }
-  if (moment_asked !== null || (moment && Math.abs(moment.to - play_time) < 0.25)) return;
-  moment_asked = play_time;
-  ask_server({ type: "moment", to: play_time });
 }
 
 function draw() {
   requestAnimationFrame(draw);
   if (!run || !samples[0] || !position || document.hidden) return;
   if (playing) step_play();
-  if (run.source === "REPLAY") ask_moment();
   if (frozen || !(dirty || playing)) return;
   dirty = false;
-  const [from, end] = in_view(), all = samples[0], message = shown_message();
+  const [from, end] = in_view(), all = samples[0];
   const [t, y] = all.between(from, end, Math.max(200, $("position").clientWidth));
   const k = scale(), z = zero(), shown = (v) => (v === null ? null : (v - z) * k);
-  const level = message && message.rest_m !== undefined ? shown(message.rest_m) : null, ends = t.length ? [t[0], t[t.length - 1]] : [];
+  const level = motion && motion.rest_m !== undefined ? shown(motion.rest_m) : null, ends = t.length ? [t[0], t[t.length - 1]] : [];
   const marks = ((state && state.marks) || []).filter(([at]) => ends.length && at >= ends[0] && at <= ends[1]);
   // Samples that are far enough apart are drawn as dots, so that the fit below is visible; denser ones as a line.
   const dense = t.length > 0.7 * $("position").clientWidth, { min, max } = position.plot.scales.y;
@@ -215,7 +188,7 @@ function draw() {
     { label: "samples", role: "data", line: dense, x: t, y: y.map(shown) },
     { label: "marks", role: "mark", x: marks.map(([at]) => at), y: marks.map(() => null), why: marks.map(([, text]) => text) },
   ] });
-  const omega = message && message.omega, swing = omega ? (2 * Math.PI) / omega : 1;
+  const omega = motion && motion.omega, swing = omega ? (2 * Math.PI) / omega : 1;
   const orbit = all.orbit(end - 3 * swing, end, Math.max(1, Math.round((swing / 40) * run.rate_hz)));
   const x = orbit.map(([p]) => shown(p)), v = orbit.map(([, v_m]) => v_m * k), fastest = Math.max(...v.map(Math.abs)), middle = (Math.max(...x) + Math.min(...x)) / 2;
   // Velocity divided by angular frequency has the unit of position; with equal scales for both, a swing is a circle.

@@ -1,1 +1,1 @@
-"""The page on the network: its server, the rights to view and to act, limits for clients, and logging."""
+"""The page on the network: its server, and the rights to view and to act."""

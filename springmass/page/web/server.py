@@ -6,24 +6,25 @@ import asyncio
 import contextlib
 import json
 import logging
-import math
 import socket
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import uvicorn
+from starlette.applications import Starlette
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from springmass.errors import complain
 from springmass.page.state import PageState
 from springmass.page.view import View, json_of
-from springmass.page.web.bounds import bounded_protocol, most_connections
-from springmass.page.web.security import ACT, Access, guarded
+from springmass.page.web.security import ACT, REPORT, Access, guarded
 from springmass.page.web.sharing import code_svg
-
-if TYPE_CHECKING:
-    from starlette.applications import Starlette
-    from starlette.websockets import WebSocket
-
-__all__ = ["Opening", "application", "serve"]
+from springmass.session.failures import raised_at
+from storage.errors import one_line
 
 LOG = logging.getLogger("springmass.page")
 STATIC = Path(__file__).parents[1] / "static"
@@ -36,113 +37,83 @@ LAST_S = 1.5
 """Time for which the page is still served after the end, so that viewers see that the run has ended."""
 ALONE_S = 30.0
 """Time after which a page without viewers ends, once the run that it recorded is saved."""
-MOST_VIEWERS = 32
-LONGEST_MESSAGE = 4096
-"""Maximum size of a browser's message in bytes."""
-LONGEST_TEXT = 500
-LIMITS = {"known_m": (0.01, 20.0), "threshold_m": (1e-4, 1.0), "keep_s": (0.0, 60.0)}
-"""Minimum and maximum of the numbers in requests, in m and s."""
+MOST_CONNECTIONS = 256
+LONGEST_MESSAGE, LONGEST_TEXT = 4096, 500
+"""Maximum size of a browser's message in bytes, and of a text in it in characters."""
+A_LINE_EVERY_S = 60.0
+Limits = tuple[float, float]
+ANY_TIME: Limits = (-1e12, 1e12)
+REQUESTS: Mapping[str, Mapping[str, Limits | None]] = {
+    "region": {"from": ANY_TIME, "to": ANY_TIME},
+    "zero": {},
+    "arm": {"threshold_m": (1e-4, 1.0), "keep_s": (0.0, 60.0)},
+    "disarm": {},
+    "record": {},
+    "mark": {"text": None},
+    "note": {"text": None},
+    "stop": {},
+    "report": {},
+    "discard": {},
+    "close": {},
+}
+"""Requests with the limits of their numbers, in m and s; None is a text. Any viewer may ask for a region."""
 
 
-@dataclass
-class Opening:
-    """The address of the page and its audience.
-
-    Parameters
-    ----------
-    port : int
-        TCP port; 0 for any free one.
-    network : str
-        This computer's address in the local network, for viewers; empty if only this computer may open the page.
-    secret, used
-        As in :class:`springmass.page.web.security.Access`.
-    opened : callable
-        Called once the page answers, with the port, the address to open (None if it has been used) and the viewers'
-        address.
-    was_used : callable
-        Called when the controller's link has been used.
-    """
-
-    port: int = 0
-    network: str = ""
-    secret: str = ""
-    used: bool = False
-    opened: Callable[[int, str | None, str], None] = lambda _port, _address, _network: None
-    was_used: Callable[[], None] = lambda: None
+class Refused(Exception):
+    """A message that a browser may not send."""
 
 
-def application(
-    page_state: PageState, share: Callable[[], str] = lambda: "", polled: Callable[[int], None] = print
-) -> Starlette:
-    """Return the page as an ASGI application without access control.
+def checked(text: str | None) -> dict[str, Any]:
+    """Return a browser's request with only its own values; Refused for everything else."""
+    try:
+        request = json.loads(text or "")
+        found = {"type": request["type"]}
+        for name, limits in REQUESTS[request["type"]].items():
+            found[name] = _text(request[name]) if limits is None else _number(request[name], *limits)
+    # These include the errors for integers of thousands of digits and for deeply nested lists.
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        raise Refused("a message that is none of the page's") from error
+    return found
 
-    Parameters
-    ----------
-    page_state : PageState
-    share : callable
-        Returns the address for viewers; empty if viewers are not admitted.
-    polled : callable
-        Called after every read of the log, with the number of viewers.
-    """
-    from collections.abc import AsyncIterator
 
-    from starlette.applications import Starlette
-    from starlette.responses import FileResponse, PlainTextResponse, Response
-    from starlette.routing import Mount, Route, WebSocketRoute
-    from starlette.staticfiles import StaticFiles
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return " ".join(value.split())[:LONGEST_TEXT]
 
-    server = _Server(page_state, share, polled)
+
+def _number(value: Any, least: float, greatest: float) -> float:
+    if not least <= (number := float(value)) <= greatest:
+        raise ValueError
+    return number
+
+
+class Server:
+    """Reads the log in turns, and sends each browser what it does not have yet; ``viewers`` is their number."""
+
+    def __init__(self, page: PageState, share: str, polled: Callable[[int], None]) -> None:
+        self._page, self._share, self._polled = page, share, polled
+        self._viewers = 0
+        self._turn, self._due_s, self._bench = 0, 0.0, page.bench
+        self._turned = asyncio.Event()
+        self._next: asyncio.TimerHandle | None = None
+        # Texts by type, and frames by series and first sample; encoded once for all viewers.
+        self._texts: dict[str, str] = {}
+        self._frames: dict[tuple[int, int, int], bytes] = {}
 
     @contextlib.asynccontextmanager
-    async def lifespan(_: Starlette) -> AsyncIterator[None]:
-        server.look()
+    async def reading(self, _: Starlette) -> AsyncIterator[None]:
+        """Read the log until the context ends."""
+        self._look()
         try:
             yield
         finally:
-            server.close()
+            if self._next is not None:
+                self._next.cancel()
 
-    async def page(_: Any) -> Response:
-        return FileResponse(STATIC / "page.html")
-
-    async def report(_: Any) -> Response:
-        made = None if page_state.after is None else page_state.after.report
-        if made is None:
-            return PlainTextResponse("springmass: no report has been made; the page makes one on O\n", 404)
-        return FileResponse(made, media_type="text/html")
-
-    async def code(_: Any) -> Response:
-        if not share():
-            return PlainTextResponse("springmass: the page is not open to viewers; --lan opens it\n", 404)
-        return Response(code_svg(share()), media_type="image/svg+xml")
-
-    routes = [
-        Route("/", page),
-        Route("/v1/report", report),
-        Route("/v1/code.svg", code),
-        WebSocketRoute("/v1/run", server.attend),
-        Mount("/static", StaticFiles(directory=STATIC)),
-    ]
-    return Starlette(routes=routes, lifespan=lifespan)
-
-
-class _Server:
-    def __init__(self, page_state: PageState, share: Callable[[], str], polled: Callable[[int], None]) -> None:
-        self._page_state, self._share, self._polled = page_state, share, polled
-        self._viewers = 0
-        self._turn = 0
-        self._turned = asyncio.Event()
-        self._motion_text = self._now_text = self._state_text = ""
-        self._frames: dict[tuple[int, int, int], bytes] = {}
-        self._due_s, self._bench = 0.0, page_state.bench
-        self._next: asyncio.TimerHandle | None = None
-
-    def look(self) -> None:
-        """Update the view now, and repeatedly as long as the page is served.
-
-        Texts and frames are encoded once for all viewers. This is a timer's callback because a sleeping task would wake
-        twice per turn.
-        """
-        self._next = asyncio.get_running_loop().call_later(TURN_S, self.look)
+    def _look(self) -> None:
+        # This is a timer's callback because a sleeping task would wake twice per turn.
+        self._next = asyncio.get_running_loop().call_later(TURN_S, self._look)
         try:
             self._update()
         except Exception:  # a defect; the next turn may succeed
@@ -150,105 +121,81 @@ class _Server:
         self._polled(self._viewers)
 
     def _update(self) -> None:
-        page_state = self._page_state
-        page_state.poll()
-        if page_state.watcher is not None:
-            self._motion_text, self._now_text = page_state.watcher.text, page_state.watcher.now_text
-        if self._due_s <= 0.0 or self._bench is not page_state.bench:
-            self._due_s, self._bench = STATE_S, page_state.bench
-            self._state_text = json_of({"type": "state", **page_state.state()})
+        page = self._page
+        page.poll()
+        if page.watcher is not None:
+            self._texts |= {"motion": page.watcher.text, "now": page.watcher.now_text}
         self._due_s -= TURN_S
+        if self._due_s <= 0.0 or self._bench is not page.bench:
+            self._due_s, self._bench = STATE_S, page.bench
+            self._texts["state"] = json_of(page.state())
         self._frames.clear()
         self._turn += 1
         if self._viewers <= MANY or self._turn % EVERY == 0:
             turned, self._turned = self._turned, asyncio.Event()
             turned.set()
 
-    def close(self) -> None:
-        """Stop reading the log."""
-        if self._next is not None:
-            self._next.cancel()
+    async def attend(self, browser: WebSocket) -> None:
+        """Serve one browser until it leaves, or close its connection: 1003 for a forbidden message, 1011 for a defect.
 
-    async def attend(self, socket_: WebSocket) -> None:
-        """Serve one browser until it leaves, or close its connection with a code.
-
-        New data are taken from the view whenever the browser has received the previous data. The codes are 1003 for a
-        forbidden message, 1011 for a defect of the page, and 1013 for too many viewers.
+        New data are taken from the view whenever the browser has received the previous data.
         """
-        from starlette.websockets import WebSocketDisconnect
-
+        client = browser.client.host if browser.client else ""
         with contextlib.suppress(WebSocketDisconnect):
-            if self._viewers >= MOST_VIEWERS:
-                _log(socket_, "more than %d viewers; the newest is closed", MOST_VIEWERS)
-                await socket_.close(1013)
-                return
-            await socket_.accept()
-            error = await self._converse(socket_)
-            if isinstance(error, _Refused):
-                _log(socket_, f"{error}; its connection is closed with 1003")
-                await socket_.close(1003)
-            elif error is not None:
-                _log(socket_, "a defect of the page; its connection is closed with 1011", error=error)
-                await socket_.close(1011)
+            await browser.accept()
+            self._viewers += 1
+            tasks = [asyncio.create_task(each(browser)) for each in (self._receive, self._send)]
+            try:
+                await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                self._viewers -= 1
+                for task in tasks:
+                    task.cancel()
+                ends = await asyncio.gather(*tasks, return_exceptions=True)
+            error = next(end for end in ends if not isinstance(end, asyncio.CancelledError))
+            if isinstance(error, Refused):
+                LOG.warning("%s sent %s; its connection is closed", client, error)
+                await browser.close(1003)
+            elif not isinstance(error, WebSocketDisconnect):
+                LOG.error("a defect of the page closed the connection of %s", client, exc_info=error)
+                await browser.close(1011)
 
-    async def _converse(self, socket_: WebSocket) -> Exception | None:
-        """Send and receive until an error, which is returned; raise WebSocketDisconnect when the browser leaves."""
-        from starlette.websockets import WebSocketDisconnect
-
-        self._viewers += 1
-        tasks = [asyncio.create_task(each(socket_)) for each in (self._receive, self._send)]
-        try:
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            self._viewers -= 1
-            for task in tasks:
-                task.cancel()
-            received, sent = await asyncio.gather(*tasks, return_exceptions=True)
-        ended = sent if isinstance(received, asyncio.CancelledError) else received
-        if isinstance(ended, WebSocketDisconnect):
-            raise ended
-        return ended if isinstance(ended, Exception) else None
-
-    async def _receive(self, socket_: WebSocket) -> None:
-        from starlette.websockets import WebSocketDisconnect
-
+    async def _receive(self, browser: WebSocket) -> None:
         while True:
-            message = await socket_.receive()
+            message = await browser.receive()
             if message["type"] == "websocket.disconnect":
                 raise WebSocketDisconnect(message.get("code", 1005))
-            text = message.get("text")
-            if text is None:
-                raise _Refused("a binary message")
-            await self._take(socket_, text)
+            request = checked(message.get("text"))
+            if request["type"] == "region":
+                if (watcher := self._page.watcher) is not None:
+                    await browser.send_text(await asyncio.to_thread(watcher.region, request["from"], request["to"]))
+            elif ACT in browser.auth.scopes:
+                self._page.ask(request)
+            else:
+                raise Refused("a command, and may only view")
 
-    async def _send(self, socket_: WebSocket) -> None:
+    async def _send(self, browser: WebSocket) -> None:
         view: View | None = None
-        sent, state, motion, now = [0], "", "", ""
+        sent: list[int] = []
+        texts: dict[str, str] = {}
         while True:
-            if self._page_state.view is not None and view is not self._page_state.view:
-                view, sent, motion, now = (
-                    self._page_state.view,
-                    [0] * len(self._page_state.view.series),
-                    "",
-                    self._now_text,
-                )
-                await socket_.send_text(json_of(self._hello(view, acts=ACT in socket_.auth.scopes)))
-            for number in range(0 if view is None else len(sent)):
-                while view is not None and sent[number] < len(view.series[number]):
-                    message = self._frame(view, number, sent[number])
-                    sent[number] += (len(message) - 16) // 16
-                    await socket_.send_bytes(message)
-            # If the view was replaced while its samples were sent, data of the next view must wait for its hello
-            # message.
-            if state != self._state_text and view is not None and view is self._page_state.view:
-                state = self._state_text
-                await socket_.send_text(state)
-            if motion is not self._motion_text and view is self._page_state.view:
-                motion = self._motion_text
-                await socket_.send_text(motion)
-            if now is not self._now_text and view is self._page_state.view:
-                now = self._now_text
-                await socket_.send_text(now)
+            if self._page.view is not None and view is not self._page.view:
+                view = self._page.view
+                sent, texts = [0] * len(view.series), {}
+                await browser.send_text(json_of(self._hello(view, acts=ACT in browser.auth.scopes)))
+            if view is not None:
+                for number, series in enumerate(view.series):
+                    while sent[number] < len(series):
+                        frame = self._frame(view, number, sent[number])
+                        sent[number] += (len(frame) - 16) // 16
+                        await browser.send_bytes(frame)
+                for kind in ("state", "motion", "now"):
+                    if view is not self._page.view:
+                        break  # it was replaced meanwhile; texts about the next one must wait for its hello message
+                    text = self._texts.get(kind, "")
+                    if text and text is not texts.get(kind):
+                        texts[kind] = text
+                        await browser.send_text(text)
             await self._turned.wait()
 
     def _frame(self, view: View, number: int, first: int) -> bytes:
@@ -258,150 +205,72 @@ class _Server:
         return self._frames[key]
 
     def _hello(self, view: View, *, acts: bool) -> dict[str, Any]:
-        controls = acts and self._page_state.controls is not None
-        role = "controller" if acts else "viewer"
-        return {**view.hello(controls=controls), "role": role, "share": self._share()}
-
-    async def _take(self, socket_: WebSocket, text: str) -> None:
-        """Carry out a browser's request.
-
-        Raises
-        ------
-        _Refused
-            If the browser may not make this request.
-        """
-        try:
-            request = json.loads(text)
-            kind = str(request["type"])
-            low = _number(request, "from") if kind == "region" else -math.inf
-            high = _number(request, "to") if kind in ANALYSES else math.inf
-            checked = {} if kind in ANALYSES else _checked(kind, request)
-        # These include the errors for integers of thousands of digits and for deeply nested lists.
-        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-            raise _Refused("a message that is none of the page's") from error
-        if kind in ANALYSES:
-            if (watcher := self._page_state.watcher) is not None:
-                answer = await (
-                    asyncio.to_thread(watcher.region, low, high)
-                    if kind == "region"
-                    else asyncio.to_thread(watcher.moment, high)
-                )
-                await socket_.send_text(answer)
-        elif ACT in socket_.auth.scopes:
-            self._act(kind, checked)
-        else:
-            raise _Refused("a command of a viewer")
-
-    def _act(self, kind: str, checked: Mapping[str, Any]) -> None:
-        """Carry out a request that is possible now and ignore others; the page shows the state."""
-        page_state = self._page_state
-        if not page_state.may(kind):
-            return
-        if page_state.after is None:
-            if page_state.controls is not None:
-                page_state.controls(checked)
-        elif kind == "report":
-            page_state.after.make_report()
-        elif kind == "note":
-            page_state.after.note(checked["text"])
-        elif kind == "discard":
-            page_state.after.discard()
-        elif kind == "close":
-            page_state.closed = True
+        hello = view.hello(controls=acts and self._page.controls is not None)
+        return {**hello, "role": "controller" if acts else "viewer", "share": self._share}
 
 
-KINDS: dict[str, tuple[str, ...]] = {
-    "zero": (),
-    "ruler": ("known_m",),
-    "arm": ("threshold_m", "keep_s"),
-    "disarm": (),
-    "record": (),
-    "mark": ("text",),
-    "note": ("text",),
-    "stop": (),
-    "report": (),
-    "discard": (),
-    "close": (),
-}
-"""Requests of the controller, with the names of their values."""
-ANALYSES = frozenset({"region", "moment"})
-"""Requests that any viewer may make, because they change nothing."""
+def application(page: PageState, share: str = "", polled: Callable[[int], None] = lambda _: None) -> Starlette:
+    """Return the page as an ASGI application without access control.
 
-
-class _Refused(Exception):
-    """A message that a browser may not send."""
-
-
-def _log(socket_: WebSocket, message: str, *values: object, error: Exception | None = None) -> None:
-    """Log an action of a browser, or a failure while it was served."""
-    client = socket_.client.host if socket_.client else ""
-    LOG.warning(message, *values, exc_info=error, extra={"client": client})
-
-
-def _checked(kind: str, request: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a command with only its own values; raise ValueError, or the error of a wrong value."""
-    if kind not in KINDS:
-        raise ValueError(kind)
-    return {"type": kind} | {name: _text(request) if name == "text" else _number(request, name) for name in KINDS[kind]}
-
-
-def _number(request: Mapping[str, Any], name: str) -> float:
-    value = float(request[name])
-    low, high = LIMITS.get(name, (-1e12, 1e12))
-    if not (math.isfinite(value) and low <= value <= high):
-        raise ValueError(name)
-    return value
-
-
-def _text(request: Mapping[str, Any]) -> str:
-    return " ".join(str(request.get("text", "")).split())[:LONGEST_TEXT]
-
-
-def serve(page_state: PageState, opening: Opening, *, until: Callable[[], bool]) -> None:
-    """Serve the page until somebody ends it.
-
-    Parameters
-    ----------
-    page_state : PageState
-    opening : Opening
-    until : callable
-        Returns whether the page should end; called after every read of the log.
-
-    Raises
-    ------
-    OSError
-        If the port is taken.
+    ``share`` is the address for viewers, if they are admitted; ``polled`` is called after every read of the log, with
+    the number of viewers.
     """
-    import uvicorn
+    server = Server(page, share, polled)
 
-    with socket.create_server(("0.0.0.0" if opening.network else "127.0.0.1", opening.port)) as listener:
+    async def main(_: Any) -> Response:
+        return FileResponse(STATIC / "page.html")
+
+    async def report(_: Any) -> Response:
+        if page.after is None or page.after.report is None:
+            return PlainTextResponse("springmass: no report has been made; the page makes one on O\n", 404)
+        return FileResponse(page.after.report, media_type="text/html")
+
+    async def code(_: Any) -> Response:
+        if not share:
+            return PlainTextResponse("springmass: the page is not open to viewers; --lan opens it\n", 404)
+        return Response(code_svg(share), media_type="image/svg+xml")
+
+    routes = [
+        Route("/", main),
+        Route(REPORT, report),
+        Route("/v2/code.svg", code),
+        WebSocketRoute("/v2/run", server.attend),
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+    return Starlette(routes=routes, lifespan=server.reading)
+
+
+def serve(
+    page: PageState, *, port: int, network: str, opened: Callable[[str, str], None], over: Callable[[], bool]
+) -> None:
+    """Serve the page until somebody ends it; OSError if the port is taken.
+
+    ``port`` 0 is any free one. ``network`` is this computer's address in the local network, for viewers; if it is
+    empty, only this computer may open the page. ``opened`` is called once the page answers, with its address and that
+    for viewers; ``over`` returns whether the recording has ended.
+    """
+    with socket.create_server(("0.0.0.0" if network else "127.0.0.1", port)) as listener:
         port = listener.getsockname()[1]
-        access = Access(port, opening.secret, viewers=bool(opening.network), used=opening.used)
-        network = f"http://{opening.network}:{port}/?token={access.viewers_token}" if opening.network else ""
+        access = Access(port, viewers=bool(network))
+        share = f"http://{network}:{port}/?token={access.viewers_token}" if network else ""
         announced, left_s, alone_s = False, LAST_S, ALONE_S
 
         def polled(viewers: int) -> None:
             nonlocal announced, left_s, alone_s
             if not announced:
                 announced = True
-                token = access.token
-                opening.opened(port, None if token is None else f"http://127.0.0.1:{port}/?token={token}", network)
-            if access.token is None and not opening.used:
-                opening.used = True
-                opening.was_used()
-            left_s -= TURN_S if until() else 0.0
-            after = page_state.after is not None and page_state.after.ours
+                opened(f"http://127.0.0.1:{port}/?token={access.token}", share)
+            left_s -= TURN_S if over() else 0.0
+            after = page.after is not None and page.after.ours
             alone_s = alone_s - TURN_S if after and not viewers else ALONE_S
-            server.should_exit = server.should_exit or page_state.closed or left_s <= 0.0 or alone_s <= 0.0
+            server.should_exit = server.should_exit or page.closed or left_s <= 0.0 or alone_s <= 0.0
 
-        page = application(page_state, lambda: network, polled)
-        most = most_connections()
         config = uvicorn.Config(
-            guarded(page, access, [opening.network] if opening.network else []),
-            http=bounded_protocol(most),
-            backlog=most // 2,  # maximum number accepted in one turn, before they can be counted
-            log_config=None,  # the caller decides where the log of its process goes
-            log_level="error",
+            guarded(application(page, share, polled), access, [network] if network else []),
+            http="h11",
+            limit_concurrency=MOST_CONNECTIONS,
+            log_config=None,
+            log_level="warning",
             access_log=False,
             ws_max_size=LONGEST_MESSAGE,
             ws_ping_interval=20,
@@ -409,4 +278,29 @@ def serve(page_state: PageState, opening: Opening, *, until: Callable[[], bool])
             timeout_graceful_shutdown=2,
         )
         server = uvicorn.Server(config)
+        logging.getLogger().addHandler(_Lines())
+        logging.captureWarnings(True)
         server.run(sockets=[listener])
+
+
+class _Lines(logging.Handler):
+    """Writes each record as one line without a traceback; of each level, at most one line a minute in all."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self._written_s: dict[int, float] = {}
+        self._left_out = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        now_s = record.relativeCreated / 1e3
+        if now_s - self._written_s.get(record.levelno, -A_LINE_EVERY_S) < A_LINE_EVERY_S:
+            self._left_out += 1
+            return
+        self._written_s[record.levelno] = now_s
+        text = " ".join(record.getMessage().split())[:300]
+        if record.exc_info and (error := record.exc_info[1]) is not None:
+            text += f": {type(error).__name__} at {raised_at(error)}: {one_line(error)[:200]}"
+        if self._left_out:
+            text += f" ({self._left_out} earlier messages were left out)"
+            self._left_out = 0
+        complain(f"page: {text}")

@@ -7,20 +7,12 @@ import socket
 
 from springmass.errors import SENSOR, ProgramError
 
-__all__ = ["address_in_network", "code_for_terminal", "code_svg"]
-
 ELSEWHERE = ("192.0.2.1", 9)
 """An address for documentation (RFC 5737): nothing is sent to it; the system only chooses the route to it."""
 
 
 def address_in_network() -> str:
-    """Return this computer's address in the network through which it would send.
-
-    Raises
-    ------
-    ProgramError
-        If the computer is in no network.
-    """
+    """Return this computer's address in the network through which it would send."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(ELSEWHERE)
