@@ -47,15 +47,13 @@ from springmass.runs.analysing import (
     in_a_name,
     law_line,
     make_folder,
-    scene_of,
 )
 from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.json_results import picked, rejected
 from springmass.runs.loading import Loaded, load, sample_data
 from springmass.runs.options import ReadOptions
 from springmass.runs.questions import for_command, option_of
-from springmass.runs.scenes import Amendments, amended, read_scenes
-from springmass.terminal.asking import ask_for_bench
+from springmass.runs.scenes import Amendments, read_scenes
 from springmass.values import Finite, NotNegative
 from storage.errors import StorageError, WriteFailed
 
@@ -116,7 +114,6 @@ class AnalyseOptions:
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
     full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
     budget: Annotated[bool, flag("print the sources of uncertainty")] = False
-    ask: Annotated[bool, flag("ask for the masses and the disc, and save them next to the recording")] = False
     template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None
     figures: Figures = ()
     si: Annotated[bool, flag("print SI units without prefixes")] = False
@@ -163,10 +160,6 @@ def analyse(
     if read.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself", USAGE)
-    if options.ask and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
-        raise ProgramError("--ask is about one recording; analyse the others by themselves", USAGE)
-    if options.ask and inputs == [STDIN]:
-        raise ProgramError("--ask reads answers from standard input, which is the recording; give --mass-kg", USAGE)
     scenes = read_scenes(options.scene, len(inputs))
     values = _values(bench)
     found, folders = files_of(inputs)
@@ -284,10 +277,7 @@ def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
     """Analyse an input; return the analysis, and where its scene was saved."""
     try:
         options, read = task.options, task.read
-        loaded, bench = load(task.file.path, read), dict(task.bench)
-        if options.ask:
-            known = amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else None
-            bench |= ask_for_bench(known or scene_of(loaded, task.scene), loaded.path.name)
+        loaded, bench = load(task.file.path, read), task.bench
         run = analyse_loaded(
             loaded,
             task.scene,
@@ -302,7 +292,7 @@ def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
             "strict": options.strict,
         }
         scene = run.analysis.scene if task.scene is not None or bench else None
-        return run.described(parameters), _remembered(loaded, scene) if task.writes or options.ask else None
+        return run.described(parameters), _remembered(loaded, scene) if task.writes else None
     except ProgramError as error:
         return _Done(task.name, error.exit_code, (str(error),))
     except NeedsAnswer as question:
