@@ -23,8 +23,9 @@ from pathlib import Path
 
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
-from springmass.session.options import RunLimits, RunListeners
-from springmass.session.session import Progress, Sensor, Session
+from springmass.session.progress import Progress
+from springmass.session.sensors import Sensor
+from springmass.session.session import RunLimits, RunListeners, Session
 from storage.recovery.recover import recover
 from storage.wire_log.scanning import read_log
 

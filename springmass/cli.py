@@ -85,8 +85,9 @@ def _call(words: Sequence[str]) -> int:
         with STOPS.raised():
             return call(words)
     except CycloptsError as error:
+        what = " ".join(str(error).split()).rstrip(".")
         called = " ".join(("springmass", *(error.command_chain or ())))
-        complain(f"{' '.join(str(error).split()).rstrip('.')}; {called} --help shows what it takes")
+        complain(f"{what}{' ' if what.endswith('?') else '; '}{called} --help shows what it takes")
         return USAGE
     except Exception as error:
         from acquisition.errors import NeedsAnswer

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import _thread
 import contextlib
 import enum
 import os
@@ -21,42 +20,38 @@ from springmass.errors import INTERRUPTED
 
 TOGETHER_NS = 100_000_000
 """Signals within this time count as one: `timeout` and some terminals send each of them twice."""
+AGAIN_S = 0.02
 
 
 class EndReason(enum.StrEnum):
-    """The reason for the end of a recording.
-
-    The values are stored in wire logs (event ``ended``) and must never change.
-    """
+    """The reason for the end of a recording; wire logs hold these values (event ``ended``), which must never change."""
 
     SECONDS = "seconds"
-    """The given duration is over."""
     CTRL_C = "Ctrl-C"
     SIGTERM = "SIGTERM"
     HANGUP = "a closed terminal"
     PAGE = "the page"
-    """The button or key of the recording's page was pressed."""
     DISK = "the disk"
-    """Nothing more could be written to the disk."""
 
 
 SIGNALS = {"SIGINT": EndReason.CTRL_C, "SIGTERM": EndReason.SIGTERM, "SIGHUP": EndReason.HANGUP}
 
 
 class Stops:
-    """The signals that end a command. Those ignored before stay ignored: under ``nohup``, a recording goes on.
+    """Whether a command runs, ends or leaves. Signals ignored before stay ignored: ``nohup`` keeps a recording alive.
 
-    The first raises KeyboardInterrupt within :meth:`raised`, after the end of an import; outside, it waits for the next
-    :meth:`raised`. The second ends the process at once, on a thread, because the main thread may wait for a disk. It
-    calls ``leaving`` and prints ``last_words``, which must not wait for a disk. ``by`` is the first reason for the end.
+    It runs while ``by`` is None. It ends, for the reason ``by``, after the first signal or a request of the page: the
+    signal raises KeyboardInterrupt within :meth:`raised`, or waits for the next :meth:`raised`. It leaves at the second
+    signal, on a thread, because the main thread may wait for a disk: it calls ``leaving`` and prints ``last_words``,
+    which must not wait for a disk.
     """
 
     def __init__(self) -> None:
-        self._before: dict[int, object] = {}
         self.by: EndReason | None = None
         self.last_words: Callable[[], str] = lambda: "stopped immediately"
         self.leaving: list[Callable[[], object]] = []
-        self._raises = self._signalled = self._postponed = False
+        self._raises = self._answered = False  # whether signals raise now, and whether one was answered
+        self._before: dict[int, object] = {}
 
     def begin(self) -> None:
         """Handle signals from now on, if this is the main thread; no other can."""
@@ -77,6 +72,8 @@ class Stops:
         """Handle signals as before; as the last act of the program, ignore them: while Python ends, they would kill."""
         if not self._before:
             return
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.set_wakeup_fd(self._woken_before)
         self._wake.close()
         before, self._before = self._before, {}
@@ -86,61 +83,53 @@ class Stops:
     @contextlib.contextmanager
     def counted(self) -> Iterator[None]:
         """Defer signals until the waits inside this context, and forget those that come after the last of them."""
-        before, self._raises = self._raises, False
-        try:
+        with self._raising(False):
             yield
-        finally:
-            self._raises = before
 
     @contextlib.contextmanager
     def raised(self) -> Iterator[None]:
-        """Raise KeyboardInterrupt for a deferred signal, or for one that arrives in this context."""
-        before, self._raises = self._raises, True
-        try:
-            if self.by and not before:
+        """Raise KeyboardInterrupt for a request that was deferred, or for a signal that arrives in this context."""
+        deferred = not self._raises
+        with self._raising(True):
+            if self.by and deferred:
                 raise KeyboardInterrupt
+            yield
+
+    @contextlib.contextmanager
+    def _raising(self, now: bool) -> Iterator[None]:
+        before, self._raises = self._raises, now
+        try:
             yield
         finally:
             self._raises = before
 
     def ask(self, by: EndReason) -> None:
-        """End the recording from another thread, as the first signal would."""
-        if self.by is not None:
-            return
-        self.by = by
-        _interrupt_main()
+        """End the recording at its next wait; any thread may ask."""
+        self.by = self.by or by
 
     def _heard(self, number: int, frame: FrameType | None) -> None:
-        if self._signalled:
-            return
-        self.by = self.by or SIGNALS[signal.Signals(number).name]
+        if not self._answered:
+            self.by = self.by or SIGNALS[signal.Signals(number).name]
+            self._answer(0, frame)
+
+    def _answer(self, _: int, frame: FrameType | None) -> None:
         if self._raises and _swallows(frame):
-            self._postponed = True
+            signal.signal(signal.SIGALRM, self._answer)
+            signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
             return
-        self._signalled = True
+        self._answered = True
         if self._raises:
             raise KeyboardInterrupt
 
     def _watch(self, woken: socket.socket) -> None:
         """Leave at the second signal. Python writes the number of each signal to ``woken``, whatever is going on."""
-        clock, first_ns, again = SystemClock(), None, 0
+        clock, first_ns = SystemClock(), None
         with woken:
-            while True:
-                try:
-                    if not (number := woken.recv(1)):
-                        return
-                except TimeoutError:
-                    if self._postponed:
-                        self._postponed, again = False, again + 1
-                        _interrupt_main()
-                    continue
+            while number := woken.recv(1):
                 if signal.Signals(number[0]).name not in SIGNALS:
                     continue
-                if again:
-                    again -= 1
-                elif first_ns is None:
+                if first_ns is None:
                     first_ns = clock.now_ns()
-                    woken.settimeout(0.02)
                 elif clock.now_ns() - first_ns > TOGETHER_NS:
                     self._leave()
 
@@ -163,7 +152,7 @@ _OF_CALLBACKS = (weakref.__file__, weakref.WeakSet.__init__.__code__.co_filename
 
 def _swallows(frame: FrameType | None) -> bool:
     """Return whether Python drops or converts what a handler raises: in an import, a destructor or its callbacks."""
-    while frame is not None:
+    while frame is not None and hasattr(signal, "setitimer"):
         code = frame.f_code
         if code.co_filename.startswith("<frozen importlib") or code.co_filename in _OF_CALLBACKS:
             return True
@@ -171,14 +160,6 @@ def _swallows(frame: FrameType | None) -> bool:
             return True
         frame = frame.f_back
     return False
-
-
-def _interrupt_main() -> None:
-    main = threading.main_thread().ident
-    if hasattr(signal, "pthread_kill") and main is not None:
-        signal.pthread_kill(main, signal.SIGINT)  # interrupts a wait, unlike a flag
-    else:
-        _thread.interrupt_main()
 
 
 STOPS = Stops()

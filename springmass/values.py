@@ -43,7 +43,6 @@ Share = Annotated[float, _where(lambda x: 0.0 <= x <= 1.0, "must lie in 0 to 1")
 SampleShare = Annotated[float, _where(lambda x: 0.0 <= x <= 0.4, "must lie in 0 to 0.4")]
 ReadingsPerSecond = Annotated[float, _where(lambda x: 1e-3 <= x <= 1e6, "must lie in 0.001 to 1000000")]
 PartsPerMillion = Annotated[float, _where(lambda x: 0.0 <= x <= 1e6, "must lie in 0 to 1000000")]
-SignedPartsPerMillion = Annotated[float, _where(lambda x: abs(x) <= 5e5, "must lie in -500000 to 500000")]
 Count = Annotated[int, _where(lambda x: x >= 1, "must be 1 or more")]
 WholeNumber = Annotated[int, _where(lambda x: x >= 0, "must be 0 or more")]
 TcpPort = Annotated[int, _where(lambda x: 0 <= x <= 65535, "must be a port from 0 to 65535")]

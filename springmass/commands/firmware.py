@@ -19,7 +19,7 @@ from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_argum
 from acquisition.live.serial_port import SerialPort
 from springmass.commands.options import flag, option
 from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
-from springmass.session.identity import outdated, settings_of
+from springmass.session.sensors import outdated, settings_of
 
 ANSWER_S = 5.0
 """Longest time until a board answers: opening the port restarts it, and its bootloader waits for two seconds."""

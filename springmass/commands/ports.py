@@ -33,13 +33,13 @@ def ports(
         print(json.dumps(rows))
         return OK
     if not rows:
-        print("no serial port on this machine; `springmass record --simulate SCENE.toml` runs without one")
+        print("no serial port on this machine; `springmass record --simulate` runs without one")
     for row in rows:
         print(visible(f"{row['device']:<16} {row['description']}"))
         if row["heard"] is not None:
             print(visible(f"{'':<16} {row['heard']}"))
     known = [row["device"] for row in rows if row["families"]]
-    suggest(f"springmass record --port {shlex.quote(known[0])}" if known else "springmass record --simulate SCENE.toml")
+    suggest(f"springmass record --port {shlex.quote(known[0])}" if known else "springmass record --simulate")
     return OK
 
 
@@ -74,9 +74,7 @@ def name_sensors(ports: tuple[str, ...], sensors: tuple[str, ...], baud: int | N
         if known:
             demand = "name one with --port and --sensor; several speak"
         else:
-            demand = (
-                "no rangefinder that is known speaks; name it with --port and --sensor, or take --simulate SCENE.toml"
-            )
+            demand = "no rangefinder that is known speaks; name it with --port and --sensor, or take --simulate"
         listed = "; ".join(descriptions) or "this machine has no serial port"
         raise ProgramError(f"record looked for a rangefinder: {demand}: {listed}", SENSOR)
     for address, name, speed in known:

@@ -32,17 +32,18 @@ from springmass.page.process import PageProcess
 from springmass.runs.outputs import made_now
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.operator import Closed, Operator
-from springmass.session.options import RunLimits, RunListeners
 from springmass.session.output import default_name, demand_new
-from springmass.session.session import BYTES_PER_READ, Ended, Sensor, Session, Trigger
-from springmass.session.simulated_bench import REST_M, Release, bench_position
-from springmass.session.trigger import Disarmed
+from springmass.session.progress import load_analysis
+from springmass.session.sensors import Sensor
+from springmass.session.session import BYTES_PER_READ, Ended, RunLimits, RunListeners, Session
+from springmass.session.simulated_bench import EXAMPLE, REST_M, Release, bench_position
+from springmass.session.trigger import Disarmed, Trigger
 from springmass.stops import STOPS, EndReason
 from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
-from springmass.terminal.recording import END_WORDS, ProgressLine
+from springmass.terminal.recording import ProgressLine
 from springmass.terminal.style import style_of
-from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, SignedPartsPerMillion
+from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
 from storage.recovery.recover import recover
@@ -72,7 +73,7 @@ class RecordOptions:
     sensor: Annotated[
         tuple[str, ...], option("NAME", "family of the sensor, from the list of `springmass sensors`")
     ] = ()
-    simulate: Annotated[File | None, option("SCENE.toml", "record a simulated bench instead of a port")] = None
+    simulate: Annotated[bool, flag("record a simulated bench instead of a port; --scene says which")] = False
     output: Annotated[
         File | None, output("RUN.h5", "run file to create, never overwritten (default: date, time and title)")
     ] = None
@@ -101,41 +102,37 @@ class RecordOptions:
     ] = None
     trigger: Annotated[Positive | None, option("M", "start when the bob is M metres from its rest position")] = None
     pre: Annotated[Positive | None, option("S", "seconds to keep before the trigger (default: 2)")] = None
-    no_trace: Annotated[bool, flag("do not draw the motion on the terminal")] = False
     seed: Annotated[int, option("N", "with --simulate: seed of the noise (default: 0)")] = 0
-    crystal_ppm: Annotated[
-        SignedPartsPerMillion, option("PPM", "with --simulate: rate error of the sensor's clock (default: 0)")
-    ] = 0.0
 
 
 def record(*, options: RecordOptions = RecordOptions(), page_options: PageOptions = PageOptions()) -> int:
     """Record, then build the run file from the log."""
-    source = options.scene or options.simulate
-    what = options.title or (
-        "run" if source is None else Path(source).name.removesuffix(".toml").removesuffix(".scene")
-    )
-    out = default_name(what, datetime.now()) if options.output is None else Path(options.output)
+    what = "simulated" if options.simulate else "run"
+    if options.scene is not None:
+        what = Path(options.scene).name.removesuffix(".toml").removesuffix(".scene")
+    out = default_name(options.title or what, datetime.now()) if options.output is None else Path(options.output)
     if out.suffix.lower() != ".h5":
         raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5", USAGE)
     _demand_sense(options, page_options)
     _fill_standard_streams()
-    if options.simulate is None:
+    if not options.simulate:
         named = name_sensors(options.port, options.sensor, options.baud)
         options = replace(options, port=named.ports, sensor=named.sensors, baud=named.baud)
     demand_new(out, len(options.port))
-    scene = None if source is None else read_scene(source)
-    if scene is not None and source is not None:
-        ask_about(scene, source)
-    log = out.with_suffix(".wire")
-    bench = Release(SystemClock())
-    with _sensors(options, scene, bench) as (sensors, kind), contextlib.ExitStack() as beside:
+    scene = EXAMPLE if options.simulate else None
+    if options.scene is not None:
+        scene = read_scene(options.scene)
+        ask_about(scene, options.scene)
+    load_analysis()
+    log, clock = out.with_suffix(".wire"), SystemClock()
+    release = Release(clock)
+    with _sensors(options, scene, release) as sensors, contextlib.ExitStack() as beside:
         rate = sum(sensor.rate_hz or sensor.family.rate_hz for sensor in sensors)
         check_disk(out, int(BYTES_PER_READ * rate * (options.seconds or UNLIMITED_S)) + 1_000_000)
-        clock = SystemClock()
         session = Session(
             sensors,
             clock,
-            kind=kind,
+            kind="simulated" if options.simulate else "live",
             scene=None if scene is None else scene.to_mapping(),
             title=options.title,
             stops=STOPS,
@@ -144,9 +141,15 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         console = beside.enter_context(Console(lambda error: session.failures.note("stderr", error)))
         try:
             page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
-            ended = _Bench(session, options, log, console, bench, page).record()
+            ended = _Bench(session, options, log, console, release, page).record()
             session.stop()
-            code, run_file = _built(ended, out, session, console)
+            for line in _failed(ended, session):
+                console.line(line)
+            code, run_file, sentences = _built(ended, out, session)
+            for line in sentences:
+                console.line(line)
+            if console.terminal and run_file is not None:
+                console.line(f"next: springmass analyse {shlex.quote(str(run_file))}")
             session.recorder = None
             if page is not None and run_file is not None and ended.by is EndReason.PAGE:
                 page.tell("built", run=str(run_file))
@@ -164,47 +167,44 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
             session.stop()
 
 
-def _built(ended: Ended, out: Path, session: Session, console: Console) -> tuple[int, Path | None]:
-    """Build the run file, report the outcome of the recording, and return exit code and file of the first run."""
-    log, status = ended.log.path, ended.status
-    for line in session.failures.describe():
-        console.line(line)
+def _failed(ended: Ended, session: Session) -> list[str]:
+    """Return what went wrong during the recording."""
+    lines, status = session.failures.describe(), ended.status
     if status.error:
-        console.line(f"springmass: {status.error}")
-        console.line(f"springmass: {status.dropped_records} records that came later were not kept")
+        lines.append(f"springmass: {status.error}")
+        lines.append(f"springmass: {status.dropped_records} records that came later were not kept")
+    return lines
+
+
+def _built(ended: Ended, out: Path, session: Session) -> tuple[int, Path | None, list[str]]:
+    """Build the run file; return exit code, file of the first run, and the sentences about the end."""
+    log, status = ended.log.path, ended.status
     whole = not status.error and not status.dropped_records
     try:
         out.parent.mkdir(parents=True, exist_ok=True)  # the folder may have been moved with the log
         report = recover(ended.log, out, remove_log=whole, provenance=made_now())
     except Exception as error:
-        console.line(f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}")
-        return SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE, None
-    for line in report.describe():
-        console.line(line)
+        code = SENSOR if status.error or isinstance(error, WriteFailed) else UNREADABLE
+        return code, None, [f"springmass: the run file was not built ({one_line(error)}); {_what_to_do(log)}"]
+    lines = list(report.describe())
     if not report.log_removed and log.exists():
-        console.line(f"{log}: the log stays")
-    if console.terminal:
-        console.line(f"next: springmass analyse {shlex.quote(str(report.main.path))}")
-    return _exit_code(ended, report, session, console), report.main.path
-
-
-def _exit_code(ended: Ended, report: RecoverReport, session: Session, console: Console) -> int:
+        lines.append(f"{log}: the log stays")
     first = [run for run in report.runs if run.part == 1]
     if useless := [run.path for run in first if not _usable(run.sensor.channel, report, session)]:
         named = ", ".join(map(str, useless))
-        console.line(f"springmass: {named}: no usable distance was recorded; check aim, distance and wiring")
-        return SENSOR
-    if ended.by is EndReason.DISK:
-        console.line(
-            "springmass: the disk is full or broken and ended the recording; the run holds everything before that"
-        )
-        return SENSOR
-    if ended.absent:
-        return SENSOR
-    if ended.by in (EndReason.SECONDS, EndReason.PAGE):
-        return OK
-    console.line(f"stopped by {END_WORDS[ended.by]}; everything up to then is saved")
-    return INTERRUPTED
+        lines.append(f"springmass: {named}: no usable distance was recorded; check aim, distance and wiring")
+        code = SENSOR
+    elif ended.by is EndReason.DISK:
+        lines.append("springmass: the disk is full or broken and ended the recording; the run has all before that")
+        code = SENSOR
+    elif ended.absent:
+        code = SENSOR
+    elif ended.by in (EndReason.SECONDS, EndReason.PAGE):
+        code = OK
+    else:
+        lines.append(f"stopped by {ended.by}; everything up to then is saved")
+        code = INTERRUPTED
+    return code, report.main.path, lines
 
 
 def _usable(channel: int, report: RecoverReport, session: Session) -> bool:
@@ -242,7 +242,7 @@ def _fill_standard_streams() -> None:
 
 
 def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
-    """Refuse options that would do nothing without another."""
+    """Refuse options that would do nothing without another, or with it."""
     for name, given, needed, there in (
         ("--ruler", bool(options.ruler), "--still", options.still is not None),
         ("--pre", options.pre is not None, "--trigger", options.trigger is not None),
@@ -252,6 +252,8 @@ def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
     ):
         if given and not there:
             raise ProgramError(f"{name} does nothing without {needed}; name both or neither", USAGE)
+    if options.simulate and options.port:
+        raise ProgramError("--simulate takes no --port; leave one of them out", USAGE)
 
 
 def _page(options: PageOptions, log: Path, session: Session, console: Console) -> PageProcess:
@@ -311,18 +313,15 @@ class _Bench:
         with marks_by_keys(watched=style.terminal) as typed:
             marks = typed
             if self.page is not None:
-                if typed is None:
-                    marks = self.page.marks
-                else:
-                    self.page.marks = typed
-            show = ProgressLine(self.console, style, trace=not self.options.no_trace, keys=typed is not None)
+                marks = self.page.marks = self.page.marks if typed is None else typed
+            show = ProgressLine(self.console, style, keys=typed is not None)
             listeners = RunListeners(progress=show, marks=marks)
             try:
                 if operator is None:
                     return self.session.record(self.log, limits, listeners)
                 return self._operated(limits, listeners, operator)
             finally:
-                show.end()
+                self.console.settle()
 
     def _operated(self, limits: RunLimits, listeners: RunListeners, operator: Operator) -> Ended:
         """Record immediately, or when the page asks for it."""
@@ -356,7 +355,7 @@ class _Bench:
             self._ask(f"bring the target to {known:g} m by the ruler, then press Enter")
             points.append(self._still(seconds, "keep it still"))
         self.session.calibrate(points, ruler, U_RULER_M)
-        found = self.session.sensors[0].calibration
+        found = self.session.calibration
         scale = format_value(found.scale, found.u_scale)
         self.console.line(f"scale {scale}, offset {format_value(found.offset_m, found.u_offset_m, 'm')}")
         self._ask("hang the bob over the sensor, then press Enter")
@@ -380,27 +379,28 @@ class _Bench:
 
 
 @contextlib.contextmanager
-def _sensors(options: RecordOptions, scene: Scene | None, bench: Release) -> Iterator[tuple[list[Sensor], str]]:
+def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> Iterator[list[Sensor]]:
     """Open the source of the recording: the named ports, or a simulated bench on a simulated port."""
     family_options = dict(options.option)
-    for name in options.sensor or ((SIMULATED_FAMILY,) if options.simulate is not None else ()):
+    names = options.sensor or ((SIMULATED_FAMILY,) if options.simulate else ())
+    for name in names:
         get_family(name).demand_options(family_options)
     calibration = _calibration(options, scene)
-    if options.simulate is not None:
-        with _simulated(options, family_options, calibration, bench) as sensor:
-            yield [sensor], "simulated"
+    if options.simulate:
+        assert scene is not None
+        with _simulated(options, names[0], scene, family_options, calibration, release) as sensor:
+            yield [sensor]
         return
-    if len(options.sensor) not in (1, len(options.port)):
+    if len(names) not in (1, len(options.port)):
         raise ProgramError("--sensor must be named once for all ports, or once for each in their order", USAGE)
-    names = options.sensor * len(options.port) if len(options.sensor) == 1 else options.sensor
-    families = [get_family(name) for name in names]
+    families = [get_family(name) for name in (names * len(options.port) if len(names) == 1 else names)]
     sensors: list[Sensor] = []
     try:
         for address, family in zip(options.port, families, strict=True):
             baud = options.baud or family.baud
             port = SerialPort(address, baud)
             sensors.append(Sensor(family, port, options.rate_hz, family_options, calibration, baud, options.clock_ppm))
-        yield sensors, "live"
+        yield sensors
     finally:
         for sensor in sensors:
             sensor.port.close()
@@ -408,34 +408,34 @@ def _sensors(options: RecordOptions, scene: Scene | None, bench: Release) -> Ite
 
 @contextlib.contextmanager
 def _simulated(
-    options: RecordOptions, family_options: dict[str, Any], calibration: Calibration, bench: Release
+    options: RecordOptions,
+    name: str,
+    scene: Scene,
+    family_options: dict[str, Any],
+    calibration: Calibration,
+    release: Release,
 ) -> Iterator[Sensor]:
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port", USAGE)
     from acquisition.simulated.pseudo_terminal import VirtualPort
     from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 
-    family = get_family(options.sensor[0] if options.sensor else SIMULATED_FAMILY)
+    family = get_family(name)
     if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
         raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that", USAGE)
     waits = options.still is not None or options.ready
-    position = bench_position(
-        read_scene(str(options.simulate)),
-        options.seconds or UNLIMITED_S,
-        where=str(options.simulate),
-        release=bench if waits else None,
-    )
-    rate = options.rate_hz or family.rate_hz
-    model = VirtualSensor(rate_hz=rate, crystal_ppm=options.crystal_ppm)
-    rng = np.random.default_rng(options.seed)
+    where = "the example bench" if options.scene is None else str(options.scene)
+    seconds = options.seconds or UNLIMITED_S
+    position = bench_position(scene, seconds, where=where, release=release if waits else None)
+    model = VirtualSensor(rate_hz=options.rate_hz or family.rate_hz)
+    finder = VirtualRangefinder(position, model, np.random.default_rng(options.seed))
     # The simulated sensor must keep sending while the session listens, waits and closes.
-    seconds = (options.seconds or UNLIMITED_S) + (options.still or 0.0) + 60.0
-    finder = VirtualRangefinder(position, model, rng)
+    seconds += (options.still or 0.0) + 60.0
     with VirtualPort(family, finder, SystemClock(), seconds=seconds, options=family_options) as virtual:
         port = SerialPort(virtual.path, family.baud)
         virtual.start()
-        bench.begin()
+        release.begin()
         try:
             yield Sensor(family, port, options.rate_hz, family_options, calibration, family.baud, options.clock_ppm)
         finally:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from storage.errors import one_line
-
-__all__ = ["Failures", "raised_at"]
 
 KINDS = 20
 """Maximum number of kinds of failure counted separately; all further kinds are counted together."""
@@ -20,10 +18,7 @@ OTHERS = "others"
 class Failures:
     """Counts failures by component, error and the line that raised it; any thread may report a failure.
 
-    Attributes
-    ----------
-    tell : callable or None
-        Called with ``(kind, facts)`` for the first failure of each kind, which becomes an event of the run.
+    During a recording, ``tell`` makes an event of the first failure of each kind.
     """
 
     def __init__(self) -> None:
@@ -50,10 +45,12 @@ class Failures:
         with self._lock:
             return dict(self._counts)
 
-    def describe(self) -> Iterator[str]:
-        """Yield a readable line for each kind of failure."""
-        for name, count in self.counts.items():
-            yield f"during the recording, which went on, {count} time{'s' * (count > 1)}: {name}"
+    def describe(self) -> list[str]:
+        """Return a readable line for each kind of failure."""
+        return [
+            f"during the recording, which went on, {count} time{'s' * (count > 1)}: {name}"
+            for name, count in self.counts.items()
+        ]
 
 
 def raised_at(error: BaseException) -> str:

@@ -12,8 +12,6 @@ from pathlib import Path
 from springmass.errors import USAGE, ProgramError
 from storage.recovery.recover import run_paths
 
-__all__ = ["default_name", "demand_new"]
-
 
 def default_name(what: str, now: datetime) -> Path:
     """Return a name with time and subject, and with a number if the name is taken.
@@ -30,27 +28,20 @@ def default_name(what: str, now: datetime) -> Path:
 
 
 def demand_new(path: Path, sensors: int) -> None:
-    """Refuse existing or impossible names for the log and for each sensor's run files.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if a run file or the log exists, even as a dangling link, or if a name is too long.
-    """
+    """Refuse names for the log and for the run files that are too long or taken, even by a dangling link."""
     longest = _longest_name(path.parent)
     runs = run_paths(path, range(sensors))
     parts = [part for run in runs for part in sorted(run.parent.glob(f"{glob.escape(run.stem)}.part*.h5"))]
     for there in dict.fromkeys((path, path.with_suffix(".wire"), *runs, *parts)):
         if (size := len(os.fsencode(there.name))) > longest:
-            raise ProgramError(
-                f"{there}: expected a name of at most {longest} bytes, got {size}; choose a shorter one", USAGE
-            )
-        if there.is_symlink() and not there.exists():
-            raise ProgramError(f"{there}: a link to nothing stands there; remove it or choose another name", USAGE)
-        if there.exists():
-            raise ProgramError(
-                f"{there}: exists already, and a recording never replaces one; choose another name", USAGE
-            )
+            why = f"expected a name of at most {longest} bytes, got {size}; choose a shorter one"
+        elif there.is_symlink() and not there.exists():
+            why = "a link to nothing stands there; remove it or choose another name"
+        elif there.exists():
+            why = "exists already, and a recording never replaces one; choose another name"
+        else:
+            continue
+        raise ProgramError(f"{there}: {why}", USAGE)
 
 
 def _longest_name(folder: Path) -> int:

@@ -25,21 +25,17 @@ from acquisition.live.calibration import Calibration, StillPoint, against_ruler,
 from acquisition.live.reader import PortReader
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
-from springmass.session.display.progress import SECOND_NS, LiveState, Progress, progress_of
-from springmass.session.display.thread import Display, Samples
+from springmass.session.display import Display, Samples
 from springmass.session.failures import Failures
-from springmass.session.identity import meeting
-from springmass.session.options import RunLimits, RunListeners
+from springmass.session.progress import SECOND_NS, LiveState, Progress, progress_of
 from springmass.session.reads import Tee
-from springmass.session.sensors import ANSWERED, Sensor
+from springmass.session.sensors import ANSWERED, Sensor, meeting
 from springmass.session.trigger import Disarmed, Trigger, Watch
 from springmass.stops import EndReason, Stops
 from storage.errors import StorageError, WriteFailed
 from storage.recorder import Recorder, RecorderStatus
 from storage.wire_log.records import LogHeader
 from storage.wire_log.scanning import LogContents
-
-__all__ = ["EndReason", "Ended", "Progress", "Sensor", "Session", "Trigger"]
 
 SAY_NS = 1_500_000_000  # silence before a run that is reported, ns
 HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
@@ -50,48 +46,39 @@ BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
-    """How a recording ended.
+class RunLimits:
+    """When a run starts and ends: by default at once, and by the user."""
 
-    Parameters
-    ----------
-    by : EndReason
-    status : RecorderStatus
-    log : LogContents
-        Contents of the log, available even if its path no longer leads to it.
-    absent : list of int
-        Ports whose sensor was lost or silent at the end.
-    """
+    seconds: float | None = None
+    trigger: Trigger | None = None
+    rest: StillPoint | None = None  # from which the trigger measures; None: from the first distance
+
+
+@dataclass(frozen=True, slots=True)
+class RunListeners:
+    """What is called during the recording of a run, and the queue of marks to put into it."""
+
+    progress: Callable[[Progress], None] = lambda _: None  # about once a second, on a separate thread
+    marks: queue.SimpleQueue[str] | None = None
+    begun: Callable[[Path], None] = lambda _: None  # once reads are recorded in this log
+    changed: Callable[[], bool] = lambda: False  # whether to stop waiting for the trigger
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a recording ended."""
 
     by: EndReason
     status: RecorderStatus
-    log: LogContents
-    absent: list[int]
+    log: LogContents  # available even if its path no longer leads to it
+    absent: list[int]  # ports whose sensor was lost or silent at the end
 
 
 class Session:
     """Records one run.
 
-    Parameters
-    ----------
-    sensors : sequence of Sensor
-    clock : Clock
-        Clock of the system.
-    kind : {"live", "simulated"}
-    scene : mapping, optional
-        Tables of the scene, stored with the run.
-    title : str
-    stops : Stops, optional
-        Requests to end the recording.
-
-    Attributes
-    ----------
-    failures : Failures
-        Failures during the recording that did not end it.
-    recorder : Recorder or None
-        Recorder of the run, once it has begun.
-    shown : LiveState or None
-        State derived from the samples shown so far.
+    ``failures`` has the failures that did not end the recording, ``recorder`` the recorder of the run once it has
+    begun, and ``shown`` the state derived from the samples shown so far.
     """
 
     def __init__(
@@ -106,32 +93,21 @@ class Session:
     ) -> None:
         self.failures = Failures()
         self.sensors = list(sensors)
-        self._clock = clock
-        self._kind = kind
-        self._scene = scene
-        self._title = title
+        self.stops = stops or Stops()
+        self.shown: LiveState | None = None
+        self.recorder: Recorder | None = None
+        self._clock, self._kind, self._scene, self._title = clock, kind, scene, title
         self._chains = [sensor.chain() for sensor in self.sensors]
         self._tee = Tee(self._chains, self.failures, self.sensors)
         self._reader: PortReader | None = None
         self._reader_failure: BaseException | None = None
-        self.stops = stops or Stops()
         self._marks: list[tuple[int, str]] = []
-        self.shown: LiveState | None = None
-        self.recorder: Recorder | None = None
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
-        """Start reading, and wait until every sensor has been heard.
+        """Start reading, and wait until every sensor has been heard; ``say`` gets a line if that takes long.
 
-        Parameters
-        ----------
-        say : callable
-            Called with a line if a sensor has not been heard after 1.5 s.
-
-        Raises
-        ------
-        ProgramError
-            With exit code 4 if a sensor has not been heard after 3 s, or after five periods of a slow sensor. If other
-            bytes were received, the message describes them.
+        A sensor that is not heard after 3 s, or after five periods of a slow sensor, raises a ProgramError that
+        describes what was received instead.
         """
         lines = [sensor.line(port) for port, sensor in enumerate(self.sensors)]
         for line in lines:
@@ -151,13 +127,11 @@ class Session:
             if self._clock.now_ns() > deadline:
                 if mute is None:
                     break
-                self.stop()
-                raise ProgramError(self._not_heard(mute), SENSOR)
+                self._end_unheard(mute)
             self._wait_until(self._clock.now_ns() + 50_000_000)
         for channel, chain in enumerate(self._chains):
             if getattr(chain.decoder, "counts", False):
-                self.stop()
-                raise ProgramError(self._not_heard(channel), SENSOR)
+                self._end_unheard(channel)
 
     def _waits_for_word(self) -> bool:
         """Return whether a sensor has not been heard yet, or may still report its identity."""
@@ -165,6 +139,12 @@ class Session:
             count < HEARD or (count < ANSWERED and sensor.family.identify and chain.status.identity is None)
             for count, sensor, chain in zip(self._tee.readings, self.sensors, self._chains, strict=True)
         )
+
+    def _end_unheard(self, channel: int) -> None:
+        self.stop()
+        if channel in self._tee.gone:
+            raise ProgramError(f"{self._tee.gone[channel]}; is a sensor connected, and is this its port?", SENSOR)
+        raise ProgramError(self.sensors[channel].not_heard(self._tee.heard(channel)), SENSOR)
 
     def meet(self) -> list[str]:
         """Store the identities and rates that sensors reported, and return lines about them."""
@@ -193,14 +173,16 @@ class Session:
         One known distance sets the offset; two or more also set the scale.
         """
         before = self.sensors[0].calibration
-        self.calibrated(against_ruler(tuple(points), tuple(known_m), u_known_m, before))
-        return self.sensors[0].calibration.restated(points[-1], before)
-
-    def calibrated(self, calibration: Calibration) -> None:
-        """Use a new calibration for the first sensor's distances from now on."""
+        calibration = against_ruler(tuple(points), tuple(known_m), u_known_m, before)
         self.sensors[0] = replace(self.sensors[0], calibration=calibration)
         self._chains[0].calibration = calibration
         self.poll(0.0)  # discard samples decoded with the earlier calibration
+        return calibration.restated(points[-1], before)
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibration of the first sensor."""
+        return self.sensors[0].calibration
 
     def now_ns(self) -> int:
         """Return the time of the clock in ns."""
@@ -224,21 +206,8 @@ class Session:
     def record(self, log: Path, limits: RunLimits, listeners: RunListeners) -> Ended:
         """Record until the time is over, the user ends the recording, or the disk fails.
 
-        Parameters
-        ----------
-        log : Path
-            Path of the new wire log.
-        limits : RunLimits
-        listeners : RunListeners
-
-        Raises
-        ------
-        Disarmed
-            If ``listeners.changed`` returned true during the wait for the trigger.
-        storage.errors.WriteFailed
-            If the log cannot be created.
-        storage.errors.NotALog
-            If the log cannot be read at the end.
+        Disarmed is raised if ``listeners.changed`` returned true during the wait for the trigger; a StorageError, if
+        the log cannot be created, or cannot be read at the end.
         """
         trigger, rest = limits.trigger, limits.rest
         moment_ns = self._clock.now_ns() if trigger is None else self._wait_for(trigger, rest, listeners)
@@ -296,10 +265,14 @@ class Session:
         marks: queue.SimpleQueue[str] | None,
     ) -> EndReason:
         """Wait for the end of the recording, and return the reason for it."""
+
+        def show(*, tick: bool = True) -> None:
+            self._ring(display, self._tee.blocks, start_ns, recorder, tick=tick)
+
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
         # Without marks, one turn per second suffices: samples are shown once a second, and a disk error persists.
         wait_ns, tick_ns = int((1.0 if marks is None else LOOK_FOR_MARKS_S) * 1e9), start_ns + SECOND_NS
-        self._ring(display, self._tee.blocks, start_ns, recorder, tick=False)
+        show(tick=False)
         while end_ns is None or self._clock.now_ns() < end_ns:
             turn_ns = min(self._clock.now_ns() + wait_ns, tick_ns, tick_ns if end_ns is None else end_ns)
             try:
@@ -309,16 +282,17 @@ class Session:
             if recorder.status.error:
                 return EndReason.DISK
             while marks is not None and not marks.empty():
-                recorder.mark(text := marks.get(), host_ns=(now_ns := self._clock.now_ns()))
+                now_ns, text = self._clock.now_ns(), marks.get()
+                recorder.mark(text, host_ns=now_ns)
                 self._marks.append((now_ns, text))
-                self._ring(display, self._tee.blocks, start_ns, recorder, tick=False)
+                show(tick=False)
             if turn_ns == end_ns:
                 break
             if turn_ns == tick_ns:
-                self._ring(display, self._tee.blocks, start_ns, recorder)
+                show()
                 tick_ns += SECOND_NS
         self._tee.stop()  # data received while the last line is shown are not part of the run
-        self._ring(display, self._tee.blocks, start_ns, recorder)
+        show()
         return EndReason.SECONDS
 
     def _wait_for(self, trigger: Trigger, rest: StillPoint | None, listeners: RunListeners) -> int:
@@ -347,7 +321,7 @@ class Session:
             display.close()
 
     def _wait_until(self, deadline_ns: int) -> None:
-        """Wait until a deadline or an interruption by the user, and record a failure of the reader, if any."""
+        """Wait until a deadline or a request to end, and record a failure of the reader, if any."""
         with self.stops.raised():
             self._clock.sleep_until_ns(deadline_ns)
         failure = None if self._reader is None else self._reader.failure
@@ -382,8 +356,3 @@ class Session:
             title=self._title,
             version=__version__,
         )
-
-    def _not_heard(self, channel: int) -> str:
-        if channel in self._tee.gone:
-            return f"{self._tee.gone[channel]}; is a sensor connected, and is this its port?"
-        return self.sensors[channel].not_heard(self._tee.heard(channel))

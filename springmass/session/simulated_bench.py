@@ -13,21 +13,22 @@ from pipeline.dynamics import Trajectory
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.strang import STRANG
 
-__all__ = ["REST_M", "Release", "bench_position"]
-
 REST_M = 0.25  # height of the bob's rest position above the sensor, m
 STEPS_A_RADIAN = 24  # steps per radian; interpolation between them has an error of 1e-8 of the amplitude
 STRETCH = 2000  # number of steps solved at a time, when the recording needs them
+EXAMPLE = Scene.from_mapping(
+    {
+        "bob": {"mass_kg": 0.2},
+        "spring": {"mass_kg": 0.01, "constant_n_per_m": 14.0},
+        "start": {"displacement_m": 0.05},
+        "damping": {"gamma_per_s": 0.01},
+    }
+)
+"""The bench that is simulated if no scene names another."""
 
 
 class Release:
-    """The moment at which the simulated bob is released, after its rest position has been measured.
-
-    Attributes
-    ----------
-    at_s : float
-        Time of release on the bench's time scale, s; infinity until it is known.
-    """
+    """The moment ``at_s`` at which the simulated bob is released, once its rest position has been measured."""
 
     def __init__(self, clock: Clock) -> None:
         self.at_s = math.inf
@@ -46,30 +47,10 @@ class Release:
 def bench_position(
     scene: Scene, seconds: float = 10.0, *, where: str = "scene", release: Release | None = None
 ) -> Callable[[float], float]:
-    """Return a function that gives the bob's distance from the sensor in m at a time in s.
+    """Return the bob's distance from the sensor in m as a function of time in s, with the drag for these seconds.
 
-    Parameters
-    ----------
-    scene : Scene
-        Bob mass, spring constant and starting displacement are required. If it names a disc or the air but no damping,
-        the drag is derived from them, as in ``springmass simulate``. All other omitted values are zero.
-    seconds : float
-        Duration of the recording, s; a derived drag applies to the amplitudes during this time.
-    where : str
-        Name of the scene in errors.
-    release : Release, optional
-        Moment of release, until which the bob hangs at rest. If omitted, the bob is released from its starting
-        displacement at t = 0.
-
-    Raises
-    ------
-    SceneError
-        If the scene lacks a value that a motion needs.
-
-    Notes
-    -----
-    The equation of motion of :class:`pipeline.dynamics.Equation` is solved by Strang splitting, only up to the latest
-    time needed.
+    The bob hangs at rest until its release; without one it starts at t = 0. The equation of motion is solved by Strang
+    splitting, only up to the latest time needed.
 
     Examples
     --------

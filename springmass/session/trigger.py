@@ -9,8 +9,6 @@ import numpy as np
 
 from acquisition.block import Block
 
-__all__ = ["Disarmed", "Trigger", "Watch"]
-
 
 class Disarmed(Exception):
     """The user stopped waiting for the trigger."""
@@ -18,29 +16,14 @@ class Disarmed(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Trigger:
-    """The condition for starting a recording.
-
-    Parameters
-    ----------
-    threshold_m : float
-        The first sensor's distance must leave its rest position by more than this, m.
-    keep_s : float
-        Time before that moment that is included in the run, s.
-    """
+    """The run starts when the first sensor's distance leaves its rest position; it keeps the time before that."""
 
     threshold_m: float
     keep_s: float = 2.0
 
 
 class Watch:
-    """Detects the moment of the trigger in the first sensor's samples.
-
-    Parameters
-    ----------
-    trigger : Trigger
-    rest_m : float
-        Rest position, m; NaN: the first measured distance.
-    """
+    """Detects the moment of the trigger in the first sensor's samples; without a rest position, from the first one."""
 
     def __init__(self, trigger: Trigger, rest_m: float = math.nan) -> None:
         self._threshold_m = trigger.threshold_m

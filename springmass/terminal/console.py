@@ -19,8 +19,6 @@ from acquisition.errors import visible
 if TYPE_CHECKING:
     from rich.live import Live
 
-__all__ = ["Console"]
-
 PATIENCE_S = 1.0
 """Maximum time that the end waits for pending lines to be written, s."""
 
@@ -28,18 +26,12 @@ PATIENCE_S = 1.0
 class Console:
     """Writes to stderr without blocking its callers; used as a context manager.
 
-    Parameters
-    ----------
-    failed : callable
-        Called from any thread with the exception of a write, or with a TimeoutError if a write does not end.
-    stream : text stream, optional
-        Stream to write to; if omitted, ``sys.stderr``.
+    ``failed`` gets, on any thread, the exception of a write, or a TimeoutError if a write does not end.
     """
 
-    def __init__(self, failed: Callable[[BaseException], None], stream: TextIO | None = None) -> None:
+    def __init__(self, failed: Callable[[BaseException], None]) -> None:
         self._failed = failed
-        self._given = sys.stderr if stream is None else stream
-        self._stream = _duplicate(self._given)
+        self._stream = _duplicate(sys.stderr)
         self._live: Live | None = None
         self._lines: Sequence[str] = ()
         self._drawing = False  # whether the queue contains a step that draws the latest lines
@@ -97,18 +89,17 @@ class Console:
 
     def close(self) -> None:
         """Wait until all lines are written, at most a second; lines not written by then are lost."""
-        if self._thread.ident is None:
-            return
-        self._steps.put(self._settle)
-        self._steps.put(None)
-        self._thread.join(PATIENCE_S)
-        if self._thread.is_alive():
-            self._failed(TimeoutError("nobody reads stderr"))
+        if self._thread.ident is not None:
+            self.settle()
+            self._steps.put(None)
+            self._thread.join(PATIENCE_S)
+            if self._thread.is_alive():
+                self._failed(TimeoutError("nobody reads stderr"))
 
     def _run(self) -> None:
         while (step := self._steps.get()) is not None:
             self._attempt(step)
-        if self._stream is not None and self._stream is not self._given:
+        if self._stream is not None and self._stream is not sys.stderr:
             self._attempt(self._stream.close)
 
     def _attempt(self, step: Callable[[], None]) -> None:

@@ -18,8 +18,6 @@ try:
 except ImportError:  # on Windows, only a line with Enter is a mark
     termios = None  # type: ignore[assignment]
 
-__all__ = ["Marks", "marks_by_keys"]
-
 PLAIN_MARK = "mark"
 Marks = queue.SimpleQueue[str]
 
@@ -28,14 +26,8 @@ Marks = queue.SimpleQueue[str]
 def marks_by_keys(*, watched: bool) -> Iterator[Marks | None]:
     """Yield the queue of marks typed during a recording; None if nothing can be typed.
 
-    Parameters
-    ----------
-    watched : bool
-        Whether stderr is a terminal, on which keys are read singly. Otherwise, each line with Enter is a mark.
-
-    Notes
-    -----
-    The terminal still handles Ctrl-C and Ctrl-Z. A program in the background does not access the terminal, because this
+    If stderr is ``watched`` on a terminal, keys are read singly; otherwise, each line with Enter is a mark. The
+    terminal still handles Ctrl-C and Ctrl-Z. A program in the background does not access the terminal, because this
     would stop the program.
     """
     descriptor = _foreground()

@@ -11,55 +11,38 @@ from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
-
-__all__ = [
-    "classic_text",
-    "comparison_text",
-    "findings_text",
-    "fitted",
-    "shared_findings_text",
-    "visible_lines",
-    "wrapped",
-]
+from springmass.terminal.table1 import aligned
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 NAMED = 5  # maximum number of runs that a line names
 FIRST = 3  # number of warnings shown without --full
 NARROW = 80  # maximum width of wrapped warnings, columns
 WARNING_LINES = 3
+INDENT = " " * 8
 
 
 def findings_text(
     findings: Sequence[Mapping[str, Any]], written: Callable[[str], str] = str, *, full: bool = False
 ) -> str:
-    """Return findings as wrapped lines, the most harmful first, each with severity, code, message and advice.
+    """Return findings of a result's JSON as wrapped lines, the most harmful first, with message and advice.
 
-    Parameters
-    ----------
-    findings : sequence of mapping
-        Findings as in the result's JSON: code, severity, message, advice.
-    written : callable
-        Converts a message to the characters of this terminal.
-    full : bool
-        Whether to show every warning and note; otherwise all errors and the first three warnings are shown.
+    Without ``full``, notes and all but the first three warnings are left out. ``written`` converts a message to the
+    characters of this terminal.
     """
     from springmass.report.advice import by_harm, is_standing
 
     ordered = by_harm(findings)
-    errors = [f for f in ordered if f["severity"] == "error"]
-    warnings = [f for f in ordered if f["severity"] == "warning"]
-    notes = [f for f in ordered if f["severity"] == "info"]
+    errors, warnings, notes = ([f for f in ordered if f["severity"] == grade] for grade in _MARKS)
     lines = [_finding_line(f, written) for f in (*errors, *(warnings if full else warnings[:FIRST]))]
     if not full:
         more = len(warnings) - FIRST
         if more > 0:
             lines.append(f"and {more} more {'warning' if more == 1 else 'warnings'}: --full")
         return "\n".join(lines or ["No warnings."])
-    standing = [f["code"] for f in notes if is_standing(f)]
     lines += [_finding_line(f, written) for f in notes if not is_standing(f)]
-    if standing:
+    if standing := [f["code"] for f in notes if is_standing(f)]:
         words = f"{_MARKS['info']} of every file of this format: {', '.join(standing)}"
-        lines.append(wrapped(words, " " * 8, NARROW))
+        lines.append(wrapped(words, INDENT, NARROW))
     if lines:
         lines.append("springmass explain CODE prints meaning, cause, advice and an example of each.")
     return "\n".join(lines or ["No warnings."])
@@ -71,7 +54,7 @@ def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> 
     message = written(finding["message"])
     if advice and severity != "info":
         message += f"{'' if message[-1:] in '.!?' else '.'} {advice}"
-    lines = wrapped(f"{_MARKS[severity]} {finding['code']}: {message}", " " * 8, NARROW).splitlines()
+    lines = wrapped(f"{_MARKS[severity]} {finding['code']}: {message}", INDENT, NARROW).splitlines()
     if severity == "error" or len(lines) <= WARNING_LINES:
         return "\n".join(lines)
     last = lines[WARNING_LINES - 1]
@@ -79,29 +62,21 @@ def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> 
 
 
 def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], written: Callable[[str], str] = str) -> str:
-    """Return the errors and warnings of several runs, one paragraph per code, and the number of notes.
-
-    Parameters
-    ----------
-    runs : mapping
-        Findings as in the result's JSON, by name of the run.
-    written : callable
-        Converts a message to the characters of this terminal.
-    """
+    """Return the errors and warnings of several runs by name, one paragraph per code, and the number of notes."""
     grave: dict[str, dict[str, Mapping[str, Any]]] = {}
     notes = 0
     for name, findings in runs.items():
-        notes += sum(f["severity"] == "info" for f in findings)
         for f in findings:
-            if f["severity"] != "info":
-                grave.setdefault(f["code"], {})[name] = f
+            if f["severity"] == "info":
+                notes += 1
+            else:
+                grave.setdefault(f["code"], {})[visible(name)] = f
     lines = []
     for code, by_run in sorted(grave.items(), key=lambda item: min(f["severity"] for f in item[1].values())):
-        names = [visible(name) for name in by_run]
+        names, first = list(by_run), next(iter(by_run.values()))
         listed = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
-        first = next(iter(by_run.values()))
         head = f"{_MARKS[first['severity']]} {code}, {len(names)} of {len(runs)} runs ({listed}): "
-        lines.append(wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{written(first['message'])}", " " * 8))
+        lines.append(wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{written(first['message'])}", INDENT))
     lines.append(f"{notes} notes do not affect the results; --json lists them.")
     return "\n".join(lines)
 
@@ -114,14 +89,7 @@ def classic_text(classic: Classic) -> str:
 
 
 def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str:
-    """Return a comparison as an aligned ASCII table, followed by its message.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    analyses : sequence of Analysis
-        Analyses of the compared runs, in the same order.
-    """
+    """Return a comparison as an aligned ASCII table, followed by its message."""
     rows = [("run", "period", "mass that swings", "spring constant", "residual / u")]
     for name, analysis, k, pull in zip(comparison.names, analyses, comparison.each, comparison.pulls, strict=True):
         mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Oscillation) else None
@@ -130,10 +98,7 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str
     # Constants that disagree have no meaningful mean.
     mean = str(comparison.spring_constant) if comparison.agree else "none"
     rows.append(("together", "", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))
-    widths = [max(len(row[i]) for row in rows) for i in range(5)]
-    lines = ["   ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
-    lines.insert(1, "-" * len(lines[0]))
-    return "\n".join([*lines, "", wrapped(comparison.message)])
+    return f"{aligned(rows)}\n\n{wrapped(comparison.message)}"
 
 
 def wrapped(text: str, indent: str = "", columns: int = 100) -> str:

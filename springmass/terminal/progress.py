@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from springmass.errors import tell
@@ -13,8 +13,6 @@ from springmass.terminal.style import watched
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-__all__ = ["TaskProgress", "counted"]
-
 EVERY_S = 10.0
 """Time between two progress lines if no terminal shows a bar, s."""
 
@@ -22,38 +20,16 @@ Item = TypeVar("Item")
 
 
 class TaskProgress:
-    """Shows the number of finished items and the time left; used as a context manager.
+    """Shows how many items, named by a plural noun, are done, and the time left; used as a context manager.
 
-    Parameters
-    ----------
-    what : str
-        Plural noun of the items, for example ``"runs"`` or ``"reports"``.
-    total : int, optional
-        Number of items, if it is known from the start.
-    lines : bool
-        Whether to write a line every ten seconds if no terminal shows the bar.
-    quiet : bool
-        Whether to show nothing.
-    seconds : callable
-        Returns the time of a monotonic clock, s.
-
-    Notes
-    -----
-    A line reads ``reports 12/300, 40 s left``. The time left is estimated from the average time per finished item.
+    Where no terminal shows the bar, ``lines`` writes ``reports 12/300, 40 s left`` every ten seconds. The time left is
+    estimated from the average time per finished item.
     """
 
-    def __init__(
-        self,
-        what: str,
-        total: int | None = None,
-        *,
-        lines: bool = False,
-        quiet: bool = False,
-        seconds: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._what, self._total, self._seconds = what, total, seconds
+    def __init__(self, what: str, total: int | None = None, *, lines: bool = False, quiet: bool = False) -> None:
+        self._what, self._total = what, total
         self._lines, self._quiet = lines and not quiet, quiet
-        self._began_s = self._shown_s = seconds()
+        self._began_s = self._shown_s = time.monotonic()
         self._bar: Progress | None = None
 
     def __enter__(self) -> Self:
@@ -77,7 +53,7 @@ class TaskProgress:
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=self._total)
             return
-        now_s = self._seconds()
+        now_s = time.monotonic()
         if not self._lines or self._total is None or not 0 < done < self._total or now_s - self._shown_s < EVERY_S:
             return
         self._shown_s = now_s

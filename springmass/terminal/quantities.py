@@ -7,8 +7,6 @@ from springmass.report.tables import page_unit, prefixed, pretty
 from springmass.report.words import typeset
 from springmass.terminal.style import TerminalStyle
 
-__all__ = ["concise", "shown"]
-
 
 def shown(estimate: Estimate | None, style: TerminalStyle) -> str:
     """Return an estimate as text: plain SI for a pipe, with prefix and ± if the terminal supports it."""
@@ -30,9 +28,7 @@ def concise(estimate: Estimate | None, style: TerminalStyle) -> str:
     >>> concise(Estimate(0.05145, 2e-5, "m"), TerminalStyle(True, True, si=False))
     '51.450(20) mm'
     """
-    if estimate is None:
-        return "-"
-    if isinstance(estimate, UpperLimit):
+    if estimate is None or isinstance(estimate, UpperLimit):
         return shown(estimate, style)
     chosen = estimate if style.si else prefixed(estimate)
     written = in_brackets(chosen.value, chosen.u)

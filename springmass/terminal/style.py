@@ -3,35 +3,19 @@
 from __future__ import annotations
 
 import os
-import shutil
 from dataclasses import dataclass
 from typing import TextIO
 
-__all__ = ["PLAIN", "TerminalStyle", "style_of"]
-
 WIDEST = 100
-PROBE = "±−·⁻⁰¹²³⁴⁵⁶⁷⁸⁹µ"
 
 
 @dataclass(frozen=True, slots=True)
 class TerminalStyle:
-    """The style of text on a stream.
+    """The style of text on a stream: by default that of a pipe."""
 
-    Parameters
-    ----------
-    terminal : bool
-        Whether the stream is a terminal, with colour and lines rewritten in place.
-    unicode : bool
-        Whether the stream is a terminal that can show ± and superscripts.
-    si : bool
-        Whether quantities are in SI units without prefixes.
-    width : int
-        Width in columns.
-    """
-
-    terminal: bool = False
-    unicode: bool = False
-    si: bool = True
+    terminal: bool = False  # with lines rewritten in place
+    unicode: bool = False  # can show ± and superscripts
+    si: bool = True  # quantities in SI units without prefixes
     width: int = WIDEST
 
 
@@ -39,31 +23,20 @@ PLAIN = TerminalStyle()
 
 
 def style_of(stream: TextIO, *, si: bool = False) -> TerminalStyle:
-    """Return the style of a stream; a pipe, a file or a terminal without a movable cursor gets plain ASCII.
-
-    Parameters
-    ----------
-    stream : text stream
-    si : bool
-        Whether the command line requests SI units without prefixes.
-    """
+    """Return the style of a stream; a pipe, a file or a terminal without a movable cursor gets plain ASCII."""
     if not watched(stream):
         return TerminalStyle(si=si)
-    columns = shutil.get_terminal_size((WIDEST, 24)).columns
-    try:
-        PROBE.encode(stream.encoding or "ascii")
-    except (UnicodeError, LookupError):
-        return TerminalStyle(terminal=True, si=si, width=columns)
-    return TerminalStyle(True, True, si, columns)
+    from rich.console import Console
+
+    options = Console(file=stream).options
+    return TerminalStyle(True, not options.ascii_only, si, options.max_width)
 
 
 def watched(stream: TextIO | None) -> bool:
     """Return whether a stream is a terminal that can move its cursor."""
     try:
         return (
-            stream is not None
-            and stream.isatty()
-            and os.environ.get("TERM", "dumb" if os.name != "nt" else "") != "dumb"
+            stream is not None and stream.isatty() and (os.name == "nt" or os.environ.get("TERM") not in (None, "dumb"))
         )
     except (OSError, ValueError):
         return False

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Mapping, Sequence
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate
-from springmass.report.tables import TableKey, TableRow, table_rows
+from springmass.report.tables import TableKey, table_rows
 from springmass.terminal.quantities import concise, shown
 from springmass.terminal.style import PLAIN, TerminalStyle
-
-__all__ = ["text_table"]
 
 NARROWEST = 24  # minimum width of the column for the names of quantities, which wrap
 
@@ -23,15 +20,8 @@ def text_table(
 ) -> str:
     """Return Table 1 in aligned columns; runs that do not fit side by side follow in another block.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the runs, shortened if they are wider than their column.
-    runs : sequence of Analysis or of mapping
-        Analyses, or their estimates from :func:`springmass.report.tables.table_estimates`.
-    style : TerminalStyle
-        Style of the stream. A pipe gets ASCII; a terminal gets rules and ±. If the runs do not fit side by side, the
-        uncertainty is given as digits in parentheses.
+    Names that are wider than their column are shortened. If the runs do not fit side by side, the uncertainty is given
+    as digits in parentheses.
 
     Examples
     --------
@@ -44,77 +34,52 @@ def text_table(
     ['period', '0.000022']
     """
     rows = table_rows(runs, missing=True)
-    left = max([len("quantity"), *(len(row.quantity) for row in rows)]) + 2
-    middle = max([len("symbol"), *(len(row.symbol) for row in rows)]) + 2
+    symbols = [row.page_symbol.replace(" ", "") if style.unicode else row.symbol for row in rows]
+    left = max([len("quantity"), *(len(row.quantity) for row in rows)])
+    room = style.width - max([len("symbol"), *map(len, symbols)]) - 4
     for form in (shown, concise):
         cells = [tuple(form(x, style) for x in row.estimates) for row in rows]
         widest = max([8, *(len(cell) for row in cells for cell in row)])
-        room = style.width - left - middle
-        if len(names) == 1 and all(len(row.note) <= room for row in rows):
-            widest = max([widest, *(len(row.note) for row in rows)])
-        cells = [
-            (_noted(row, widest),) * len(line) if row.note else line for row, line in zip(rows, cells, strict=True)
-        ]
-        together = max(1, (style.width - left - middle + 3) // (widest + 3))
+        if len(names) == 1:
+            widest = max([widest, *(len(row.note) for row in rows if len(row.note) <= room - left)])
+        together = max(1, (room - left + 3) // (widest + 3))
         if together >= len(names):
             break
     else:
         # Long names of quantities wrap if all runs then fit side by side.
-        wrapped = style.width - middle + 3 - len(names) * (widest + 3)
+        wrapped = room + 3 - len(names) * (widest + 3)
         if wrapped >= NARROWEST:
             left, together = wrapped, len(names)
+    for i, row in enumerate(rows):
+        if row.note:
+            cells[i] = (row.note if len(row.note) <= widest else "no mass",) * len(names)
+    heads = [_shortened(_readable(name, style), widest) for name in names]
     blocks = []
     for first in range(0, len(names), together):
-        chosen = slice(first, first + together)
-        heads = [_shortened(_readable(name, style), widest) for name in names[chosen]]
-        part = [row[chosen] for row in cells]
-        blocks.append(
-            _drawn(rows, heads, part, style) if style.terminal else _plain(rows, heads, part, left, middle, widest)
-        )
+        part = slice(first, first + together)
+        lines = [("quantity", "symbol", *heads[part])]
+        lines += [(row.quantity, symbol, *each[part]) for row, symbol, each in zip(rows, symbols, cells, strict=True)]
+        blocks.append(aligned(lines, [left, 0, *[widest] * len(heads[part])], close=2))
     return "\n\n".join(blocks) + "\n"
 
 
-def _plain(
-    rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Sequence[str]], left: int, middle: int, widest: int
-) -> str:
-    lines = [_line("quantity", "symbol", heads, left, middle, widest)]
-    lines.append("-" * max(len(lines[0]), left + middle + len(heads) * (widest + 3) - 3))
-    for row, values in zip(rows, cells, strict=True):
-        first, *others = textwrap.wrap(row.quantity, left - 2)
-        lines += [_line(first, row.symbol, values, left, middle, widest), *(f"  {line}" for line in others)]
-    return "\n".join(line.rstrip() for line in lines)
+def aligned(rows: Sequence[Sequence[str]], least: Sequence[int] = (), close: int = 0) -> str:
+    """Return rows in columns, with a rule under the first; a first column wider than ``least[0]`` wraps.
 
+    The first ``close`` columns are separated by two blanks, the others by three.
+    """
+    from rich.cells import cell_len, set_cell_size
 
-def _drawn(rows: Sequence[TableRow], heads: Sequence[str], cells: Sequence[Sequence[str]], style: TerminalStyle) -> str:
-    """Return the table drawn by rich, in colour unless NO_COLOR is set."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(
-        box=box.SIMPLE_HEAD if style.unicode else box.ASCII2, pad_edge=False, show_edge=False, header_style="bold"
-    )
-    table.add_column("quantity")  # on a narrow terminal, the name of the damping law wraps
-    table.add_column("", style="dim", no_wrap=True)
-    for head in heads:
-        table.add_column(Text(head), no_wrap=True)
-    for row, values in zip(rows, cells, strict=True):
-        symbol = row.page_symbol.replace(" ", "") if style.unicode else row.symbol
-        table.add_row(row.quantity, symbol, *(Text(value) for value in values))
-    console = Console(file=io.StringIO(), force_terminal=True, width=style.width, highlight=False)
-    console.print(table)
-    assert isinstance(console.file, io.StringIO)
-    return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines())
-
-
-def _line(quantity: str, symbol: str, cells: Sequence[str], left: int, middle: int, widest: int) -> str:
-    return quantity.ljust(left) + symbol.ljust(middle) + "   ".join(cell.ljust(widest) for cell in cells)
-
-
-def _noted(row: TableRow, width: int) -> str:
-    """Return the reason why a row has no values, shortened if it does not fit the column."""
-    return row.note if len(row.note) <= width else "no mass"
+    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
+    widths = [max(pair) for pair in zip(widths, least, strict=True)] if least else widths
+    widths[0] = least[0] if least else widths[0]
+    gaps = [2 if i < close else 3 for i in range(len(widths))]
+    lines: list[str] = []
+    for quantity, *others in rows:
+        first, *more = textwrap.wrap(quantity, widths[0]) or [""]
+        cells = [set_cell_size(text, w + gap) for text, w, gap in zip((first, *others), widths, gaps, strict=True)]
+        lines += ["".join(cells).rstrip(), *(f"  {line}" for line in more)]
+    return "\n".join([lines[0], "-" * (sum(widths) + sum(gaps[:-1])), *lines[1:]])
 
 
 def _shortened(name: str, width: int) -> str:

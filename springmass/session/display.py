@@ -11,10 +11,8 @@ import threading
 from collections.abc import Callable, Sequence
 
 from acquisition.block import Block
-from springmass.session.display.progress import LiveState, Progress
 from springmass.session.failures import Failures
-
-__all__ = ["Display"]
+from springmass.session.progress import LiveState, Progress
 
 LAST_S = 1.0
 """Maximum time that the end of a recording waits for the display's current turn, s."""
@@ -23,21 +21,10 @@ Samples = Sequence[tuple[int, Block]]
 
 
 class Display:
-    """Calls a function about once a second on a separate thread.
-
-    Parameters
-    ----------
-    shown : LiveState
-        Used only by this thread from now on.
-    show : callable
-        Called with the progress.
-    failures : Failures
-    """
+    """Shows the progress on its own thread, which alone uses ``shown`` from now on."""
 
     def __init__(self, shown: LiveState, show: Callable[[Progress], None], failures: Failures) -> None:
-        self._shown = shown
-        self._show = show
-        self._failures = failures
+        self._shown, self._show, self._failures = shown, show, failures
         # A request has a function that takes samples and one that reads the state; None ends the thread.
         self._rings: queue.SimpleQueue[tuple[Callable[[], Samples], Callable[[LiveState], Progress]] | None] = (
             queue.SimpleQueue()

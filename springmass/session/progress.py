@@ -17,18 +17,13 @@ from acquisition.decoders.family import Family
 from acquisition.live.decoding import SensorChain
 from pipeline.options import options_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
-from pipeline.track import F8
-from springmass.session.display.memory import demand_room
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
 from storage.recorder import Recorder, RecorderStatus
 
-__all__ = ["LiveState", "Progress", "Trouble", "TroubleKind", "progress_of"]
-
 SECOND_NS = 1_000_000_000
 USELESS_S = 0.8
 """Time in s after which a lack of targets or of changes is a trouble; the display's first turn can report it."""
-RECENT_S = 10.0
 FIRST_SAMPLES = 1000
 """Number of samples whose timestamps define t = 0, as in the run file; later ones would add the clocks' difference."""
 MOTION_EVERY_NS = 1_900_000_000
@@ -39,86 +34,43 @@ class TroubleKind(enum.Enum):
     """The kind of fault that makes readings useless."""
 
     NO_TARGET = enum.auto()
-    """The sensor hears no echo."""
     UNCHANGED = enum.auto()
-    """The distance does not change."""
     SENSOR_FAULT = enum.auto()
-    """The sensor itself reports a fault."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """The reason why a sensor's readings are useless.
-
-    Parameters
-    ----------
-    kind : TroubleKind
-    text : str
-        Message for the user: what is wrong, and what to check.
-    channel : int or None
-        Channel of the sensor if there are several.
-    """
+    """Why a sensor's readings are useless, and what to check; with the channel if there are several."""
 
     kind: TroubleKind
     text: str
     channel: int | None = None
 
+    def __str__(self) -> str:
+        """Return the text, with the sensor's channel if there are several."""
+        return self.text if self.channel is None else f"sensor {self.channel}: {self.text}"
+
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """The state of a recording for one line of progress.
-
-    Parameters
-    ----------
-    seconds : float
-        Time since the recording began, s.
-    samples, missing, gaps : int
-        Numbers of samples, missing values and gaps of all sensors.
-    rate_hz : float
-        Number of samples from the first sensor in the last second.
-    motion : callable
-        Returns the first sensor's motion, LiveMotion or NotYet. A call takes milliseconds, so it is made only for
-        display, and its result is reused for about two seconds.
-    status : RecorderStatus
-    disk_free_bytes : int or None
-        Free space on the disk with the log; None before there is a log.
-    waiting : bool
-        Whether the recording is still waiting for its trigger.
-    unshown : int
-        Number of samples that arrived too fast to be shown; they are in the run file.
-    gone : sequence of str
-        Reasons for lost ports that have not come back.
-    silent_s : float
-        Time since the first sensor's last reading, s.
-    missing_share : float
-        Fraction of missing values in the first sensor's latest block.
-    trouble : Trouble or None
-        Trouble of the first sensor in channel order that has one.
-    latest : callable
-        Returns times in s and distances in m, each (n,), of the first sensor's last ten seconds.
-    marks : sequence of (float, str)
-        Times of the marks so far, in s on the run's time scale, and their texts, as in the run file and on the page.
-    tick : bool
-        Whether this is the regular update once a second; otherwise it shows the start or a new mark.
-    """
+    """The state of a recording for one line of progress."""
 
     seconds: float
     samples: int
-    missing: int
+    missing: int  # of all sensors, as are the gaps
     gaps: int
-    rate_hz: float
-    motion: Callable[[], LiveMotion | NotYet]
+    rate_hz: float  # samples from the first sensor in the last second
+    motion: Callable[[], LiveMotion | NotYet]  # of the first sensor; it takes milliseconds
     status: RecorderStatus | None
     disk_free_bytes: int | None
-    waiting: bool
-    unshown: int = 0
-    gone: Sequence[str] = ()
-    silent_s: float = 0.0
-    missing_share: float = 0.0
-    trouble: Trouble | None = None
-    latest: Callable[[], tuple[F8, F8]] = lambda: (np.empty(0), np.empty(0))
-    marks: Sequence[tuple[float, str]] = ()
-    tick: bool = True
+    waiting: bool  # for its trigger
+    unshown: int  # samples that arrived too fast to be shown; they are in the run file
+    gone: Sequence[str]  # why ports were lost that have not come back
+    silent_s: float  # since the first sensor's last reading
+    missing_share: float  # of the first sensor's latest block
+    trouble: Trouble | None
+    marks: Sequence[tuple[float, str]]  # on the run's time scale, as in the run file and on the page
+    tick: bool = True  # whether this is the regular update, and not the start or a new mark
 
 
 class Usefulness:
@@ -166,23 +118,11 @@ class Usefulness:
 
 
 class LiveState:
-    """The state derived from the samples so far.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Nominal rate of the first sensor.
-
-    Attributes
-    ----------
-    zero_ns : int or None
-        Host time at the run's t = 0, ns; None before the first sample.
-    """
+    """The state derived from the samples so far; ``zero_ns`` is the host time at the run's t = 0, once it is known."""
 
     def __init__(self, rate_hz: float) -> None:
         self.samples = self.missing = 0
         self._rate_hz = rate_hz
-        self._has_room = False
         self.useful: dict[int, Usefulness] = {}
         self.zero_ns: int | None = None
         self._early = 0
@@ -194,8 +134,7 @@ class LiveState:
         self._motion = MotionAccumulator(self._rate_hz, options=options_for("fast"))
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
         self._found_ns = 0
-        self._recent: deque[tuple[F8, F8]] = deque()
-        self._missing_share = 0.0
+        self.missing_share = 0.0
         self._stamps: deque[I8] = deque()
         self._last_ns: int | None = None
 
@@ -212,41 +151,24 @@ class LiveState:
             missing = int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
             self.missing += missing
             self.useful.setdefault(channel, Usefulness()).push(block)
-            if channel == self._channel and len(block):
-                self._missing_share = missing / len(block)
-                self._recent.append((block.t, block.distance))
-                while self._recent[0][0][-1] < block.t[-1] - RECENT_S:
-                    self._recent.popleft()
-                self._motion.push(block.t, block.distance, block.flags)
-                if block.host_ns is not None and len(block):
-                    if channel == 0 and self._early < FIRST_SAMPLES:
-                        # A timestamp may be late but never early.
-                        zero_ns = int((block.host_ns - 1e9 * block.t)[: FIRST_SAMPLES - self._early].min())
-                        self.zero_ns = zero_ns if self.zero_ns is None else min(zero_ns, self.zero_ns)
-                        self._early += len(block)
-                    self._stamps.append(block.host_ns)
-                    self._last_ns = int(block.host_ns[-1])
+            if channel != self._channel or not len(block):
+                continue
+            self.missing_share = missing / len(block)
+            self._motion.push(block.t, block.distance, block.flags)
+            if block.host_ns is not None:
+                if channel == 0 and self._early < FIRST_SAMPLES:
+                    # A timestamp may be late but never early.
+                    zero_ns = int((block.host_ns - 1e9 * block.t)[: FIRST_SAMPLES - self._early].min())
+                    self.zero_ns = zero_ns if self.zero_ns is None else min(zero_ns, self.zero_ns)
+                    self._early += len(block)
+                self._stamps.append(block.host_ns)
+                self._last_ns = int(block.host_ns[-1])
 
     def motion(self, now_ns: int) -> LiveMotion | NotYet:
         """Return the first sensor's motion, calculated again if the last result is old enough."""
-        if not self._has_room:
-            demand_room()
-            self._has_room = True
         if isinstance(self._found, NotYet) or now_ns - self._found_ns >= MOTION_EVERY_NS:
             self._found, self._found_ns = self._motion.value(), now_ns
         return self._found
-
-    @property
-    def missing_share(self) -> float:
-        """Fraction of missing values in the first sensor's latest block."""
-        return self._missing_share
-
-    def latest(self) -> tuple[F8, F8]:
-        """Return times in s and distances in m, each (n,), of the first sensor's last ten seconds."""
-        if not self._recent:
-            return np.empty(0), np.empty(0)
-        t, distance = zip(*self._recent, strict=True)
-        return np.concatenate(t), np.concatenate(distance)
 
     def silent_s(self, now_ns: int) -> float:
         """Return the time since the first sensor's last reading, s; 0 before the first reading."""
@@ -258,6 +180,17 @@ class LiveState:
         while self._stamps and self._stamps[0][-1] < since:
             self._stamps.popleft()
         return sum(int(np.count_nonzero(stamps >= since)) for stamps in self._stamps)
+
+
+def load_analysis() -> None:
+    """Analyse a motion before the recording, which loads the libraries of linear algebra and their memory.
+
+    Where memory has run out they block or end the process, which must not happen during a recording.
+    """
+    t = np.arange(500) / 100
+    motion = MotionAccumulator(100.0, options=options_for("fast"))
+    motion.push(t, 0.2 + 0.05 * np.cos(8.0 * t), np.zeros(500, np.uint8))
+    motion.value()
 
 
 def progress_of(
@@ -283,24 +216,24 @@ def progress_of(
             return NotYet(f"no motion shown ({type(error).__name__})")
 
     shown.follow(tee.first)
+    zero_ns = start_ns if shown.zero_ns is None else shown.zero_ns
     return Progress(
-        (now_ns - start_ns) * 1e-9,
-        shown.samples,
-        shown.missing,
-        sum(len(chain.timebase.gaps) + int(chain.timebase.gaps_left_out["count"]) for chain in chains),
-        shown.rate_hz(now_ns),
-        motion,
-        None if recorder is None else recorder.status,
-        None if recorder is None else _free_bytes(recorder.path.parent),
-        recorder is None,
-        tee.unshown,
-        tuple(tee.gone.values()),
-        shown.silent_s(now_ns),
-        shown.missing_share,
-        _trouble(shown, chains, waiting=recorder is None),
-        shown.latest,
-        [((host_ns - (start_ns if shown.zero_ns is None else shown.zero_ns)) * 1e-9, text) for host_ns, text in marks],
-        tick,
+        seconds=(now_ns - start_ns) * 1e-9,
+        samples=shown.samples,
+        missing=shown.missing,
+        gaps=sum(len(chain.timebase.gaps) + int(chain.timebase.gaps_left_out["count"]) for chain in chains),
+        rate_hz=shown.rate_hz(now_ns),
+        motion=motion,
+        status=None if recorder is None else recorder.status,
+        disk_free_bytes=None if recorder is None else _free_bytes(recorder.path.parent),
+        waiting=recorder is None,
+        unshown=tee.unshown,
+        gone=tuple(tee.gone.values()),
+        silent_s=shown.silent_s(now_ns),
+        missing_share=shown.missing_share,
+        trouble=_trouble(shown, chains, waiting=recorder is None),
+        marks=[((host_ns - zero_ns) * 1e-9, text) for host_ns, text in marks],
+        tick=tick,
     )
 
 
