@@ -83,16 +83,16 @@ def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     if not isinstance(motion, Oscillation):
         return {TableKey(name): analysis.estimates[name] for name in _IN_TABLE if name in analysis.estimates}
     derived = motion.derived
-    law, certain = derived.laws[0].fit.law, bool(derived.law)
+    law, certain = derived.law_of_coefficients, bool(motion.damping.admissible) or motion.damping.by_statement
     # A coefficient of a user-defined law is not one of these quantities, even if it has the same name.
-    coefficients = derived.coefficients if law.name in LAWS else {}
+    coefficients = derived.coefficients if derived.quoted and law in LAWS else {}
     found = {}
     for name in _IN_TABLE:
         if name in derived.estimates:
-            key = TableKey(name, derived.law, certain) if QUANTITIES[name].by_law else TableKey(name)
+            key = TableKey(name, derived.law, bool(derived.law)) if QUANTITIES[name].by_law else TableKey(name)
             found[key] = derived.estimates[name]
         elif name in coefficients:
-            found[TableKey(name, law.name, certain, law.name)] = coefficients[name]
+            found[TableKey(name, law, certain, law)] = coefficients[name]
     return found
 
 

@@ -52,6 +52,15 @@ def test_a_law_of_a_scene_file_is_named_first(cli: Callable[..., Done], run: Pat
     assert free["damping"]["stated"] is None
 
 
+def test_table_1_has_the_coefficients_of_one_law_that_is_known(cli: Callable[..., Done], run: Path) -> None:
+    """Of seven seconds that several laws describe it shows no coefficient, but those of a stated law."""
+    free, stated = cli("analyse", run, "--no-report").out, cli("analyse", run, "--law", "linear", "--no-report").out
+    names = ("linear damping", "quadratic damping", "dry friction, ")
+    assert [name in free for name in names] == [False, False, False]
+    assert [name in stated for name in names] == [True, False, False]
+    assert "damping rate at the start" in free
+
+
 def test_a_law_that_does_not_exist_is_refused(cli: Callable[..., Done], run: Path) -> None:
     """Option and scene file list the laws."""
     assert "linear+quadratic" in cli("analyse", run, "--law", "cubic", "--no-report").complaint
