@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import springmass
@@ -33,6 +34,24 @@ def test_json_is_strict_and_has_the_number_that_was_put_in(cli: Cli, data: Path)
     constant = result["estimates"]["spring_constant"]
     assert abs(constant["value"] - 14.0) < 3 * constant["u"]
     assert result["input"]["kind"] == "simulated"
+
+
+def test_a_stated_mass_changes_no_distance(cli: Cli, tmp_path: Path) -> None:
+    """A plain table keeps its u of the rest position; a sensor in its scene adds the temperature."""
+    t = np.arange(1500) / 100
+    y = 0.25 + 0.05 * np.exp(-0.01 * t) * np.cos(8.0 * t) + 1e-4 * np.random.default_rng(3).standard_normal(t.size)
+    table = tmp_path / "table.csv"
+    table.write_text("time (s),distance (m)\n" + "".join(f"{a:.2f},{b:.6f}\n" for a, b in zip(t, y, strict=True)))
+    scene = tmp_path / "sensor.toml"
+    scene.write_text('[sensor]\nposition = "below"\n')
+
+    def u(*options: str | Path) -> float:
+        (result,) = cli("analyse", "--json", table, *options).results
+        return float(result["estimates"]["offset"]["u"])
+
+    assert u("--mass-kg", "0.2") == u() < 1e-5
+    assert u("--scene", scene, "--mass-kg", "0.2") == pytest.approx(u("--scene", scene))
+    assert u("--scene", scene) == pytest.approx(0.25 * 0.0055, rel=0.02)
 
 
 def test_a_bad_input_does_not_keep_the_others_from_theirs(cli: Cli, recording: Path, tmp_path: Path) -> None:
