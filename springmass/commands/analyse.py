@@ -284,7 +284,7 @@ def _attempt(task: _Task) -> tuple[Analysed, Path | None] | _Done:
     """Analyse an input; return the analysis, and where its scene was saved."""
     try:
         options, read = task.options, task.read
-        loaded, bench = load(task.file.path, read), dict(task.bench)
+        loaded, bench = load(task.file.path, read, scene_given=task.scene is not None), dict(task.bench)
         if options.ask:
             known = amended(scene_of(loaded, task.scene), bench, where="the command line") if bench else None
             bench |= ask_for_bench(known or scene_of(loaded, task.scene), loaded.path.name)
@@ -376,7 +376,7 @@ def _print_text(analysed: Analysed, options: AnalyseOptions) -> None:
     print(text_table([analysed.name], [analysed.analysis], style))
     if analysed.classic is not None:
         print(f"{classic_text(analysed.classic)}\n")
-    elif (options.full or options.budget) and (budget := budget_text(analysed.analysis)):
+    if (options.full or options.budget) and (budget := budget_text(analysed.analysis)):
         print(f"{fitted(budget, style.width) if style.terminal else budget}\n")
     if sentence := damping_sentence(analysed.analysis):
         print(f"{wrapped(sentence, '', 80)}\n")

@@ -149,7 +149,7 @@ def load_and_analyse(
     pipeline.errors.AnalysisError, pipeline.errors.SceneError
         If the recording cannot be analysed.
     """
-    loaded = load(path, reading)
+    loaded = load(path, reading, scene_given=scene is not None)
     return analyse_loaded(
         loaded, scene, bench=bench, accuracy=accuracy, law=law, options=options, with_classic=with_classic
     )

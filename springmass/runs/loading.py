@@ -118,7 +118,7 @@ class Loaded:
             yield self.samples[start : start + size]
 
 
-def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
+def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = False) -> Loaded:
     """Read a recording, a run file or a wire log.
 
     All digests of a run file are checked before any sample is used.
@@ -128,6 +128,8 @@ def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
     path : path
         :data:`springmass.layout.STDIN` for standard input.
     options : ReadOptions
+    scene_given : bool
+        Whether the caller uses another scene, so that none is said to be read from the notes.
 
     Raises
     ------
@@ -168,8 +170,10 @@ def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             complain(f"{where}: {trap.message}")
-    if described := (about := about_of(where)).described():
+    about = about_of(where)
+    if described := about.described(scene=not scene_given):
         tell(f"{about.path}: {described} read from the notes next to the file")
+    if about.described():
         scene = loaded.scene if about.scene is None else about.scene.to_mapping()
         marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
         noted = {"marks": marks} if marks else {}
