@@ -367,6 +367,7 @@ def _judged(analysed: Analysed, task: _Task) -> tuple[int, tuple[str, ...]]:
 def _print_text(analysed: Analysed, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.budgets import budget_text
+    from springmass.report.trust import trust_text
     from springmass.report.words import damping_sentence, typeset
     from springmass.terminal.printing import classic_text, findings_text, fitted, wrapped
     from springmass.terminal.style import style_of
@@ -378,8 +379,9 @@ def _print_text(analysed: Analysed, options: AnalyseOptions) -> None:
         print(f"{classic_text(analysed.classic)}\n")
     if (options.full or options.budget) and (budget := budget_text(analysed.analysis)):
         print(f"{fitted(budget, style.width) if style.terminal else budget}\n")
-    if sentence := damping_sentence(analysed.analysis):
-        print(f"{wrapped(sentence, '', 80)}\n")
+    for text in (trust_text(analysed.analysis, page=style.unicode), damping_sentence(analysed.analysis)):
+        if text:
+            print(f"{wrapped(text, '', 80)}\n")
     print(findings_text(analysed.result["findings"], typeset if style.unicode else str, full=options.full))
 
 

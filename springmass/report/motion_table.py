@@ -101,5 +101,6 @@ def amplitude_csv(analysis: Analysis) -> str:
     u_phase = np.sqrt(windows.covariance[:, 1, 1] * max(motion.phase.reduced_chi2, 1.0))
     table = (windows.t, scale * windows.amplitude, scale * scatter.u, windows.phase, u_phase, scatter.kept)
     word = f"amplitude{_spelt(analysis.track.unit)}"
-    lines = ["%.10g,%.10g,%.3g,%.10g,%.3g,%d" % row for row in zip(*table, strict=True)]
+    rows = zip(*table, strict=True)
+    lines = [f"{t:.10g},{a:.10g},{u_a:.3g},{phi:.10g},{u_phi:.3g},{used:d}" for t, a, u_a, phi, u_phi, used in rows]
     return "\n".join([f"time_s,{word},u_{word},phase_rad,u_phase_rad,used", *lines, ""])

@@ -205,6 +205,23 @@ def pretty(estimate: Estimate | None) -> str:
     return f"{_typeset(number)} {page_unit(estimate.unit)}".rstrip()
 
 
+def cells(estimate: Estimate | None) -> str:
+    """Return an estimate as value, u and unit for three cells of a spreadsheet, with the digits of u, divided by |.
+
+    Examples
+    --------
+    >>> cells(Estimate(0.7525961, 4.96e-5, "s")), cells(Estimate(101325.0, 1490.0, "Pa"))
+    ('0.752596|0.000050|s', '1.013e+05|0.015e+05|Pa')
+    """
+    if estimate is None:
+        return "||"
+    if isinstance(estimate, UpperLimit):
+        return f"< {format_limit(estimate.limit)}||{page_unit(estimate.unit)}"
+    value, _, u = format_value(estimate.value, estimate.u).partition(" +- ")
+    u, _, power = u.partition(")")
+    return f"{value.lstrip('(')}{power}|{u}{power}|{page_unit(estimate.unit)}"
+
+
 def pretty_number(value: float | None, digits: int = 2) -> str:
     """Typeset a number without an uncertainty to a few digits; return a dash for None or NaN.
 

@@ -68,7 +68,13 @@ def _names(stems: Sequence[str]) -> set[str]:
     """Return the names of all files that a report of these runs may contain, or one of 0.2.0."""
     charts = [f"{stem}{name}" for stem in stems for name in (*CHARTS, "classic", "logarithmic")]
     figures = {f"figures/{name}.{kind}" for name in (*charts, "comparison", "overlay") for kind in get_args(Kind)}
-    return {PAGE, LAB_REPORT, *TABLES, *figures, *(f"{stem}{name}.csv" for stem in stems for name in ("motion", "amplitude"))}
+    return {
+        PAGE,
+        LAB_REPORT,
+        *TABLES,
+        *figures,
+        *(f"{stem}{name}.csv" for stem in stems for name in ("motion", "amplitude")),
+    }
 
 
 def _write(

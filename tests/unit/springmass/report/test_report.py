@@ -22,7 +22,16 @@ from springmass.charts.run import charts_of
 from springmass.cli import main
 
 DATA = springmass.sample_data()
-TABLES = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv", "budget.tex", "motion.csv", "amplitude.csv"}
+TABLES = {
+    "report.html",
+    "results.json",
+    "results.csv",
+    "table.tex",
+    "budget.csv",
+    "budget.tex",
+    "motion.csv",
+    "amplitude.csv",
+}
 
 
 def reported(recording: Path, out: Path, *options: str) -> Path:
@@ -166,6 +175,20 @@ def test_amplitudes_and_phases_of_windows_are_written(folder: Path) -> None:
     assert np.mean(np.abs(amplitude - true) < 2.0 * u) > 0.9
     turns = (phase[-1] - phase[0]) / (2.0 * np.pi)
     assert (t[-1] - t[0]) / turns == pytest.approx(truth["period"]["value"], rel=1e-4)
+
+
+def test_table_1_is_ready_for_a_spreadsheet_and_says_what_may_be_quoted(page: str, result: dict[str, Any]) -> None:
+    """Each value has cells of its own for value and u, with the digits of u, and a judgement."""
+    cells = [each.split("|") for each in re.findall(r'<td class="num"[^>]* data-cells="([^"]*)"', page)]
+    period = result["estimates"]["period"]
+    (value, u) = next((value, u) for value, u, unit in cells if unit == "s" and float(value) > 0.7)
+    assert abs(float(value) - period["value"]) < 0.5e-6
+    assert float(u) == pytest.approx(period["u"], rel=0.05)
+    assert value.split(".")[1].isdigit()
+    assert len(value.split(".")[1]) == len(u.split(".")[1])
+    judged = re.findall(r'<td class="trust ([a-z-]+)">', page)
+    assert len(judged) == len(cells)
+    assert set(judged) <= {"sound", "uncertain", "do-not-quote"}
 
 
 def test_latex_is_balanced(folder: Path) -> None:
