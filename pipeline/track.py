@@ -88,6 +88,8 @@ class Track:
         Duration of the comparison of the clocks, s; None if it lasts from the first sample to the last.
     speed_of_sound_m_per_s : float or None
         Speed of sound with which echo times were converted to distances, m/s; None if it is unknown.
+    sonic : bool
+        Whether the distances are those of echoes, so that the temperature of the air changes their scale.
     u_scale : float
         Relative standard uncertainty of the scale of the distances, from a calibration; 0 without a calibration.
     u_offset_m : float
@@ -121,6 +123,7 @@ class Track:
     longest_stall_s: float = 0.0
     compared_s: float | None = None
     speed_of_sound_m_per_s: float | None = None
+    sonic: bool = False
     u_scale: float = 0.0
     u_offset_m: float = 0.0
     quantity: str = "length"

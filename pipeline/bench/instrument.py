@@ -30,6 +30,7 @@ class Instrument:
     speed_of_sound_m_per_s: float | None = None  # speed of sound used for the distances, m/s
     u_scale: float = 0.0  # relative standard uncertainty of the scale from a calibration; 0 without a calibration
     u_offset_m: float = 0.0  # standard uncertainty of the zero, m
+    sonic: bool = False  # whether the distances are those of echoes, whatever the speed of sound
     # Whether the clocks differ by more than both their errors allow, or held readings prevented a comparison.
     clock_refused: bool = False
 
@@ -65,7 +66,8 @@ class Instrument:
             if limit is not None and not (math.isfinite(limit) and limit >= 0):
                 raise TrackError(f"{name} must be finite and not negative, got {limit:g}; leave it out")
         rate, words, refused = _rate(track, u_crystal)
-        return cls(track.clock, rate, words, track.speed_of_sound_m_per_s, track.u_scale, track.u_offset_m, refused)
+        sound, sonic = track.speed_of_sound_m_per_s, track.sonic or track.speed_of_sound_m_per_s is not None
+        return cls(track.clock, rate, words, sound, track.u_scale, track.u_offset_m, sonic, refused)
 
 
 def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:

@@ -186,10 +186,10 @@ class Scene:
         return tuple(clauses)
 
     @property
-    def tells_of_bench(self) -> bool:
-        """Whether the scene states a mass, the disc or the air, and not only the sensor or a simulation."""
-        given = (self.bob_mass_kg, self.spring_mass_kg, self.disc_diameter_m, self.air_temperature_c)
-        return any(x is not None for x in (*given, self.air_pressure_pa, self.air_relative_humidity))
+    def tells_of_sensor(self) -> bool:
+        """Whether the scene has a table [sensor]: the distances come from a rangefinder."""
+        given = (self.sensor_sigma_m, self.sensor_position, self.sensor_mean_samples, self.sensor_lag_s)
+        return any(x is not None for x in given)
 
 
 def _check_vapour(scene: Scene, where: str) -> None:

@@ -23,7 +23,7 @@ class Ambient:
 
     def __init__(self, scene: Scene, inputs: Inputs, *, u_temperature_k: float) -> None:
         celsius, pressure, humidity = scene_air(scene)
-        self._sonic = scene.tells_of_bench
+        self._sensor = scene.tells_of_sensor
         self.known = scene.air_temperature_c is not None
         celsius = Estimate(celsius.value, celsius.u or u_temperature_k, "degC")
         self._inputs = inputs
@@ -48,12 +48,12 @@ class Ambient:
         A calibrated scale has only the uncertainty of the calibration. Otherwise the uncertainty of the speed of sound
         comes from temperature, pressure, humidity and its formula. If the record used another speed of sound than that
         of the scene's air, the difference is not corrected; it is the half-width of a rectangular distribution. If the
-        scene states no air temperature, that of a room is used, 20 +- 3 degC. If neither the scene describes a bench
-        nor the record states a speed of sound, the distances need not come from echoes, and their scale is exact.
+        scene states no air temperature, that of a room is used, 20 +- 3 degC. If neither the record is that of a
+        rangefinder nor the scene has a sensor, the distances need not come from echoes, and their scale is exact.
         """
         if instrument.u_scale > 0:
             return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")
-        if not self._sonic and instrument.speed_of_sound_m_per_s is None:
+        if not self._sensor and not instrument.sonic:
             return 1.0
         sound = function_of(speed_of_sound, self._temperature, self._pressure, self._humidity)
         actual = estimate_of(sound, "m/s").value

@@ -19,7 +19,8 @@ from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.checks.misfit import Misfit
 from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
-from pipeline.damping.laws import Law, free_power
+from pipeline.damping.laws import Drag, Law, free_power
+from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.select import Damping
 from pipeline.motion.averaged import Fitted, Phase
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
@@ -32,6 +33,9 @@ from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
+# Weight of the nearest law, if no law fits, from which its coefficients are quoted: the others together are within the
+# usual 5 % of a test.
+FAR_AHEAD = 0.95
 U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
 
 
@@ -41,12 +45,12 @@ class Derived:
 
     # Estimates with all known contributions to the uncertainty, including clock and scale.
     estimates: Mapping[str, Estimate]
-    # Coefficients of the law ``laws[0]``, with all known contributions; coefficients that are not determined are upper
-    # limits. The law is a stated one if there is one. Otherwise it is linear and quadratic drag together if the record
-    # allows it, or the selected law.
+    # Coefficients of one law, with all known contributions; coefficients that are not determined are upper limits. The
+    # law is the stated one if there is one, or the only admissible one. Otherwise it is linear and quadratic drag
+    # together if the record allows it, or the selected law.
     coefficients: Mapping[str, Estimate]
     budgets: Mapping[str, Budget]  # contributions of the inputs to every estimate and coefficient
-    # The laws over which amplitude and damping rate are averaged; the coefficients are those of the first law.
+    # The laws over which amplitude and damping rate are averaged.
     laws: tuple[Weighted, ...]
     # Variables with units, from which the properties below are read; those that the scene does not determine are
     # missing.
@@ -54,6 +58,10 @@ class Derived:
     # Name of the law by which the results are stated; empty if they are an average over laws. They count as an average
     # also if the record selects one drag and the results use both, of which it is a special case.
     law: str
+    law_of_coefficients: str  # name of the law of ``coefficients``
+    # Whether the coefficients may be quoted: their law is stated, the only one that the record admits, or if it admits
+    # none, far nearer than the others.
+    quoted: bool
 
     @cached_property
     def of_law(self) -> frozenset[str]:
@@ -72,7 +80,7 @@ class Derived:
         """
         from uncertainties import correlated_values
 
-        coefficients = self.coefficients if self.laws[0].fit.name == fit.name else {}
+        coefficients = self.coefficients if self.law_of_coefficients == fit.name else {}
         if self.law == fit.name:
             return {"A0": self.estimates["amplitude"], **coefficients}
         joint = scaled(fit).joint
@@ -133,6 +141,11 @@ class Derived:
         displacement.
         """
         return self._part("drag_length")
+
+    @property
+    def amplitude_scale(self) -> float:
+        """Factor from amplitudes of the record to those of the motion, before the filter of a sensor."""
+        return estimate_of(self._scales[1], "").value
 
     def _part(self, name: str) -> Estimate | None:
         return estimate_of(*self.parts[name]) if name in self.parts else None
@@ -205,11 +218,13 @@ def derive(
     law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == fitted.damping.selected else ""
     return Derived(
         estimates={name: budgets[name].estimate for name in found},
-        coefficients={name: limited(laws.stated.law, name, budgets[name].estimate) for name in coefficients},
+        coefficients={name: limited(laws.shown.law, name, budgets[name].estimate) for name in coefficients},
         budgets=budgets,
         laws=laws.weighted,
         parts=parts,
         law=law,
+        law_of_coefficients=laws.shown.name,
+        quoted=laws.quoted,
     )
 
 
@@ -333,7 +348,7 @@ def _terms(
     zero = inputs.add("sensor_zero", Estimate(0.0, instrument.u_offset_m, unit), "B")
     offset = inputs.add("rest_position", rest.mean, "A", free) * scale
     noise = inputs.add("noise", _noise(demodulated, unit), "A", demodulated.residual.size - 3.0 * windows)
-    coefficients = _coefficients(laws, rates, lengths)
+    coefficients = _coefficients(laws, rates, lengths, lam, start)
     diameter: Any = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
@@ -464,6 +479,9 @@ class _Laws:
             found = [(Weighted(best, 1.0), *_of_law(best, elapsed))]
         self.weighted = tuple(one for one, *_ in found)
         self.stated = self.weighted[0].fit
+        ahead = not damping.admissible and self.weighted[0].weight >= FAR_AHEAD
+        self.quoted = damping.by_statement or damping.settled or ahead
+        self.shown = best if self.quoted else self.stated
         self.squared_rate = mean_squared_rate(best, best.amplitude(elapsed))
         each = np.array([values for _, values, _ in found])
         weights = np.array([one.weight for one in self.weighted])
@@ -514,9 +532,16 @@ def _start_phase(phase: Phase, slope: Any, inputs: Inputs, dof: float) -> Any:
     return inputs.add("phase", Estimate(at_start.value, own, at_start.unit), "A", dof) + way * (slope - omega.value)
 
 
-def _coefficients(laws: _Laws, rate: Any, scale: Any) -> dict[str, tuple[Any, str]]:
-    """Return the coefficients of the law of the results, in true seconds and metres."""
+def _coefficients(laws: _Laws, rate: Any, scale: Any, lam: Any, start: Any) -> dict[str, tuple[Any, str]]:
+    """Return the coefficients of the law of the results, in true seconds and metres.
+
+    If the record shows one drag only, c A^n, and the results allow for a little of another one, c follows from them:
+    :math:`\\lambda A_0 = c A_0^n`.
+    """
     found = _in_true_units(laws.stated.law, laws.stated.joint, laws.variables, rate, scale)
+    shown = laws.shown.law
+    if shown is not laws.stated.law and isinstance(shown, Drag):
+        return {COEFFICIENTS[n]: (lam / start ** (n - 1), found[COEFFICIENTS[n]][1]) for n in shown.powers}
     return {name: found[name] for name in laws.stated.joint.names[1:]}
 
 

@@ -235,10 +235,10 @@ def _speed_of_sound(scene: Scene, instrument: Instrument) -> Effect:
     record, shift = instrument.speed_of_sound_m_per_s or SPEED_OF_SOUND_OF_RECORD, None
     if instrument.u_scale > 0:
         why = "the distances were calibrated, so the calibration's uncertainty stands in its place"
+    elif not instrument.sonic and not scene.tells_of_sensor:
+        why = "no rangefinder is known, so its 0.18 %/K stand in no uncertainty; [sensor] in the scene adds them"
     elif scene.air_temperature_c is None:
-        bench = scene.tells_of_bench or instrument.speed_of_sound_m_per_s is not None
-        counts = "a room's 20 +- 3 degC count, 0.5 % in the scale" if bench else "its 0.18 %/K stand in no uncertainty"
-        why = f"the scene gives no air temperature, so {counts}"
+        why = "the scene gives no air temperature, so a room's 20 +- 3 degC count, 0.5 % in the scale"
     else:
         shift = speed_of_sound(*(each.value for each in scene_air(scene))) / record - 1.0
         why = (

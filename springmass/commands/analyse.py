@@ -222,6 +222,7 @@ def _save_scene(run: Run) -> None:
 def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.budgets import budget_text
+    from springmass.report.trust import trust_text
     from springmass.report.words import damping_sentence, typeset
     from springmass.terminal.printing import classic_text, findings_text, fitted, wrapped
     from springmass.terminal.style import style_of
@@ -231,10 +232,11 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     print(text_table([run.name], [run.analysis], style))
     if run.classic is not None:
         print(f"{classic_text(run.classic)}\n")
-    elif options.full and (budget := budget_text(run.analysis)):
+    if options.full and (budget := budget_text(run.analysis)):
         print(f"{fitted(budget, style.width) if style.terminal else budget}\n")
-    if sentence := damping_sentence(run.analysis):
-        print(f"{wrapped(sentence, '', 80)}\n")
+    for text in (trust_text(run.analysis, page=style.unicode), damping_sentence(run.analysis)):
+        if text:
+            print(f"{wrapped(text, '', 80)}\n")
     print(findings_text(run.result["findings"], typeset if style.unicode else str, full=options.full))
 
 

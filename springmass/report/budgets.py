@@ -51,10 +51,11 @@ def budgets_of(analysis: Analysis) -> tuple[BudgetRow, ...]:
 def budget_text(analysis: Analysis) -> str:
     """Return a brief budget in ASCII: one line per quantity with its two largest contributions.
 
-    Quantities with only one input of at least 1 % are omitted, because their line would give no information.
+    Quantities with only one input of at least 1 % are omitted, because their line would give no information, but for
+    the spring constant, whose u may come from a mass that was not stated.
     """
     shown = {row: [c for c in row.contributions if c.share >= 0.01] for row in budgets_of(analysis)}
-    rows = [row for row, inputs in shown.items() if len(inputs) > 1]
+    rows = [row for row, inputs in shown.items() if len(inputs) > 1 or row.name == "spring_constant"]
     if not rows:
         return ""
     left = max(len(row.quantity) for row in rows) + 2

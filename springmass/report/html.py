@@ -21,7 +21,8 @@ from springmass.report.budgets import budgets_of
 from springmass.report.laws import laws_across, laws_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.summary import summary
-from springmass.report.tables import page_unit, prefixed, pretty, pretty_number, table_rows
+from springmass.report.tables import cells, page_unit, prefixed, pretty, pretty_number, table_rows
+from springmass.report.trust import trust_of
 from springmass.report.words import method, typeset
 from springmass.runs.comparing import Compared
 from springmass.runs.json_results import picked
@@ -127,6 +128,7 @@ def template(name: str) -> Template:
     )
     environment.filters |= {
         "pretty": pretty,
+        "cells": cells,
         "number": pretty_number,
         "symbol": _symbol,
         "input": lambda name: INPUTS[name].label,
@@ -146,7 +148,8 @@ def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
             replace(row, estimates=tuple(None if x is None else prefixed(x) for x in row.estimates))
             for row in table_rows([run.analysis for run in some], missing=True)
         ]
-        yield {"names": [run.name for run in some], "rows": rows}
+        trust = trust_of(some[0].analysis) if len(runs) == 1 else {}
+        yield {"names": [run.name for run in some], "rows": rows, "trust": trust}
 
 
 def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, stem: str) -> dict[str, Any]:

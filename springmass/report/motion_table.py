@@ -1,4 +1,4 @@
-"""The motion as a table: position, velocity and acceleration at every sample, with uncertainties."""
+"""Motion and amplitude against time as tables with uncertainties: at every sample, and for every window."""
 
 from __future__ import annotations
 
@@ -86,3 +86,21 @@ def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
     blocks = (table[at : at + 1000] for at in range(0, len(table), 1000))
     text = "".join((line * len(block)) % tuple(block.ravel().tolist()) for block in blocks)
     return ",".join(columns_of(analysis.track.unit)) + "\n" + text.replace("nan", "")
+
+
+def amplitude_csv(analysis: Analysis) -> str:
+    """Return CSV with one line per window: time, amplitude and total phase with their u; empty if nothing oscillates.
+
+    u of an amplitude is its scatter about a smooth curve; the scale of the distances, which all share, is not in it.
+    ``used`` is 0 for amplitudes far from their neighbours, to which no law was fitted.
+    """
+    motion = analysis.motion
+    if not isinstance(motion, Oscillation):
+        return ""
+    windows, scatter, scale = motion.demodulated, motion.damping.scatter, motion.derived.amplitude_scale
+    u_phase = np.sqrt(windows.covariance[:, 1, 1] * max(motion.phase.reduced_chi2, 1.0))
+    table = (windows.t, scale * windows.amplitude, scale * scatter.u, windows.phase, u_phase, scatter.kept)
+    word = f"amplitude{_spelt(analysis.track.unit)}"
+    rows = zip(*table, strict=True)
+    lines = [f"{t:.10g},{a:.10g},{u_a:.3g},{phi:.10g},{u_phi:.3g},{used:d}" for t, a, u_a, phi, u_phi, used in rows]
+    return "\n".join([f"time_s,{word},u_{word},phase_rad,u_phase_rad,used", *lines, ""])

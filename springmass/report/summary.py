@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from pipeline.analyse import Analysis, Oscillation, Still
-from pipeline.findings.finding import Finding
 from pipeline.numerics.quantity import noun
 from pipeline.registry.quantities import INPUTS
-from springmass.report.advice import Harm, harm_of, sentence
+from springmass.report.advice import harm_of, sentence
 from springmass.report.budgets import BudgetRow, budgets_of
 from springmass.report.tables import is_about, prefixed
-from springmass.report.words import damping_sentence, kept, listed, typeset
-
-_TRUST = {
-    Harm.UNUSABLE: "Do not use the results that this spoils: “{message}”",
-    Harm.SCALE: "{names} depend on an assumption, which you must check: “{message}”",
-    Harm.PART: "{names} can be trusted for the part that was analysed: “{message}”",
-    Harm.UNCERTAINTY: "{names} can be trusted within ±u, which includes this: “{message}”",
-    Harm.IMPROVABLE: "{names} can be trusted within ±u",
-    Harm.NOTE: "{names} can be trusted within ±u",
-}
+from springmass.report.trust import trust_text
+from springmass.report.words import damping_sentence, kept, typeset
 
 
 def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
@@ -38,7 +27,7 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
         to_do = f"Nothing needs attention. {_improvement(row)}".rstrip()
     if "spring_constant" not in analysis.estimates and analysis.scene.bob_mass_kg is None and _is_length(analysis):
         to_do += " For the spring constant, state the mass: --mass-kg KG."
-    return (("Values", _values(analysis, motion)), ("How sure", _trust(analysis, ordered, row)), ("What to do", to_do))
+    return (("Values", _values(analysis, motion)), ("How sure", _trust(analysis, row)), ("What to do", to_do))
 
 
 def _is_length(analysis: Analysis) -> bool:
@@ -59,13 +48,9 @@ def _values(analysis: Analysis, motion: Oscillation) -> str:
     return f"{sentence('; '.join(parts))} {damping_sentence(analysis)}"
 
 
-def _trust(analysis: Analysis, warnings: Sequence[Finding], row: BudgetRow | None) -> str:
-    harm = min((harm_of(f.code, f.severity) for f in warnings), default=Harm.NOTE)
-    names = ["T", *(["k"] if "spring_constant" in analysis.estimates else []), "A₀"]
-    message = typeset(warnings[0].message).rstrip(".") if warnings else ""
-    text = _TRUST[harm].format(names=listed(names), message=message)
+def _trust(analysis: Analysis, row: BudgetRow | None) -> str:
     noise = "more than noise" if is_about(analysis, "residuals") else "only noise"
-    text += f"; the fit leaves {noise} in the residuals"
+    text = f"{trust_text(analysis, page=True)} The fit leaves {noise} in the residuals"
     if row is not None:
         greatest, symbol = row.contributions[0], "k" if row.name == "spring_constant" else "T"
         text += f"; {100.0 * greatest.share:.0f}\u00a0% of u({symbol})² comes from the {INPUTS[greatest.name].label}"

@@ -83,16 +83,16 @@ def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     if not isinstance(motion, Oscillation):
         return {TableKey(name): analysis.estimates[name] for name in _IN_TABLE if name in analysis.estimates}
     derived = motion.derived
-    law, certain = derived.laws[0].fit.law, bool(derived.law)
+    law, certain = derived.law_of_coefficients, bool(motion.damping.admissible) or motion.damping.by_statement
     # A coefficient of a user-defined law is not one of these quantities, even if it has the same name.
-    coefficients = derived.coefficients if law.name in LAWS else {}
+    coefficients = derived.coefficients if derived.quoted and law in LAWS else {}
     found = {}
     for name in _IN_TABLE:
         if name in derived.estimates:
-            key = TableKey(name, derived.law, certain) if QUANTITIES[name].by_law else TableKey(name)
+            key = TableKey(name, derived.law, bool(derived.law)) if QUANTITIES[name].by_law else TableKey(name)
             found[key] = derived.estimates[name]
         elif name in coefficients:
-            found[TableKey(name, law.name, certain, law.name)] = coefficients[name]
+            found[TableKey(name, law, certain, law)] = coefficients[name]
     return found
 
 
@@ -203,6 +203,23 @@ def pretty(estimate: Estimate | None) -> str:
         return f"< {_typeset(format_limit(estimate.limit))} {page_unit(estimate.unit)}".rstrip() + " (95 %)"
     number = format_value(estimate.value, estimate.u)
     return f"{_typeset(number)} {page_unit(estimate.unit)}".rstrip()
+
+
+def cells(estimate: Estimate | None) -> str:
+    """Return an estimate as value, u and unit for three cells of a spreadsheet, with the digits of u, divided by |.
+
+    Examples
+    --------
+    >>> cells(Estimate(0.7525961, 4.96e-5, "s")), cells(Estimate(101325.0, 1490.0, "Pa"))
+    ('0.752596|0.000050|s', '1.013e+05|0.015e+05|Pa')
+    """
+    if estimate is None:
+        return "||"
+    if isinstance(estimate, UpperLimit):
+        return f"< {format_limit(estimate.limit)}||{page_unit(estimate.unit)}"
+    value, _, u = format_value(estimate.value, estimate.u).partition(" +- ")
+    u, _, power = u.partition(")")
+    return f"{value.lstrip('(')}{power}|{u}{power}|{page_unit(estimate.unit)}"
 
 
 def pretty_number(value: float | None, digits: int = 2) -> str:

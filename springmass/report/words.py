@@ -103,7 +103,7 @@ def damping_sentence(analysis: Analysis) -> str:
     """Return one sentence on the damping law that fits and the status of the others; empty if nothing oscillates."""
     if not isinstance(analysis.motion, Oscillation):
         return ""
-    damping = analysis.motion.damping
+    damping, quoted = analysis.motion.damping, analysis.motion.derived.quoted
     chosen = words_of(damping.best.law)
     span = f"{float(analysis.track.t[-1] - analysis.track.t[0]):.0f} s"
     if damping.best.rejected and damping.by_statement:
@@ -112,9 +112,14 @@ def damping_sentence(analysis: Analysis) -> str:
             "instead of its coefficients."
         )
     if damping.best.rejected:
+        if quoted:
+            return (
+                f"No damping law fits to within the scatter; {chosen} is by far the nearest, and u of its coefficients "
+                "was increased."
+            )
         return (
-            f"No damping law describes how the amplitude falls; {chosen} is nearest, but quote the amplitude against "
-            "time instead of its coefficients."
+            f"No damping law fits to within the scatter; {chosen} is nearest, but others are nearly as good: quote the "
+            "damping rate or the amplitude against time, not their coefficients."
         )
     possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
     if len(damping.best.law.parameters) == 1:
@@ -130,8 +135,9 @@ def damping_sentence(analysis: Analysis) -> str:
     if possible:
         more = len(possible) - NAMED_LAWS
         if more > 1:
-            return f"{text}; {', '.join(possible[:NAMED_LAWS])} and {more} more laws cannot be ruled out in {span}."
-        return f"{text}; {listed(possible)} cannot be ruled out in {span}."
+            possible = [*possible[:NAMED_LAWS], f"{more} more laws"]
+        ruled_out = f"{listed(possible)} cannot be ruled out in {span}"
+        return f"{text}; {ruled_out}. The damping rate may be quoted: it allows for all of them."
     others, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
     if not others:
         return f"{text}; no other law was tried."

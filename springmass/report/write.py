@@ -16,7 +16,7 @@ from springmass.errors import detail
 from springmass.report.budgets import budget_csv
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, lab_report_tex, table_tex
-from springmass.report.motion_table import motion_csv, smoothed_or_why
+from springmass.report.motion_table import amplitude_csv, motion_csv, smoothed_or_why
 from springmass.report.recorded import notes_of
 from springmass.report.summary import summary as sentences
 from springmass.report.tables import results_csv
@@ -68,7 +68,13 @@ def _names(stems: Sequence[str]) -> set[str]:
     """Return the names of all files that a report of these runs may contain, or one of 0.2.0."""
     charts = [f"{stem}{name}" for stem in stems for name in (*CHARTS, "classic", "logarithmic")]
     figures = {f"figures/{name}.{kind}" for name in (*charts, "comparison", "overlay") for kind in get_args(Kind)}
-    return {PAGE, LAB_REPORT, *TABLES, *figures, *(f"{stem}motion.csv" for stem in stems)}
+    return {
+        PAGE,
+        LAB_REPORT,
+        *TABLES,
+        *figures,
+        *(f"{stem}{name}.csv" for stem in stems for name in ("motion", "amplitude")),
+    }
 
 
 def _write(
@@ -100,6 +106,8 @@ def _write(
     for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
         if not isinstance(smoothed, str):
             write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))
+        if amplitudes := amplitude_csv(analysis):
+            write_whole(folder / f"{stem}amplitude.csv", amplitudes)
     results = [run.result for run in runs]
     content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
     text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"

@@ -41,9 +41,9 @@ class About:
         together = tuple(sorted({*self.marks, *marks}))
         return replace(self, scene=scene or self.scene, notes=(*self.notes, *notes), marks=together)
 
-    def described(self) -> str:
-        """Return a summary of the notes in words; empty if there are none."""
-        parts = ["its scene"] if self.scene is not None else []
+    def described(self, *, scene: bool = True) -> str:
+        """Return a summary of the notes in words, with or without their scene; empty if there are none."""
+        parts = ["its scene"] if scene and self.scene is not None else []
         parts += [f"{len(self.notes)} notes"] if self.notes else []
         parts += [f"{len(self.marks)} marks"] if self.marks else []
         return ", ".join(parts)

@@ -187,7 +187,7 @@ def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
 
 
 def _coefficients(derived: Derived) -> dict[str, Any]:
-    law = derived.laws[0].fit.name
+    law = derived.law_of_coefficients
     return {name: {**x, "law": law} for name, x in parameters_json(derived.coefficients).items()}
 
 

@@ -79,10 +79,11 @@ class Loaded:
             yield self.samples[start : start + size]
 
 
-def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
+def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = False) -> Loaded:
     """Read a recording, a run file or a wire log, or standard input.
 
-    All digests of a run file are checked before any sample is used. Raises NeedsAnswer if the file leaves something
+    All digests of a run file are checked before any sample is used. With ``scene_given`` the caller uses another scene,
+    and none is said to be read from the notes. Raises NeedsAnswer if the file leaves something
     open that the options do not give, FormatError or StorageError if it cannot be read, and ProgramError if no sample
     lies within the chosen time interval, or an option is given that the file states itself.
     """
@@ -102,8 +103,10 @@ def load(path: str | Path, options: ReadOptions = READ) -> Loaded:
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             complain(f"{where}: {trap.message}")
-    if described := (about := about_of(where)).described():
+    about = about_of(where)
+    if described := about.described(scene=not scene_given):
         tell(f"{about.path}: {described} read from the notes next to the file")
+    if about.described():
         scene = loaded.scene if about.scene is None else about.scene.to_mapping()
         marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
         noted = {"marks": marks} if marks else {}

@@ -82,7 +82,7 @@ class Run(Mapping[str, Value]):
     def of(cls, source: Any, scene: Any = None, how: How = HOW, name: str = "") -> Run:
         """Return the run of a path, arrays, or another run; ``scene`` is one, its tables, or the path of its file."""
         if isinstance(source, str | os.PathLike):
-            loaded = load(Path(source), how)
+            loaded = load(Path(source), how, scene_given=scene is not None)
         elif isinstance(source, Run):
             loaded = within(again(source.loaded, how), how)
             scene, name = source.stated if scene is None else scene, name or source.name

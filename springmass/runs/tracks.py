@@ -92,7 +92,7 @@ def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
     if not sensor:
         return {}
     calibration = Calibration.from_mapping(sensor.get("calibration", {}))
-    known = {"u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
+    known = {"sonic": True, "u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
     # Families that send distances instead of echo times have applied an unknown speed of sound.
     if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
         known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s

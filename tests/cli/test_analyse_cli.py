@@ -5,12 +5,14 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import springmass
@@ -34,6 +36,41 @@ def test_json_is_strict_and_has_the_number_that_was_put_in(cli: Cli, data: Path)
     constant = result["estimates"]["spring_constant"]
     assert abs(constant["value"] - 14.0) < 3 * constant["u"]
     assert result["input"]["kind"] == "simulated"
+
+
+def test_a_stated_mass_changes_no_distance(cli: Cli, tmp_path: Path) -> None:
+    """A plain table keeps its u of the rest position; a sensor in its scene adds the temperature."""
+    t = np.arange(1500) / 100
+    y = 0.25 + 0.05 * np.exp(-0.01 * t) * np.cos(8.0 * t) + 1e-4 * np.random.default_rng(3).standard_normal(t.size)
+    table = tmp_path / "table.csv"
+    table.write_text("time (s),distance (m)\n" + "".join(f"{a:.2f},{b:.6f}\n" for a, b in zip(t, y, strict=True)))
+    scene = tmp_path / "sensor.toml"
+    scene.write_text('[sensor]\nposition = "below"\n')
+
+    def u(*options: str | Path) -> float:
+        (result,) = cli("analyse", "--json", table, *options).results
+        return float(result["estimates"]["offset"]["u"])
+
+    assert u("--mass-kg", "0.2") == u() < 1e-5
+    assert u("--scene", scene, "--mass-kg", "0.2") == pytest.approx(u("--scene", scene))
+    assert u("--scene", scene) == pytest.approx(0.25 * 0.0055, rel=0.02)
+
+
+def test_a_missing_mass_of_the_spring_comes_first(cli: Cli, recording: Path, tmp_path: Path) -> None:
+    """It is the first warning, and with --full the budget of k names it, by the classic method too."""
+    for options in ((), ("--method", "classic")):
+        out = cli("analyse", recording, "--mass-kg", "0.2", "--full", "-o", tmp_path, *options).out
+        assert re.search(r"(warning|ERROR) +(\w+):", out)[2] == "spring_mass_missing"  # type: ignore[index]
+        assert re.search(r"spring constant +mass of the spring, which was not stated", out)
+
+
+def test_a_given_scene_replaces_that_of_the_notes(cli: Cli, recording: Path, tmp_path: Path) -> None:
+    """No line says that a scene was read from the notes if another one is used."""
+    scene = tmp_path / "bench.toml"
+    scene.write_text("[bob]\nmass_kg = 0.3\n")
+    assert cli("scene", recording, "--scene", scene).code == 0
+    assert "its scene" in cli("analyse", recording, "--no-report").err
+    assert "its scene" not in cli("analyse", recording, "--no-report", "--scene", scene).err
 
 
 def test_a_bad_input_does_not_keep_the_others_from_theirs(cli: Cli, recording: Path, tmp_path: Path) -> None:

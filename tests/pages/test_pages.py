@@ -144,7 +144,7 @@ def test_table_1_is_copied(page: Page, show: Show, page_of: PageOf) -> None:
     """As cells for a spreadsheet."""
     show(page_of("analyse"), "laptop")
     page.evaluate("window.setTimeout = () => 0")  # the answer stays on the button
-    page.get_by_role("button", name="Copy table").click()
+    page.get_by_role("button", name="Copy as cells").click()
     page.get_by_role("button", name="Copied").wait_for()
 
 

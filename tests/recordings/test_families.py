@@ -215,7 +215,7 @@ TABLE = [
         "MPa",
         "Pressão ABS.",
         clock="device",
-        traps=frozenset({"stale_header", "unit_assumed", "rate_assumed", "missing_samples"}),
+        traps=frozenset({"stale_header", "unit_assumed", "jittered_time", "missing_samples"}),
     ),
     Row(
         TDMS,

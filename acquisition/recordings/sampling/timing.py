@@ -215,9 +215,12 @@ def clock_traps(timing: Timing) -> Iterator[Trap]:
         message = f"the times are measured: their steps vary from {steps}"
         yield Trap("jittered_time", message)
     elif not timing.certain:
-        why = "the times fit no regular grid and are used as printed"
-        why = why if timing.grid is None else "there are too few rows to be certain"
-        yield Trap("rate_assumed", f"the rate of {timing.rate_hz:g} Hz is the most likely one: {why}")
+        if timing.grid is None:
+            message = f"the times fit no regular grid and are used as printed ({timing.rate_hz:.6g} Hz on average)"
+            yield Trap("jittered_time", message)
+        else:
+            message = f"the rate of {timing.rate_hz:g} Hz is the most likely one: there are too few rows to be certain"
+            yield Trap("rate_assumed", message)
 
 
 def find_bursts(t: F8) -> Bursts | None:

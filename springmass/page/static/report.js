@@ -51,10 +51,10 @@ function begin() {
   }
   for (const place of document.querySelectorAll(".copy")) {
     const table = place.closest("section").querySelectorAll("table");
-    const cells = () => [...table].flatMap((each) => [...each.rows].map((row) => [...row.cells].map((cell) => cell.textContent.trim()).join("\t"))).join("\n");
-    place.append(makeButton("Copy table", async (button) => {
+    const cells = () => [...table].flatMap((each) => [...each.rows].map((row) => [...row.cells].map((cell) => cell.dataset.cells?.replaceAll("|", "\t") ?? cell.textContent.trim()).join("\t"))).join("\n");
+    place.append(makeButton("Copy as cells", async (button) => {
       button.textContent = (await copyText(cells())) ? "Copied" : "Not allowed by the browser";
-      setTimeout(() => { button.textContent = "Copy table"; }, 1500);
+      setTimeout(() => { button.textContent = "Copy as cells"; }, 1500);
     }));
   }
   // A link into a folded part opens it; for printing, everything is opened and closed again afterwards.

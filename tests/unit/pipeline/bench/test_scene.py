@@ -44,7 +44,7 @@ def test_every_key_of_the_reference_scene_is_read() -> None:
         beta_per_m_s=Estimate(0.235, 0.0, "1/(m s)"),
         mu_m_per_s=Estimate(0.0, 0.0, "m/s"),
     )
-    assert scene.tells_of_bench
+    assert scene.tells_of_sensor
 
 
 def test_nothing_known_is_empty() -> None:
@@ -53,12 +53,6 @@ def test_nothing_known_is_empty() -> None:
         scene = Scene.from_mapping(tables)
         assert scene == Scene()
         assert scene.to_mapping() == {}
-
-
-def test_a_sensor_alone_is_no_bench() -> None:
-    """A scene that only says where the sensor is tells of no bench; one with a bob, or with air, does."""
-    assert not Scene.from_mapping({"sensor": {"position": "above"}}).tells_of_bench
-    assert Scene.from_mapping({"air": {"relative_humidity": 0.4}}).tells_of_bench
 
 
 REFUSED: list[tuple[str, str, Any]] = [

@@ -32,6 +32,7 @@ SCENE: dict[str, Any] = {
         "pressure_pa": {"value": PASCAL[0], "u": PASCAL[1]},
         "relative_humidity": {"value": HUMIDITY[0], "u": HUMIDITY[1]},
     },
+    "sensor": {"position": "below"},
 }
 
 

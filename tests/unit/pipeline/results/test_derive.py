@@ -25,6 +25,7 @@ BENCH: dict[str, Any] = {
     "spring": {"mass_kg": {"value": 0.0100, "u": 0.0005}},
     "disc": {"diameter_m": {"value": 0.102, "u": 0.0005}},
     "air": {"temperature_c": {"value": 20.0, "u": 0.3}, "pressure_pa": 101325.0, "relative_humidity": 0.0},
+    "sensor": {"position": "below"},
 }
 
 

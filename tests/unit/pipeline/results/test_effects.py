@@ -23,6 +23,7 @@ BENCH: dict[str, Any] = {
     "spring": {"mass_kg": 0.0100},
     "disc": {"diameter_m": 0.102},
     "air": {"temperature_c": 20.0, "pressure_pa": 101325.0, "relative_humidity": 0.0},
+    "sensor": {"position": "below"},
 }
 
 

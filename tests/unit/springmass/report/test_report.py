@@ -22,7 +22,16 @@ from springmass.charts.run import charts_of
 from springmass.cli import main
 
 DATA = springmass.sample_data()
-TABLES = {"report.html", "results.json", "results.csv", "table.tex", "budget.csv", "budget.tex", "motion.csv"}
+TABLES = {
+    "report.html",
+    "results.json",
+    "results.csv",
+    "table.tex",
+    "budget.csv",
+    "budget.tex",
+    "motion.csv",
+    "amplitude.csv",
+}
 
 
 def reported(recording: Path, out: Path, *options: str) -> Path:
@@ -70,7 +79,7 @@ def result(folder: Path) -> dict[str, Any]:
 
 
 def test_every_file_of_a_report_is_written(folder: Path) -> None:
-    """A report is a page and six tables; figures are written only on request."""
+    """A report is a page and seven tables; figures are written only on request."""
     assert files_in(folder) == TABLES
 
 
@@ -150,6 +159,36 @@ def test_the_motion_is_written_at_every_sample(folder: Path, result: dict[str, A
     np.testing.assert_allclose(y, samples.distance, atol=1e-9)
     assert used.sum() == result["quality"]["used"]
     assert np.abs(np.gradient(position, t) - velocity)[1:-1].max() < 2e-3 * np.abs(velocity).max()
+
+
+def test_amplitudes_and_phases_of_windows_are_written(folder: Path) -> None:
+    """amplitude.csv follows the true amplitude within its u, and its phase turns once in a true period."""
+    truth = json.loads((DATA / "damped_simulated.truth.json").read_text("utf-8"))["truth"]
+    rows = [row for row in rows_of(folder / "amplitude.csv") if row["used"] == "1"]
+    t, amplitude, u, phase = (
+        np.array([float(row[name]) for row in rows]) for name in ("time_s", "amplitude_m", "u_amplitude_m", "phase_rad")
+    )
+    gamma, beta, start = (truth[name]["value"] for name in ("gamma", "beta", "amplitude"))
+    decay = np.exp(-gamma * t)
+    true = start * decay / (1.0 + beta * start * (1.0 - decay) / gamma)
+    assert len(rows) > 100
+    assert np.mean(np.abs(amplitude - true) < 2.0 * u) > 0.9
+    turns = (phase[-1] - phase[0]) / (2.0 * np.pi)
+    assert (t[-1] - t[0]) / turns == pytest.approx(truth["period"]["value"], rel=1e-4)
+
+
+def test_table_1_is_ready_for_a_spreadsheet_and_says_what_may_be_quoted(page: str, result: dict[str, Any]) -> None:
+    """Each value has cells of its own for value and u, with the digits of u, and a judgement."""
+    cells = [each.split("|") for each in re.findall(r'<td class="num"[^>]* data-cells="([^"]*)"', page)]
+    period = result["estimates"]["period"]
+    (value, u) = next((value, u) for value, u, unit in cells if unit == "s" and float(value) > 0.7)
+    assert abs(float(value) - period["value"]) < 0.5e-6
+    assert float(u) == pytest.approx(period["u"], rel=0.05)
+    assert value.split(".")[1].isdigit()
+    assert len(value.split(".")[1]) == len(u.split(".")[1])
+    judged = re.findall(r'<td class="trust ([a-z-]+)">', page)
+    assert len(judged) == len(cells)
+    assert set(judged) <= {"sound", "uncertain", "do-not-quote"}
 
 
 def test_latex_is_balanced(folder: Path) -> None:
