@@ -18,7 +18,6 @@ from springmass.options import (
     AnalyseOptions,
     BatchOptions,
     BenchOptions,
-    CatalogOptions,
     CompareOptions,
     ConvertOptions,
     DemoOptions,
@@ -26,7 +25,6 @@ from springmass.options import (
     FirmwareOptions,
     FormatsOptions,
     JsonOption,
-    MapOptions,
     PageOptions,
     PortsOptions,
     RecordOptions,
@@ -61,7 +59,6 @@ def _argument(name: str, words: str, *, required: bool | None = None) -> Paramet
 
 
 Recording = Annotated[File, _argument("INPUT", "recording, run file or wire log")]
-Courses = Annotated[File, _argument("DIR", "folders that batch created", required=True)]
 
 
 def _columns(console: Console, options: ConsoleOptions, panel: HelpPanel) -> None:
@@ -220,34 +217,6 @@ def batch(
     from springmass.commands.batch import run
 
     return run(inputs, options, read)
-
-
-@app.command
-def report(
-    folder: Annotated[File, _argument("DIR", "folder that batch created")],
-    name: Annotated[str, _argument("RUN", "name of a run in its table, or path of its recording")],
-    /,
-) -> int:
-    """Write the full report of one run of a course."""
-    from springmass.commands.report import run
-
-    return run(folder, name)
-
-
-@app.command
-def catalog(*folders: Courses, options: CatalogOptions = CatalogOptions()) -> int:
-    """Search, filter and list the runs of courses."""
-    from springmass.commands.catalog import run
-
-    return run(folders, options)
-
-
-@app.command(name="map")
-def drag_map(*folders: Courses, options: MapOptions = MapOptions()) -> int:
-    """Draw the drag coefficients of a course against Reynolds and Keulegan-Carpenter number."""
-    from springmass.commands.map import run
-
-    return run(folders, options)
 
 
 @app.command

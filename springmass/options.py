@@ -34,7 +34,6 @@ __all__ = [
     "AnalyseOptions",
     "BatchOptions",
     "BenchOptions",
-    "CatalogOptions",
     "CompareOptions",
     "ConvertOptions",
     "DemoOptions",
@@ -42,7 +41,6 @@ __all__ = [
     "FirmwareOptions",
     "FormatsOptions",
     "JsonOption",
-    "MapOptions",
     "PageOptions",
     "PortsOptions",
     "RecordOptions",
@@ -225,10 +223,6 @@ class AnalyseOptions:
 class CompareOptions:
     """The options of ``springmass compare``."""
 
-    where: Annotated[str, _option("EXPR", "for courses: compare only runs for which this expression is true")] = ""
-    bench: Annotated[
-        str | None, _option("NAME", "for courses: column that names the bench (default: bench, group or section)")
-    ] = None
     scene: Annotated[
         tuple[File, ...], _option("FILE", "scene file: one for all runs, or one per run in the same order")
     ] = ()
@@ -264,31 +258,9 @@ class BatchOptions:
     law: StatedLaw = None
     jobs: Annotated[Count | None, _option("N", "number of processes (default: one per core)")] = None
     dask: Annotated[str | None, _option("ADDRESS", "analyse on the workers of this dask scheduler")] = None
-    rehash: Annotated[bool, _flag("read every file again to check whether it has changed")] = False
     reports: Annotated[
         WholeNumber, _option("N", "write full reports of the N runs that most need a look (default: 20)")
     ] = 20
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class CatalogOptions:
-    """The options of ``springmass catalog``."""
-
-    where: Annotated[str, _option("EXPR", "list only runs that match: \"section = 'A' and period_u < 1e-4\"")] = ""
-    columns: Annotated[str | None, _option("A,B", "columns to list")] = None
-    sort: Annotated[str | None, _option("NAME", "sort by this column; --sort=-NAME: largest first")] = None
-    limit: Annotated[Count | None, _option("N", "list at most N runs")] = None
-    json: Annotated[bool, _flag("print one JSON object per run instead of CSV")] = False
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class MapOptions:
-    """The options of ``springmass map``."""
-
-    where: Annotated[str, _option("EXPR", "draw only runs that match this expression, as in catalog")] = ""
-    output: Annotated[File, _output("DIR", "folder for drag-map.svg, .pdf and .csv (default: here)")] = "."
 
 
 @Parameter(name="*")

@@ -8,18 +8,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from springmass.batch.course import template
+from springmass.batch.page import GROUPS, PAGE
 from springmass.batch.plan import plan
-from springmass.batch.rows import FAILED
+from springmass.batch.rows import CSV, FAILED
 from springmass.batch.running import run_course
-from springmass.batch.store import CSV, GROUPS, PAGE
+from springmass.batch.runs_csv import template
+from springmass.batch.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, manner, suggest, tell
 from springmass.options import BatchOptions
+from springmass.runs.analysing import make_folder
 from springmass.runs.options import ReadOptions
 from springmass.terminal.printing import visible_lines
 from springmass.terminal.progress import TaskProgress
-
-__all__ = ["run"]
 
 
 def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptions) -> int:
@@ -37,7 +37,20 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
     if options.dask is not None and options.jobs:
         raise ProgramError("--dask brings its workers, got --jobs too; leave out --jobs", USAGE)
     quiet = manner()[0]
-    with contextlib.ExitStack() as shown:
+    folder = make_folder(options.output)
+    with contextlib.ExitStack() as shown, opened(folder) as store:
+        course = plan(
+            inputs,
+            runs_csv=None if options.runs is None else str(options.runs),
+            scene=None if options.scene is None else str(options.scene),
+            accuracy=options.accuracy,
+            law=options.law,
+            answers=read.given(),
+            known=store.paths(),
+            output=str(folder),
+        )
+        for line in course.notes:
+            tell(line)
         runs = shown.enter_context(TaskProgress("runs", lines=True, quiet=quiet))
         reports: list[TaskProgress] = []
 
@@ -54,30 +67,20 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
             reports[0].update(done, total)
 
         outcome = run_course(
-            inputs,
-            str(options.output),
-            runs_csv=None if options.runs is None else str(options.runs),
-            scene=None if options.scene is None else str(options.scene),
-            accuracy=options.accuracy,
-            law=options.law,
-            answers=read.given(),
+            course,
+            store,
+            folder,
             jobs=options.jobs,
             dask=options.dask,
-            rehash=options.rehash,
             reports=options.reports,
-            note=tell,
             progress=analysed,
             reported=reported,
         )
-    folder = Path(options.output)
-    for name, kept in outcome.edited:
-        complain(f"{folder / name}: was edited; kept as {kept} and written again")
-    for line in (*outcome.damaged, *outcome.unwritten):
+    for line in outcome.unwritten:
         complain(line)
-    failed = len(outcome.failures)
-    tell(f"{outcome.runs} runs: {outcome.unchanged} unchanged, {outcome.analysed} analysed, {failed} failed")
-    tell(f"written: {folder / CSV}, {folder / PAGE}, {folder / GROUPS}")
+    tell(f"{outcome.runs} runs: {outcome.unchanged} unchanged, {outcome.analysed} analysed, {outcome.failed} failed")
     suggest(f"open {folder / PAGE} in a browser")
-    if failed and failed == outcome.runs:
+    tell(f"written: {folder / PAGE}, {folder / GROUPS}, {folder / CSV}; the data are in {folder / DATABASE}")
+    if outcome.failed and outcome.failed == outcome.runs:
         return UNREADABLE
-    return SOME_FAILED if failed or outcome.unwritten else OK
+    return SOME_FAILED if outcome.failed or outcome.unwritten else OK

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition.errors import visible
-from springmass.batch.store import is_course
+from springmass.batch.rows import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
 from springmass.options import CompareOptions
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, law_line, make_folder, now_utc, scene_of
@@ -28,8 +28,6 @@ def run(recordings: Sequence[str | Path], options: CompareOptions, read: ReadOpt
     inputs = [str(each) for each in recordings]
     if all(is_course(path) for path in inputs):
         return _run_courses(inputs, options)
-    if options.where or options.bench:
-        raise ProgramError("--where and --bench choose among the results of courses; name folders of batch", USAGE)
     if len(inputs) < 2:
         raise ProgramError(
             f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one", USAGE
@@ -77,19 +75,20 @@ def run(recordings: Sequence[str | Path], options: CompareOptions, read: ReadOpt
 
 def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     from springmass.batch.benches import compare_rows, compared_json, compared_text
-    from springmass.batch.search import search
     from springmass.terminal.printing import visible_lines
 
     if options.output is not None or options.scene:
         raise ProgramError("-o and --scene go with single runs; a course has its page and its scenes", USAGE)
-    found = compare_rows(search(inputs, where=options.where).rows, bench=options.bench)
+    rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
+    found = compare_rows(rows)
     print(json.dumps(compared_json(found), allow_nan=False) if options.json else visible_lines(compared_text(found)))
     wrong = {one.name for one in found.suspects}.union(*(one.names for one in found.disagreements))
     if options.strict and wrong:
         complain(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
         return REJECTED
     for suspect in found.suspects[:1]:
-        suggest(f"springmass report {shlex.join([*inputs[:1], suspect.name])}")
+        path = next(row["path"] for row in rows if suspect.name in (row["run"], f"{row[COURSE]}: {row['run']}"))
+        suggest(f"springmass analyse {shlex.quote(path)}")
     return OK
 
 
