@@ -14,7 +14,6 @@ from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.course import LITTLE
 from springmass.batch.benches import BENCHES, CourseComparison
-from springmass.batch.reports import Need, need_of
 from springmass.batch.rows import COURSE, FAILED
 from springmass.charts.chart import Chart
 from springmass.charts.drag_map import DragRun, drag_map
@@ -33,6 +32,7 @@ SHOWN = (
 )
 """Estimates with a column: name, symbol and unit; an empty unit means none, or that of the run."""
 LOOKS = ("failed", "error", "warning", "fine")
+_STATUS = {"ok": 0, "no_oscillation": 1}
 
 
 def write_page(
@@ -79,14 +79,17 @@ def _of_drag(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
 
 
 def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
-    """Return the line that the page shows for a run."""
+    """Return the line that the page shows for a run; the larger ``need``, the more it needs inspection.
+
+    That is whether it has no period, its errors, its findings that change a result, and its misfit, in this order.
+    """
     failed = row["status"] in FAILED
     look = "failed" if failed else "error" if row["errors"] else "warning" if row["tell"] else "fine"
     return {
         "name": row["run"],
         "link": "",
         "look": look,
-        "need": need_of(row),
+        "need": [_STATUS.get(row["status"], 2), row["errors"], len(row["tell"]), row.get("reduced_chi2") or 0.0],
         "tell": [row["error"]] if failed else row["tell"],
         "notes": [message for _, message in json.loads(row.get("messages") or "[]")],
         "codes": "" if failed else ", ".join(json.loads(row.get("findings") or "[]")),
@@ -110,9 +113,7 @@ def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
             line["tell"] = [sentence(message), *line["tell"]]
         if LOOKS.index(look) < LOOKS.index(line["look"]):
             line["look"] = look
-        need: Need = line["need"]
-        counted = {"errors": need.errors + 1} if look == "error" else {"harmful": need.harmful + 1}
-        line["need"] = need._replace(**counted)
+        line["need"][1 if look == "error" else 2] += 1
 
 
 def write_groups(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequence[str]) -> None:

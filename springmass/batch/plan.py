@@ -17,7 +17,7 @@ from acquisition.recordings.base import dialect_folder
 from acquisition.regular_file import open_regular, open_regular_text, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import SceneError
-from springmass.batch.runs_csv import POSITION, Entry, join, read_table
+from springmass.batch.runs_csv import ANSWERS, LAW, POSITION, Values, join, read_table
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 from springmass.layout import PACKAGES, part
 from springmass.runs.about import about_path
@@ -107,23 +107,24 @@ def plan(
     for recording in recordings:  # a file named by several inputs is one run
         first.setdefault(os.path.abspath(recording.path), recording)
     files = sorted(first.values(), key=lambda recording: recording.path)
-    joined = [(recording, Entry()) for recording in files]
+    joined: list[tuple[InputFile, int, Values]] = [(recording, 0, {}) for recording in files]
+    tags: tuple[str, ...] = ()
     if table is not None:
         joined, said = join(table, files)
-        notes += said
-        if table.tags:
-            notes.append(f"{table.path}: tags: {', '.join(table.tags)}")
+        tags = table.tags
+        notes += [*said, *([f"{table.path}: tags: {', '.join(tags)}"] if tags else [])]
     shared = None if scene is None else read_scene(scene)
     if shared is not None and shared.damping_law is not None and law is None:
         notes.insert(0, f"damping law {shared.damping_law}: stated in {scene}")
     given = {name: value for name, value in (answers or {}).items() if value not in (None, False)}
     jobs = []
-    for file, entry in joined:
-        velocity = {} if file.velocity is None else {"velocity": file.velocity}
-        of_run = _scene(entry, shared, f"{runs_csv}, line {entry.line}")
-        read = {**given, **velocity, **entry.answers}
-        jobs.append(Job(file.path, os.getcwd(), read, of_run, dict(entry.tags), accuracy, entry.law or law))
-    return Plan(tuple(jobs), () if table is None else table.tags, tuple(notes))
+    for file, line, values in joined:
+        read = given | ({} if file.velocity is None else {"velocity": file.velocity})
+        read |= {name: values[name] for name in ANSWERS if name in values}
+        stated = _scene(values, shared, f"{runs_csv}, line {line}")
+        of_tags = {name: values[name] for name in tags if name in values}
+        jobs.append(Job(file.path, os.getcwd(), read, stated, of_tags, accuracy, values.get(LAW, law)))
+    return Plan(tuple(jobs), tags, tuple(notes))
 
 
 def _expanded(inputs: Sequence[str]) -> list[str]:
@@ -150,14 +151,15 @@ def _listed(path: Path) -> list[str]:
     return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
 
 
-def _scene(entry: Entry, shared: Scene | None, where: str) -> dict[str, Any] | None:
+def _scene(values: Values, shared: Scene | None, where: str) -> dict[str, Any] | None:
     """Return the scene that a run is given, with the values of the table in place of those of a file."""
-    given = read_scene(entry.scene_file) if entry.scene_file else shared
+    given = read_scene(values["scene"]) if "scene" in values else shared
     tables = {} if given is None else given.to_mapping()
-    for name, value in entry.scene.items():
-        table, key = ("sensor", "position") if name == POSITION else PLACES[name]
-        number = value if name == POSITION else {"value": value[0], "u": value[1]} if value[1] else value[0]
-        tables.setdefault(table, {})[key] = number
+    if POSITION in values:
+        tables.setdefault("sensor", {})["position"] = values[POSITION]
+    for name in PLACES.keys() & values.keys():
+        (table, key), (value, u) = PLACES[name], values[name]
+        tables.setdefault(table, {})[key] = {"value": value, "u": u} if u else value
     try:
         return Scene.from_mapping(tables, where=where).to_mapping() if tables else None
     except SceneError as error:

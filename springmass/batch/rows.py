@@ -11,19 +11,13 @@ from typing import Any
 
 from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
+from pipeline.registry.quantities import QUANTITIES
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 from springmass.report.tables import cell
 from storage.atomic import whole_file, writing
 
 CSV = "results.csv"
-ESTIMATES = (
-    "period", "frequency", "angular_frequency", "spring_constant", "amplitude", "displacement_amplitude",
-    "angle_amplitude", "offset", "noise", "phase", "damping_rate", "quality_factor", "velocity_rms", "reynolds_number",
-    "reynolds_number_start",
-    "keulegan_carpenter_number", "drag_coefficient", "gamma", "beta", "mu", "c", "n", "natural_angular_frequency",
-    "own_mass_kg", "first_mode_period", "second_mode_period", "first_mode_amplitude", "second_mode_amplitude",
-    "relaxation_rate", "relaxation_rate_slow", "relaxation_rate_fast",
-)  # fmt: skip
+ESTIMATES = (*QUANTITIES, "natural_angular_frequency", "own_mass_kg")
 """Estimates with two columns each: the value, and with ``_u`` the standard uncertainty, in SI units."""
 QUALITY = (
     "used", "missing", "false_echo", "clipped", "duplicate_time", "non_monotonic_time", "outside", "malformed_rows",
@@ -34,20 +28,10 @@ NUMBERS = (
     *(name for pair in ((x, f"{x}_u") for x in (*ESTIMATES, *PLACES)) for name in pair),
 )  # fmt: skip
 UNITS = {
-    **dict.fromkeys(("period", "first_mode_period", "second_mode_period", "duration_s"), "s"),
-    **dict.fromkeys(("frequency", "rate_hz"), "Hz"),
-    **dict.fromkeys(("angular_frequency", "natural_angular_frequency"), "rad/s"),
-    **dict.fromkeys(
-        ("damping_rate", "gamma", "relaxation_rate", "relaxation_rate_slow", "relaxation_rate_fast"), "1/s"
-    ),
-    **dict.fromkeys(("own_mass_kg", "bob_mass_kg", "spring_mass_kg"), "kg"),
-    "spring_constant": "N/m",
-    "displacement_amplitude": "m",
-    "angle_amplitude": "rad",
-    "phase": "rad",
-    "disc_diameter_m": "m",
-    "air_temperature_c": "degC",
-    "air_pressure_pa": "Pa",
+    **{name: x.unit for name, x in QUANTITIES.items() if isinstance(x.unit, str) and x.unit and name != "velocity_rms"},
+    **{"rate_hz": "Hz", "duration_s": "s", "natural_angular_frequency": "rad/s", "own_mass_kg": "kg"},
+    **{"bob_mass_kg": "kg", "spring_mass_kg": "kg", "disc_diameter_m": "m"},
+    **{"air_temperature_c": "degC", "air_pressure_pa": "Pa"},
 }
 """Units of columns whose unit is the same in every run; for the others it follows from the column ``unit``."""
 DETAILS = ("findings", "messages", "correlations", "drag_points")
@@ -76,13 +60,14 @@ def columns_of(tags: Sequence[str]) -> tuple[str, ...]:
 def write_rows(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> None:
     """Write ``results.csv`` whole: numbers with all their digits, unknown values empty, texts without formulas."""
     columns = columns_of(tags)
-    with whole_file(folder / CSV) as temporary, writing(folder / CSV):
-        with temporary.open("w", encoding="utf-8", newline="") as file:
-            table = csv.writer(file, lineterminator="\n")
+    with whole_file(folder / CSV) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        with writing(folder / CSV):
             table.writerow(columns)
             for row in rows:
                 values = [row.get(name) for name in columns]
                 table.writerow([cell(value) if isinstance(value, str) else value for value in values])
+            file.flush()
 
 
 def is_course(folder: str | os.PathLike[str]) -> bool:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import heapq
+import re
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,15 +15,17 @@ from springmass.batch.benches import compare_rows
 from springmass.batch.executors import outcomes, workers
 from springmass.batch.page import line_of, mark, write_groups, write_page
 from springmass.batch.plan import Job, Plan, code_sha256, names_of
-from springmass.batch.reports import remove_others, report_of, write_missing
 from springmass.batch.rows import COURSE, FAILED, write_rows
 from springmass.batch.store import Store
-from springmass.batch.worker import analyse_many, blank_row
+from springmass.batch.worker import analyse_many, blank_row, write_reports
 from springmass.errors import USAGE, ProgramError
 from springmass.report.script import SHARED, report_script
-from storage.atomic import write_whole
+from storage.atomic import write_whole, writing
+from storage.errors import WriteFailed
 
 GROWTH = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
+REPORTS = "reports"
+_DIED = "its worker process died twice, for lack of memory perhaps; the next pass tries it again"
 Row = dict[str, Any]
 
 
@@ -52,8 +57,8 @@ def run_course(
     numbers of finished and of all reports.
     """
     made_of = {job.key: job.made_of() for job in course.jobs}
-    stored = store.made_of()
-    todo = [job for job in course.jobs if stored.get(job.key) != made_of[job.key]]
+    known = store.known()
+    todo = [job for job in course.jobs if known.get(job.key, ("",))[0] != made_of[job.key]]
     done = {job.key for job in course.jobs} - {job.key for job in todo}
     outcome = Outcome(len(course.jobs), len(done))
     written = len(done)
@@ -69,7 +74,7 @@ def run_course(
     table = _table(course, store, done)
     outcome.failed = sum(row["status"] in FAILED for row in table)
     write_rows(folder, table, course.tags)
-    _write_pages(course, store, folder, table, outcome, reports, jobs, reported)
+    outcome.unwritten = _write_pages(course, store, folder, table, reports, jobs, reported)
     return outcome
 
 
@@ -90,8 +95,7 @@ def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterat
     with workers(len(todo), jobs, dask) as by:
         for batch, rows in outcomes(analyse_many, todo, by):
             if rows is None:
-                died = "its worker process died twice, for lack of memory perhaps; the next pass tries it again"
-                rows = [blank_row(job, "ended", f"{job.path}: {died}") for job in batch]
+                rows = [blank_row(job, "ended", f"{job.path}: {_DIED}") for job in batch]
             if any(row["code_sha256"] != code_sha256() for row in rows):
                 wrong = "a worker has another version of springmass or of its libraries; install the same everywhere"
                 raise ProgramError(f"{dask}: {wrong}", USAGE)
@@ -103,28 +107,50 @@ def _write_pages(
     store: Store,
     folder: Path,
     table: Sequence[Row],
-    outcome: Outcome,
     reports: int,
     jobs: int | None,
     reported: Callable[[int, int], None],
-) -> None:
-    """Write what the groups should be told, the reports of the worst runs that are not up to date, and the page."""
+) -> list[str]:
+    """Write what to tell the groups, missing reports of the worst runs, and the page; return what cannot be written."""
     write_whole(folder / SHARED, report_script())
     lines = [line_of(row, course.tags) for row in table]
     if sum(row["status"] == "ok" for row in table) > 1:
         mark(lines, compare_rows(table))
     write_groups(folder, lines, course.tags)
-    job_of = {row["run"]: job for row, job in zip(table, course.jobs, strict=True)}
-    drawn = [line for row, line in zip(table, lines, strict=True) if row["status"] in ("ok", "no_oscillation")]
-    chosen = heapq.nlargest(reports, drawn, key=lambda line: (line["need"], line["name"]))
-    pages = {line["name"]: report_of(folder, line["name"]) for line in chosen}
-    outcome.unwritten += remove_others(folder, set(pages.values()))
-    fresh = store.reported()
-    missing = {name: job_of[name] for name, page in pages.items() if job_of[name].key not in fresh or not page.exists()}
-    reasons = write_missing(folder, missing, jobs, reported)
-    store.set_reported(job.key for name, job in missing.items() if not reasons[name])
-    outcome.unwritten += sorted(filter(None, reasons.values()))
-    for line in chosen:
-        if not reasons.get(line["name"]):
-            line["link"] = pages[line["name"]].relative_to(folder).as_posix()
+    drawn = [(line, job) for line, job in zip(lines, course.jobs, strict=True) if line["need"][0] < 2]
+    chosen = heapq.nlargest(reports, drawn, key=lambda pair: (pair[0]["need"], pair[0]["name"]))
+    known, tasks = store.known(), []
+    for line, job in chosen:
+        line["link"] = report_of(line["name"])
+        if not known[job.key][1] or not (folder / line["link"]).exists():
+            tasks.append((line["name"], job, (folder / line["link"]).parent))
+    unwritten = list(_remove_others(folder, {line["link"] for line in lines}))
+    with workers(len(tasks), jobs) as by:
+        for done, (((name, job, _),), reasons) in enumerate(outcomes(write_reports, tasks, by, 1), 1):
+            if reason := f"{job.path}: {_DIED}" if reasons is None else reasons[0]:
+                unwritten.append(reason)
+                next(line for line in lines if line["name"] == name)["link"] = ""
+            else:
+                store.set_reported(job.key)
+            reported(done, len(tasks))
     write_page(folder, table, lines, course.tags)
+    return sorted(unwritten)
+
+
+def report_of(run: str) -> str:
+    """Return the path of a run's report in the folder, with a digest if the name is long or has unsafe characters."""
+    safe = re.sub(r"[^A-Za-z0-9.+_-]+", "_", run).strip("._")
+    if safe != run or len(safe) > 100:
+        safe = f"{safe[:100]}-{hashlib.sha256(run.encode('utf-8', 'backslashreplace')).hexdigest()[:8]}"
+    return f"{REPORTS}/{safe}.results/report.html"
+
+
+def _remove_others(folder: Path, links: set[str]) -> Iterator[str]:
+    """Remove the reports of runs that are not among the worst any more; yield a line for each that stays."""
+    for page in sorted((folder / REPORTS).glob("*.results/report.html")):
+        if page.relative_to(folder).as_posix() not in links:
+            try:
+                with writing(page.parent):
+                    shutil.rmtree(page.parent)
+            except WriteFailed as error:
+                yield str(error)

@@ -8,7 +8,7 @@ import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -26,58 +26,32 @@ NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
 ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", *NUMBERS)
 POSITION = "sensor_position"
 LAW = "law"
-KNOWN = ("path", "scene", POSITION, LAW, *ANSWERS, *PLACES, *(f"{name}_u" for name in PLACES))
+_U = tuple(f"{name}_u" for name in PLACES)
+KNOWN = ("path", "scene", POSITION, LAW, *ANSWERS, *PLACES, *_U)
 TEMPLATE = (
     "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
     "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
 )  # fmt: skip
 LARGEST = 64 << 20  # maximum size of a table of runs, bytes
+Values = Mapping[str, Any]
 _UNIT = re.compile(r"_(kg|g|m|mm|cm|s|hz|c|pa|n_per_m|per_s)(_u)?$")
 _TAG = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """What a row, or all rows that match a file, state: the scene's file, (value, u) by attribute of a scene, answers
-    to what the recording leaves open, and tags; ``line`` is the line of the first row.
-    """
-
-    scene_file: str = ""
-    scene: Mapping[str, Any] = field(default_factory=dict)
-    answers: Mapping[str, Any] = field(default_factory=dict)
-    tags: Mapping[str, str] = field(default_factory=dict)
-    law: str = ""
-    line: int = 0
-
-    def under(self, other: Entry) -> Entry:
-        """Return both together; where they differ, the other takes precedence."""
-        scene, answers, tags = ({**getattr(self, x), **getattr(other, x)} for x in ("scene", "answers", "tags"))
-        file, law = other.scene_file or self.scene_file, other.law or self.law
-        return Entry(file, scene, answers, tags, law, self.line or other.line)
-
-    def clash(self, other: Entry) -> str:
-        """Return a name that both state differently; empty if there is none."""
-        for mine, theirs in zip(self._stated(), other._stated(), strict=True):
-            for name in sorted(mine.keys() & theirs.keys()):
-                if mine[name] != theirs[name]:
-                    return name
-        return ""
-
-    def _stated(self) -> tuple[Mapping[str, Any], ...]:
-        return self.scene, self.answers, self.tags, {LAW: self.law} if self.law else {}
-
-
-@dataclass(frozen=True, slots=True)
 class RunsTable:
-    """A table of runs: its file, its tags, and the path or pattern of each row with what the row states."""
+    """A table of runs: its file, the columns that are tags, and for each row line, path or pattern, and values.
+
+    Values are by column, those of a quantity with its standard uncertainty.
+    """
 
     path: Path
     tags: tuple[str, ...]
-    rows: tuple[tuple[str, Entry], ...]
+    rows: tuple[tuple[int, str, Values], ...]
 
     def files(self) -> list[str]:
         """Return the files named without a pattern; relative paths start from the table's folder."""
-        named = [os.path.join(self.path.parent, text) for text, _ in self.rows if not self.is_pattern(text)]
+        named = [os.path.join(self.path.parent, text) for _, text, _ in self.rows if not self.is_pattern(text)]
         return list(dict.fromkeys(named))
 
     def is_pattern(self, text: str) -> bool:
@@ -113,15 +87,16 @@ def read_table(path: str | Path) -> RunsTable:
         names.pop()
     tags = _tags(path, names)
     rows = []
-    for number, cells, _ in lines:
+    for line, cells, _ in lines:
+        where = f"{path}, line {line}"
         if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
             wrong = f"expected {len(names)} columns, got {len(cells)}; put quotes around a text with a separator"
-            raise ProgramError(f"{path}, line {number}: {wrong}", USAGE)
-        values = {name: cell.strip() for name, cell in zip(names, cells, strict=False) if cell.strip()}
-        if values and "path" not in values:
-            raise ProgramError(f"{path}, line {number}: the path of the run is missing; fill it in", USAGE)
-        if values:
-            rows.append((values["path"], _entry(path, number, values, tags, decimal_comma=comma)))
+            raise ProgramError(f"{where}: {wrong}", USAGE)
+        texts = {name: cell.strip() for name, cell in zip(names, cells, strict=False) if cell.strip()}
+        if texts and "path" not in texts:
+            raise ProgramError(f"{where}: the path of the run is missing; fill it in", USAGE)
+        if texts:
+            rows.append((line, texts["path"], _values(path.parent, where, texts, decimal_comma=comma)))
     return RunsTable(path, tags, tuple(rows))
 
 
@@ -166,71 +141,71 @@ def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
     return tags
 
 
-def _entry(path: Path, line: int, values: Mapping[str, str], tags: Sequence[str], *, decimal_comma: bool) -> Entry:
+def _values(folder: Path, where: str, texts: Mapping[str, str], *, decimal_comma: bool) -> Values:
     def number(name: str) -> float:
-        text = values[name].replace(",", ".") if decimal_comma else values[name]
+        text = texts[name].replace(",", ".") if decimal_comma else texts[name]
         try:
             value = float(text)
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise ProgramError(f"{path}, line {line}: {name} must be a finite number, got {values[name]!r}", USAGE)
+            raise ProgramError(f"{where}: {name} must be a finite number, got {texts[name]!r}", USAGE)
         return value
 
-    scene: dict[str, Any] = {POSITION: values[POSITION]} if POSITION in values else {}
+    values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
+    values |= {name: number(name) for name in NUMBERS if name in texts}
+    values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
     for name in PLACES:
-        if name in values:
-            scene[name] = (number(name), number(f"{name}_u") if f"{name}_u" in values else 0.0)
-        elif f"{name}_u" in values:
-            raise ProgramError(f"{path}, line {line}: {name}_u is there without {name}; fill in both", USAGE)
-    answers: dict[str, Any] = {x: number(x) if x in NUMBERS else values[x] for x in ANSWERS if x in values}
-    if "velocity" in answers:
-        answers["velocity"] = os.path.join(path.parent, answers["velocity"])
-    scene_file = os.path.join(path.parent, values["scene"]) if "scene" in values else ""
-    law = values.get(LAW, "")
-    if law not in ("", ANY_LAW, *LAW_NAMES):
+        if name in texts:
+            values[name] = (number(name), number(f"{name}_u") if f"{name}_u" in texts else 0.0)
+        elif f"{name}_u" in texts:
+            raise ProgramError(f"{where}: {name}_u is there without {name}; fill in both", USAGE)
+    if (law := texts.get(LAW)) not in (None, ANY_LAW, *LAW_NAMES):
         laws = ", ".join((*LAW_NAMES, ANY_LAW))
-        raise ProgramError(f"{path}, line {line}: {LAW} must be one of {laws}, got {law!r}", USAGE)
-    return Entry(scene_file, scene, answers, {name: values[name] for name in tags if name in values}, law, line)
+        raise ProgramError(f"{where}: {LAW} must be one of {laws}, got {law!r}", USAGE)
+    return values
 
 
-def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[InputFile, Entry]], list[str]]:
-    """Return each file with its values from the table, and a note for each row without a file and file without a row.
+def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[InputFile, int, Values]], list[str]]:
+    """Return each file with line and values from the table; a note for each row without file and file without row.
 
     A file has one run for each row that names its path with a different ``run`` or ``channel``. A row with a path
     takes precedence over a row with a pattern; other rows that contradict each other are refused.
     """
-    exact: dict[str, list[Entry]] = {}
-    patterns: list[tuple[str, Entry]] = []
-    for text, entry in table.rows:
+    exact: dict[str, list[tuple[int, Values]]] = {}
+    patterns: list[tuple[int, str, Values]] = []
+    for line, text, values in table.rows:
         if table.is_pattern(text):
-            patterns.append((text if "/" not in text else table.whole(text), entry))
+            patterns.append((line, text if "/" not in text else table.whole(text), values))
         else:
-            exact.setdefault(table.whole(text), []).append(entry)
+            exact.setdefault(table.whole(text), []).append((line, values))
     used: set[int] = set()
-    joined: list[tuple[InputFile, Entry]] = []
+    joined: list[tuple[InputFile, int, Values]] = []
     notes = []
     for file in files:
-        path = os.path.abspath(file.path)
-        # A pattern without a slash is compared only with the file name.
-        wide = [entry for text, entry in patterns if fnmatchcase(path if "/" in text else os.path.basename(path), text)]
-        narrow = exact.get(path, [])
-        used |= {entry.line for entry in (*wide, *narrow)}
-        if not wide and not narrow:
-            notes.append(f"{table.path}: no row belongs to {file.path}")
-        base = Entry()
-        for entry in wide:
-            if clash := base.clash(entry):
-                wrong = f"lines {base.line} and {entry.line} both match {file.path} and differ in {clash}"
+        path, first = os.path.abspath(file.path), 0
+        base: Values = {}
+        for line, text, values in patterns:
+            # A pattern without a slash is compared only with the file name.
+            if not fnmatchcase(path if "/" in text else os.path.basename(path), text):
+                continue
+            if clash := sorted(x for x in base.keys() & values.keys() if base[x] != values[x]):
+                wrong = f"lines {first} and {line} both match {file.path} and differ in {clash[0]}"
                 raise ProgramError(f"{table.path}: {wrong}; narrow one of the patterns", USAGE)
-            base = base.under(entry)
+            base, first = {**base, **values}, first or line
+            used.add(line)
         lines: dict[tuple[Any, Any], int] = {}
-        for entry in narrow:
-            which = (entry.answers.get("run"), entry.answers.get("channel"))
+        for line, values in exact.get(path, []):
+            which = (values.get("run"), values.get("channel"))
             if which in lines:
-                wrong = f"lines {lines[which]} and {entry.line} both name {file.path}"
+                wrong = f"lines {lines[which]} and {line} both name {file.path}"
                 raise ProgramError(f"{table.path}: {wrong}; leave one out, or give each another run or channel", USAGE)
-            lines[which] = entry.line
-        joined += [(file, base.under(entry)) for entry in narrow] or [(file, base)]
-    unused = [f"line {entry.line}: {text}" for text, entry in table.rows if entry.line not in used]
+            lines[which] = line
+            joined.append((file, line, {**base, **values}))
+        used |= set(lines.values())
+        if not lines:
+            joined.append((file, first, base))
+        if not lines and not first:
+            notes.append(f"{table.path}: no row belongs to {file.path}")
+    unused = [f"line {line}: {text}" for line, text, _ in table.rows if line not in used]
     return joined, [*(f"{table.path}, {row}: no file of the inputs belongs to this row" for row in unused), *notes]

@@ -44,14 +44,11 @@ class Store:
         """Close the file."""
         self._db.close()
 
-    def paths(self) -> set[str]:
-        """Return the paths of all runs that have a row."""
-        return {json.loads(key)[0] for key in self.made_of()}
-
-    def made_of(self) -> dict[str, str]:
-        """Return by key what each row was made of."""
+    def known(self) -> dict[str, tuple[str, bool]]:
+        """Return by key what each row was made of, and whether a report was written of it."""
         with self._errors():
-            return dict(self._db.execute("SELECT key, made_of FROM runs"))
+            found = self._db.execute("SELECT key, made_of, reported FROM runs")
+            return {key: (made_of, bool(reported)) for key, made_of, reported in found}
 
     def rows(self, keys: Iterable[str]) -> Iterator[dict[str, Any]]:
         """Yield the rows of these keys, in this order."""
@@ -65,14 +62,9 @@ class Store:
         values = [(key, made_of, json.dumps(row, allow_nan=False)) for key, made_of, row in rows]
         self._change("REPLACE INTO runs VALUES (?, ?, 0, ?)", values)
 
-    def reported(self) -> set[str]:
-        """Return the keys of the runs of whose present row a report was written."""
-        with self._errors():
-            return {key for (key,) in self._db.execute("SELECT key FROM runs WHERE reported")}
-
-    def set_reported(self, keys: Iterable[str]) -> None:
-        """Note of which rows a report was written."""
-        self._change("UPDATE runs SET reported = 1 WHERE key = ?", [(key,) for key in keys])
+    def set_reported(self, key: str) -> None:
+        """Note that a report was written of a run's present row."""
+        self._change("UPDATE runs SET reported = 1 WHERE key = ?", [(key,)])
 
     def _change(self, statement: str, values: Sequence[tuple[Any, ...]]) -> None:
         with self._errors():
@@ -91,7 +83,8 @@ class Store:
             yield
         except sqlite3.Error as error:
             if error.sqlite_errorname == "SQLITE_BUSY":
-                raise ProgramError(f"{self._path.parent}: in use by another process; wait for its end", USAGE) from error
+                wrong = f"{self._path.parent}: in use by another process; wait for its end"
+                raise ProgramError(wrong, USAGE) from error
             if error.sqlite_errorname in ("SQLITE_NOTADB", "SQLITE_CORRUPT", "SQLITE_ERROR"):
                 remedy = "remove it, and batch analyses all runs again"
                 raise ProgramError(f"{self._path}: damaged ({error}); {remedy}", UNREADABLE) from error

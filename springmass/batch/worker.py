@@ -10,8 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from acquisition.errors import AcquisitionError, NeedsAnswer, visible
 from pipeline.analyse import Analysis, Oscillation, Overdamped
 from pipeline.bench.scene import PLACES, Scene
@@ -19,9 +17,10 @@ from pipeline.errors import AnalysisError, PipelineError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.threads import one_thread
 from pipeline.results.compare import SpringRun
-from pipeline.track import F8
 from springmass.batch.plan import Job, code_sha256, digest_of
 from springmass.batch.rows import ESTIMATES
+from springmass.charts.drag_map import drag_points
+from springmass.charts.outline import outline
 from springmass.errors import NO_MEMORY, ProgramError, internal_error, quietly
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.script import SHARED
@@ -32,8 +31,6 @@ from storage.errors import StorageError
 
 LARGEST = 1e100
 """Maximum magnitude of numbers in a row, whose square is still finite. Larger estimates are left out."""
-BINS, FEWEST_BINS = 60, 8  # maximum and minimum number of bins in a thumbnail
-DRAG_POINTS = 8
 DIGITS = 6  # decimal places of a correlation
 TIME = "by springmass batch"  # in place of a time, so that a pass at any time gives the same bytes
 
@@ -134,7 +131,7 @@ def _fill(row: dict[str, Any], run: AnalysedRun) -> None:
         "findings": _json([f.code for f in findings]),
         "messages": _json([[f.severity, visible(f.message)] for f in findings if f.severity != "info"]),
         "tell": [f"{sentence(f.message)} {f.advice}".rstrip() for harm, f in by_harm if harm <= Harm.PART],
-        "thumbnail": _thumbnail(track.t, track.y, _period_s(analysis)),
+        "thumbnail": outline(analysis),
     }  # fmt: skip
     if isinstance(motion, Oscillation):
         _fill_damping(row, analysis, motion)
@@ -154,7 +151,7 @@ def _fill_damping(row: dict[str, Any], analysis: Analysis, motion: Oscillation) 
         "undetermined": " ".join(undetermined) or None,
         "reduced_chi2": _number(damping.best.reduced_chi2),
         "correlations": _json({"names": list(derived.joint.names), "matrix": matrix}),
-        "drag_points": _json(_drag_points(analysis, motion)),
+        "drag_points": _json(drag_points(analysis)),
     }
     try:
         spring = SpringRun.of("", derived, clock=analysis.track.clock)
@@ -176,49 +173,3 @@ def _number(x: Any) -> float | None:
 def _json(value: Any) -> str | None:
     """Return canonical JSON in one line; None for what is empty."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"), sort_keys=True) if value else None
-
-
-def _drag_points(analysis: Analysis, motion: Oscillation) -> list[list[float]]:
-    """Return Re, KC, drag coefficient and its u at amplitudes spaced evenly on a logarithmic scale."""
-    diameter, derived, estimates = analysis.scene.disc_diameter_m, motion.derived, analysis.estimates
-    curve = derived.drag_curve(motion.damping, motion.demodulated)
-    if curve is None or diameter is None or derived.displacement is None or "reynolds_number" not in estimates:
-        return []
-    lengths: F8 = curve.x * derived.displacement.value
-    order = np.argsort(lengths)
-    if not lengths[order[0]] > 0:
-        return []
-    at = np.geomspace(lengths[order[0]], lengths[order[-1]], DRAG_POINTS)
-    value, u = (np.interp(at, lengths[order], each[order]) for each in (curve.y, curve.u))
-    # The Re estimate uses the rms velocity of the whole run; at amplitude A the rms velocity is omega A / sqrt 2.
-    per_velocity = estimates["reynolds_number"].value / estimates["velocity_rms"].value
-    reynolds = per_velocity * estimates["angular_frequency"].value * at / np.sqrt(2.0)
-    points = np.column_stack([reynolds, 2.0 * np.pi * at / diameter.value, value, u])
-    kept = np.isfinite(points).all(axis=1) & (np.abs(points).max(axis=1) <= LARGEST)
-    return [[float(f"{x:.6g}") for x in point] for point in points[kept].tolist()]
-
-
-def _period_s(analysis: Analysis) -> float:
-    """Return the period, or, if there is none, a time too short to limit the number of bins."""
-    return analysis.estimates["period"].value if "period" in analysis.estimates else 1e-9
-
-
-def _thumbnail(t: F8, y: F8, period_s: float) -> str:
-    """Return an outline of the recording as an SVG path in a box of 120 by 30; empty if nothing was measured."""
-    there = np.isfinite(t) & np.isfinite(y)
-    order = np.argsort(t[there], kind="stable")
-    t, y = t[there][order], y[there][order]
-    if t.size < 2 or not np.ptp(t) > 0:
-        return ""
-    span = t[-1] - t[0]
-    count = int(np.clip(span / period_s, FEWEST_BINS, BINS))  # a bin shorter than a period would not show the outline
-    ends = np.searchsorted(t, t[0] + span * np.arange(count + 1) / count)
-    filled = np.flatnonzero(np.diff(ends))
-    low, high = (edge.reduceat(y, ends[filled]) for edge in (np.minimum, np.maximum))
-    beyond = y.size // 200  # the extreme 0.5 % are ignored, so that false echoes do not flatten the outline
-    bottom, top = np.partition(y, (beyond, -1 - beyond))[[beyond, -1 - beyond]]
-    scale = 28.0 / max(top - bottom, 1e-300)
-    above, below = (np.clip(29.0 - (edge - bottom) * scale, 0.0, 30.0).round() for edge in (high, low))
-    x = ((filled + 0.5) * 120.0 / count).round(1).tolist()
-    edge = [*zip(x, above.tolist(), strict=True), *reversed([*zip(x, below.tolist(), strict=True)])]
-    return "M" + "L".join(f"{a:g} {b:g}" for a, b in edge) + "Z"

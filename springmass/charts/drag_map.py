@@ -8,9 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.errors import visible
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, line_of
+
+
+POINTS = 8  # of one run
+LARGEST = 1e100  # whose square is still finite
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,6 +24,29 @@ class DragRun:
 
     disc: str
     points: F8
+
+
+def drag_points(analysis: Analysis) -> list[list[float]]:
+    """Return Re, KC, drag coefficient and its u at amplitudes spaced evenly on a logarithmic scale."""
+    motion, diameter, estimates = analysis.motion, analysis.scene.disc_diameter_m, analysis.estimates
+    if not isinstance(motion, Oscillation):
+        return []
+    derived = motion.derived
+    curve = derived.drag_curve(motion.damping, motion.demodulated)
+    if curve is None or diameter is None or derived.displacement is None or "reynolds_number" not in estimates:
+        return []
+    lengths: F8 = curve.x * derived.displacement.value
+    order = np.argsort(lengths)
+    if not lengths[order[0]] > 0:
+        return []
+    at = np.geomspace(lengths[order[0]], lengths[order[-1]], POINTS)
+    value, u = (np.interp(at, lengths[order], each[order]) for each in (curve.y, curve.u))
+    # The Re estimate uses the rms velocity of the whole run; at amplitude A the rms velocity is omega A / sqrt 2.
+    per_velocity = estimates["reynolds_number"].value / estimates["velocity_rms"].value
+    reynolds = per_velocity * estimates["angular_frequency"].value * at / np.sqrt(2.0)
+    points = np.column_stack([reynolds, 2.0 * np.pi * at / diameter.value, value, u])
+    kept = np.isfinite(points).all(axis=1) & (np.abs(points).max(axis=1) <= LARGEST)
+    return [[float(f"{x:.6g}") for x in point] for point in points[kept].tolist()]
 
 
 def drag_of_disc_at_rest(reynolds: F8) -> F8:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -46,7 +47,7 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
             accuracy=options.accuracy,
             law=options.law,
             answers=read.given(),
-            known=store.paths(),
+            known=[json.loads(key)[0] for key in store.known()],
             output=str(folder),
         )
         for line in course.notes:
