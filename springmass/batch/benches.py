@@ -121,14 +121,6 @@ def _estimate(row: Mapping[str, Any], name: str) -> Estimate | None:
     return None if value is None or u is None else Estimate(value, u)
 
 
-def compared_json(comparison: CourseComparison) -> dict[str, Any]:
-    """Return a comparison as a JSON-serialisable mapping."""
-    from springmass.runs.json_results import SCHEMA, plain
-
-    fields: dict[str, Any] = plain(comparison)
-    return {"schema": SCHEMA, **fields}
-
-
 def compared_text(comparison: CourseComparison) -> str:
     """Return a comparison as lines of text."""
     lines = [f"{comparison.runs} runs; benches distinguished by {comparison.bench}", ""]

@@ -23,14 +23,14 @@ from springmass.terminal.printing import visible_lines
 from storage.atomic import write_whole
 
 PAGE, GROUPS = "index.html", "groups.txt"
-SHOWN = (
-    ("period", "T", "s"),
-    ("spring_constant", "k", "N/m"),
-    ("amplitude", "A₀", ""),
-    ("damping_rate", "λ", "1/s"),
-    ("drag_coefficient", "C_d", ""),
-)
-"""Estimates with a column: name, symbol and unit; an empty unit means none, or that of the run."""
+SHOWN = {
+    "period": "T / s",
+    "spring_constant": "k / (N/m)",
+    "amplitude": "A₀",
+    "damping_rate": "λ / (1/s)",
+    "drag_coefficient": "C_d",
+}
+"""Estimates with a column, and its heading; amplitudes have the unit of their run."""
 LOOKS = ("failed", "error", "warning", "fine")
 _STATUS = {"ok": 0, "no_oscillation": 1}
 
@@ -42,15 +42,16 @@ def write_page(
     from springmass.report.html import Figures, drawn_by_script, template
     from springmass.report.script import SHARED
 
-    there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in lines)]  # only with numbers
-    shown = [{**line, "cells": [line["cells"][i] for i in there], "link": quote(line["link"])} for line in lines]
+    there = [name for name in SHOWN if any(line["cells"][name] for line in lines)]  # only with numbers
+    shown = [{**line, "link": quote(line["link"])} for line in lines]
     figures = Figures()
-    drawn = [figures.add(chart) for chart in (_of_all(rows), _of_drag(rows)) if chart is not None]
+    differing = {visible(line["name"]): line["differs"] for line in lines if line["differs"]}
+    drawn = [figures.add(chart) for chart in (_of_all(rows, differing), _of_drag(rows)) if chart is not None]
     page = template("course.html.j2").render(
         title=folder.resolve().name,
         lines=sorted(shown, key=lambda line: (*(-x for x in line["need"]), line["name"])),
         tags=tags,
-        quantities=[SHOWN[i] for i in there],
+        quantities={name: SHOWN[name] for name in there},
         counts={kind: sum(line["look"] == kind for line in shown) for kind in LOOKS},
         figures={figure["name"]: figure for figure in drawn},
         **drawn_by_script(figures.charts, SHARED),
@@ -58,12 +59,12 @@ def write_page(
     write_whole(folder / PAGE, page.encode("utf-8", "backslashreplace"))
 
 
-def _of_all(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
+def _of_all(rows: Sequence[Mapping[str, Any]], differing: Mapping[str, str]) -> Chart | None:
     """Return the chart of all spring constants, or else of all periods, if at least two runs have one."""
     for name, label in (("spring_constant", "spring constant / (N/m)"), ("period", "period / s")):
         known = [(visible(row["run"]), row[name], row[f"{name}_u"] or 0.0) for row in rows if row.get(name) is not None]
         if len(known) > 1:
-            return course(label, known)
+            return course(label, known, differing)
     return None
 
 
@@ -92,9 +93,9 @@ def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
         "need": [_STATUS.get(row["status"], 2), row["errors"], len(row["tell"]), row.get("reduced_chi2") or 0.0],
         "tell": [row["error"]] if failed else row["tell"],
         "notes": [message for _, message in json.loads(row.get("messages") or "[]")],
-        "codes": "" if failed else ", ".join(json.loads(row.get("findings") or "[]")),
+        "differs": "",
         "tags": [row[tag] or "" for tag in tags],
-        "cells": [_cell(row, *shown) for shown in SHOWN],
+        "cells": {name: _cell(row, name) for name in SHOWN},
         "law": row.get("law") or "",
         "thumbnail": row["thumbnail"],
     }
@@ -114,6 +115,7 @@ def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
         if LOOKS.index(look) < LOOKS.index(line["look"]):
             line["look"] = look
         line["need"][1 if look == "error" else 2] += 1
+        line["differs"] = line["differs"] or (message if look == "error" else "")
 
 
 def write_groups(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequence[str]) -> None:
@@ -136,10 +138,9 @@ def write_groups(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequenc
     write_whole(folder / GROUPS, text.encode("utf-8", "backslashreplace") + b"\n")
 
 
-def _cell(row: Mapping[str, Any], quantity: str, label: str, unit: str) -> tuple[str, str, str]:
-    """Return an estimate's label, its text, and its value as the sort key."""
-    value, u = row.get(quantity), row.get(f"{quantity}_u")
+def _cell(row: Mapping[str, Any], name: str) -> tuple[str, str] | None:
+    """Return an estimate's text, and its value as the sort key."""
+    value, u = row.get(name), row.get(f"{name}_u")
     if value is None or u is None:
-        return label, "", ""
-    unit = unit or (row["unit"] if quantity == "amplitude" else "")
-    return label, repr(Estimate(value, u, unit)), repr(value)
+        return None
+    return repr(Estimate(value, u, row["unit"] if name == "amplitude" else "")), repr(value)

@@ -167,14 +167,7 @@ def _scene(values: Values, shared: Scene | None, where: str) -> dict[str, Any] |
 
 
 def names_of(jobs: Sequence[Job]) -> list[str]:
-    """Return a name per run: its path below the common folder, without suffix, with repeated names numbered.
-
-    Examples
-    --------
-    >>> jobs = [Job(path, "/", {}, None, {}, "fast", None) for path in ("c/a/1.txt", "c/b/1.txt", "c/b/1.csv")]
-    >>> names_of(jobs)
-    ['a/1', 'b/1', 'b/1-2']
-    """
+    """Return a name per run: its path below the common folder, without suffix, with repeated names numbered."""
     if not jobs:
         return []
     whole = [os.path.abspath(job.whole(job.path)) for job in jobs]

@@ -29,9 +29,15 @@ NUMBERS = (
 )  # fmt: skip
 UNITS = {
     **{name: x.unit for name, x in QUANTITIES.items() if isinstance(x.unit, str) and x.unit and name != "velocity_rms"},
-    **{"rate_hz": "Hz", "duration_s": "s", "natural_angular_frequency": "rad/s", "own_mass_kg": "kg"},
-    **{"bob_mass_kg": "kg", "spring_mass_kg": "kg", "disc_diameter_m": "m"},
-    **{"air_temperature_c": "degC", "air_pressure_pa": "Pa"},
+    "rate_hz": "Hz",
+    "duration_s": "s",
+    "natural_angular_frequency": "rad/s",
+    "own_mass_kg": "kg",
+    "bob_mass_kg": "kg",
+    "spring_mass_kg": "kg",
+    "disc_diameter_m": "m",
+    "air_temperature_c": "degC",
+    "air_pressure_pa": "Pa",
 }
 """Units of columns whose unit is the same in every run; for the others it follows from the column ``unit``."""
 DETAILS = ("findings", "messages", "correlations", "drag_points")

@@ -7,7 +7,6 @@ import heapq
 import re
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,29 +14,17 @@ from springmass.batch.benches import compare_rows
 from springmass.batch.executors import outcomes, workers
 from springmass.batch.page import line_of, mark, write_groups, write_page
 from springmass.batch.plan import Job, Plan, code_sha256, names_of
-from springmass.batch.rows import COURSE, FAILED, write_rows
+from springmass.batch.rows import COURSE, write_rows
 from springmass.batch.store import Store
 from springmass.batch.worker import analyse_many, blank_row, write_reports
 from springmass.errors import USAGE, ProgramError
 from springmass.report.script import SHARED, report_script
 from storage.atomic import write_whole, writing
-from storage.errors import WriteFailed
 
 GROWTH = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
 REPORTS = "reports"
 _DIED = "its worker process died twice, for lack of memory perhaps; the next pass tries it again"
 Row = dict[str, Any]
-
-
-@dataclass(slots=True)
-class Outcome:
-    """The numbers of all runs, unchanged, analysed and failed ones; a line for each report that was not written."""
-
-    runs: int = 0
-    unchanged: int = 0
-    analysed: int = 0
-    failed: int = 0
-    unwritten: list[str] = field(default_factory=list)
 
 
 def run_course(
@@ -50,32 +37,32 @@ def run_course(
     reports: int,
     progress: Callable[[Sequence[Row], int, int], None],
     reported: Callable[[int, int], None],
-) -> Outcome:
+) -> tuple[list[Row], int, list[str]]:
     """Analyse the new and changed runs of a course, and write table, page and reports of all runs.
 
     ``progress`` is called with the rows just made, their number so far and their final number, ``reported`` with the
-    numbers of finished and of all reports.
+    numbers of finished and of all reports. Return all rows, how many were made, and a line for each unwritten report.
     """
     made_of = {job.key: job.made_of() for job in course.jobs}
-    known = store.known()
-    todo = [job for job in course.jobs if known.get(job.key, ("",))[0] != made_of[job.key]]
-    done = {job.key for job in course.jobs} - {job.key for job in todo}
-    outcome = Outcome(len(course.jobs), len(done))
-    written = len(done)
+    stored = store.made_of()
+    todo = [job for job in course.jobs if stored.get(job.key) != made_of[job.key]]
+    for page in (folder / REPORTS).glob("*.results/report.html") if todo else ():
+        with writing(page.parent):  # it may show a run that has changed; an interrupted pass leaves none of these
+            shutil.rmtree(page.parent)
+    done = made_of.keys() - {job.key for job in todo}
+    made, written = 0, len(done)
     for rows in _analysed(todo, jobs, dask):
         # A run during which a worker died is tried again by the next pass.
-        store.add([(job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows])
+        store.add((job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows)
         done |= {job.key for job, _ in rows}
-        outcome.analysed += len(rows)
+        made += len(rows)
         if len(done) >= GROWTH * written:
             write_rows(folder, _table(course, store, done), course.tags)
             written = len(done)
-        progress([row for _, row in rows], outcome.analysed, len(todo))
+        progress([row for _, row in rows], made, len(todo))
     table = _table(course, store, done)
-    outcome.failed = sum(row["status"] in FAILED for row in table)
     write_rows(folder, table, course.tags)
-    outcome.unwritten = _write_pages(course, store, folder, table, reports, jobs, reported)
-    return outcome
+    return table, made, _write_pages(course, folder, table, reports, jobs, reported)
 
 
 def _table(course: Plan, store: Store, done: set[str]) -> list[Row]:
@@ -104,7 +91,6 @@ def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterat
 
 def _write_pages(
     course: Plan,
-    store: Store,
     folder: Path,
     table: Sequence[Row],
     reports: int,
@@ -118,21 +104,16 @@ def _write_pages(
         mark(lines, compare_rows(table))
     write_groups(folder, lines, course.tags)
     drawn = [(line, job) for line, job in zip(lines, course.jobs, strict=True) if line["need"][0] < 2]
-    chosen = heapq.nlargest(reports, drawn, key=lambda pair: (pair[0]["need"], pair[0]["name"]))
-    known, tasks = store.known(), []
-    for line, job in chosen:
-        line["link"] = report_of(line["name"])
-        if not known[job.key][1] or not (folder / line["link"]).exists():
-            tasks.append((line["name"], job, (folder / line["link"]).parent))
-    unwritten = list(_remove_others(folder, {line["link"] for line in lines}))
+    worst = heapq.nlargest(reports, drawn, key=lambda pair: (pair[0]["need"], pair[0]["name"]))
+    named = [(line["name"], job, folder / report_of(line["name"])) for line, job in worst]
+    tasks = [(name, job, page.parent) for name, job, page in named if not page.exists()]
+    unwritten: list[str] = []
     with workers(len(tasks), jobs) as by:
-        for done, (((name, job, _),), reasons) in enumerate(outcomes(write_reports, tasks, by, 1), 1):
-            if reason := f"{job.path}: {_DIED}" if reasons is None else reasons[0]:
-                unwritten.append(reason)
-                next(line for line in lines if line["name"] == name)["link"] = ""
-            else:
-                store.set_reported(job.key)
+        for done, (batch, reasons) in enumerate(outcomes(write_reports, tasks, by, 1), 1):
+            unwritten += [f"{job.path}: {_DIED}" for _, job, _ in batch] if reasons is None else filter(None, reasons)
             reported(done, len(tasks))
+    for line in lines:
+        line["link"] = link if (folder / (link := report_of(line["name"]))).exists() else ""
     write_page(folder, table, lines, course.tags)
     return sorted(unwritten)
 
@@ -143,14 +124,3 @@ def report_of(run: str) -> str:
     if safe != run or len(safe) > 100:
         safe = f"{safe[:100]}-{hashlib.sha256(run.encode('utf-8', 'backslashreplace')).hexdigest()[:8]}"
     return f"{REPORTS}/{safe}.results/report.html"
-
-
-def _remove_others(folder: Path, links: set[str]) -> Iterator[str]:
-    """Remove the reports of runs that are not among the worst any more; yield a line for each that stays."""
-    for page in sorted((folder / REPORTS).glob("*.results/report.html")):
-        if page.relative_to(folder).as_posix() not in links:
-            try:
-                with writing(page.parent):
-                    shutil.rmtree(page.parent)
-            except WriteFailed as error:
-                yield str(error)

@@ -12,10 +12,10 @@ import os
 import platform
 import sqlite3
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from springmass.errors import UNREADABLE, USAGE, ProgramError, tell
 from storage.atomic import writing
@@ -25,7 +25,7 @@ if sys.platform != "win32":
     import fcntl
 
 DATABASE, LOCK = "course.db", "course.lock"
-_TABLE = "CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, made_of TEXT, reported INTEGER, row TEXT)"
+_TABLE = "CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, made_of TEXT, row TEXT)"
 
 
 class Store:
@@ -44,11 +44,10 @@ class Store:
         """Close the file."""
         self._db.close()
 
-    def known(self) -> dict[str, tuple[str, bool]]:
-        """Return by key what each row was made of, and whether a report was written of it."""
+    def made_of(self) -> dict[str, str]:
+        """Return by key what each row was made of."""
         with self._errors():
-            found = self._db.execute("SELECT key, made_of, reported FROM runs")
-            return {key: (made_of, bool(reported)) for key, made_of, reported in found}
+            return dict(self._db.execute("SELECT key, made_of FROM runs"))
 
     def rows(self, keys: Iterable[str]) -> Iterator[dict[str, Any]]:
         """Yield the rows of these keys, in this order."""
@@ -57,25 +56,12 @@ class Store:
                 for (row,) in self._db.execute("SELECT row FROM runs WHERE key = ?", (key,)):
                     yield json.loads(row)
 
-    def add(self, rows: Sequence[tuple[str, str, Mapping[str, Any]]]) -> None:
+    def add(self, rows: Iterable[tuple[str, str, Mapping[str, Any]]]) -> None:
         """Store rows, each with its key and what it was made of, in one transaction."""
         values = [(key, made_of, json.dumps(row, allow_nan=False)) for key, made_of, row in rows]
-        self._change("REPLACE INTO runs VALUES (?, ?, 0, ?)", values)
-
-    def set_reported(self, key: str) -> None:
-        """Note that a report was written of a run's present row."""
-        self._change("UPDATE runs SET reported = 1 WHERE key = ?", [(key,)])
-
-    def _change(self, statement: str, values: Sequence[tuple[Any, ...]]) -> None:
-        with self._errors():
+        with self._errors(), self._db:  # commits, or rolls back after an error
             self._db.execute("BEGIN IMMEDIATE")
-            try:
-                self._db.executemany(statement, values)
-                self._db.execute("COMMIT")
-            except BaseException:
-                with contextlib.suppress(sqlite3.Error):  # after a full disk SQLite has taken it back itself
-                    self._db.execute("ROLLBACK")
-                raise
+            self._db.executemany("REPLACE INTO runs VALUES (?, ?, ?)", values)
 
     @contextlib.contextmanager
     def _errors(self) -> Iterator[None]:
@@ -99,27 +85,19 @@ def opened(folder: Path) -> Iterator[Store]:
     with writing(path):
         file = path.open("a+b")
     with file:
-        _lock(file, folder)
+        try:
+            if sys.platform != "win32":
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            file.seek(0)
+            holder = file.read(200).decode("utf-8", "replace") or "another process"
+            raise ProgramError(f"{folder}: in use by {holder}; wait for its end", USAGE) from error
+        except OSError:
+            tell(f"{folder}: this disk has no locks; let only one batch at a time write there")
         with writing(path):
             file.truncate(0)
             since = datetime.now(UTC).isoformat(timespec="seconds")
             file.write(f"process {os.getpid()} on {platform.node()} since {since}".encode("utf-8", "replace"))
             file.flush()
-        store = Store(folder)
-        try:
+        with contextlib.closing(Store(folder)) as store:
             yield store
-        finally:
-            store.close()
-
-
-def _lock(file: BinaryIO, folder: Path) -> None:
-    if sys.platform == "win32":
-        return  # there SQLite's own locks are on
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        file.seek(0)
-        holder = file.read(200).decode("utf-8", "replace") or "another process"
-        raise ProgramError(f"{folder}: in use by {holder}; wait for its end", USAGE) from error
-    except OSError:
-        tell(f"{folder}: this disk has no locks; let only one batch at a time write there")

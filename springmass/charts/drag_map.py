@@ -13,7 +13,6 @@ from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, line_of
 
-
 POINTS = 8  # of one run
 LARGEST = 1e100  # whose square is still finite
 

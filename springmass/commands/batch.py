@@ -47,7 +47,7 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
             accuracy=options.accuracy,
             law=options.law,
             answers=read.given(),
-            known=[json.loads(key)[0] for key in store.known()],
+            known=[json.loads(key)[0] for key in store.made_of()],
             output=str(folder),
         )
         for line in course.notes:
@@ -67,7 +67,7 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
                 reports.append(shown.enter_context(TaskProgress("reports", lines=True, quiet=quiet)))
             reports[0].update(done, total)
 
-        outcome = run_course(
+        rows, made, unwritten = run_course(
             course,
             store,
             folder,
@@ -77,11 +77,12 @@ def run(recordings: Sequence[str | Path], options: BatchOptions, read: ReadOptio
             progress=analysed,
             reported=reported,
         )
-    for line in outcome.unwritten:
+    for line in unwritten:
         complain(line)
-    tell(f"{outcome.runs} runs: {outcome.unchanged} unchanged, {outcome.analysed} analysed, {outcome.failed} failed")
+    failed = sum(row["status"] in FAILED for row in rows)
+    tell(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
     suggest(f"open {folder / PAGE} in a browser")
     tell(f"written: {folder / PAGE}, {folder / GROUPS}, {folder / CSV}; the data are in {folder / DATABASE}")
-    if outcome.failed and outcome.failed == outcome.runs:
+    if failed and failed == len(rows):
         return UNREADABLE
-    return SOME_FAILED if outcome.failed or outcome.unwritten else OK
+    return SOME_FAILED if failed or unwritten else OK

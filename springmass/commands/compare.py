@@ -13,7 +13,7 @@ from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, sugge
 from springmass.options import CompareOptions
 from springmass.runs.analysing import Analysed, analyse_loaded, distinct_names, law_line, make_folder, now_utc, scene_of
 from springmass.runs.comparing import Compared, compare_analysed, comparison_json, demand_one_spring
-from springmass.runs.json_results import picked, provenance_of, rejected
+from springmass.runs.json_results import SCHEMA, picked, plain, provenance_of, rejected
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
 from springmass.runs.scenes import read_scenes
@@ -74,14 +74,18 @@ def run(recordings: Sequence[str | Path], options: CompareOptions, read: ReadOpt
 
 
 def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
-    from springmass.batch.benches import compare_rows, compared_json, compared_text
+    from springmass.batch.benches import compare_rows, compared_text
     from springmass.terminal.printing import visible_lines
 
     if options.output is not None or options.scene:
         raise ProgramError("-o and --scene go with single runs; a course has its page and its scenes", USAGE)
     rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
     found = compare_rows(rows)
-    print(json.dumps(compared_json(found), allow_nan=False) if options.json else visible_lines(compared_text(found)))
+    print(
+        json.dumps({"schema": SCHEMA, **plain(found)}, allow_nan=False)
+        if options.json
+        else visible_lines(compared_text(found))
+    )
     wrong = {one.name for one in found.suspects}.union(*(one.names for one in found.disagreements))
     if options.strict and wrong:
         complain(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")

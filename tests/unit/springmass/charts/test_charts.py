@@ -154,9 +154,10 @@ def test_several_runs(damped: sm.Analysis, motion: Oscillation) -> None:
     _, k = chart.xy("spring constant")
     np.testing.assert_allclose(k, [each.value for each in found.each], rtol=1e-6)
     np.testing.assert_allclose(chart.xy("residual", 1)[1], found.pulls, atol=1e-6)
-    many = Drawn(course("period / s", [("x", 0.8, 0.1), ("y", 0.9, 0.2)]))
+    many = Drawn(course("period / s", [("x", 0.8, 0.1), ("y", 0.9, 0.2), ("z", 90.0, 0.2)], {"z": "far from the others"}))
     assert many.xy("value")[1] == pytest.approx([0.8, 0.9])
-    assert many.json["panels"][0]["names"] == ["x", "y"]
+    assert many.json["panels"][0]["names"] == ["x", "y", "z"]
+    assert many.json["panels"][0]["range"][1] < 2.0
 
 
 def test_a_map_of_drag() -> None:
