@@ -40,7 +40,7 @@ from threadpoolctl import threadpool_limits
 from springmass import load
 from springmass.batch.rows import DETAILS, columns_of
 from springmass.cli import main
-from storage.catalog import search_rows
+
 
 SAMPLES = 12_000
 PART = 500  # number of runs in a pass; the loop is timed after each pass

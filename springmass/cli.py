@@ -116,10 +116,10 @@ def _exit_code(error: Exception) -> int | None:
         return error.exit_code
     from acquisition.errors import AcquisitionError, CalibrationError, PortError, SensorError
     from pipeline.errors import DynamicsError, PipelineError, SceneError
-    from storage.errors import DiskNearlyFull, QueryRefused, StorageError, WriteFailed
+    from storage.errors import DiskNearlyFull, StorageError, WriteFailed
 
     if isinstance(error, PortError | CalibrationError | DiskNearlyFull):
         return SENSOR
-    if isinstance(error, SceneError | DynamicsError | WriteFailed | SensorError | QueryRefused):
+    if isinstance(error, SceneError | DynamicsError | WriteFailed | SensorError):
         return USAGE
     return UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None

@@ -51,10 +51,6 @@ class RunOpen(StorageError):
     separator = " "
 
 
-class QueryRefused(StorageError):
-    """A search that is invalid or names an unknown column."""
-
-
 class RunClosed(StorageError):
     """A run that is read after its ``with`` ended."""
 

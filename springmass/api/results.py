@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any, Literal
 
-from springmass.batch.rows import NUMBERS, UNITS, WHOLE, columns_of
-from springmass.batch.store import open_course, table_rows
+from springmass.batch.rows import NUMBERS, UNITS, WHOLE, columns_of, read_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,12 +34,12 @@ def results(
     Raises
     ------
     springmass.errors.ProgramError
-        If the folder contains no complete course, or its rows are damaged.
+        If the folder contains no course, or its table is damaged.
     """
     import pandas as pd
 
-    store = open_course(folder)
-    frame = pd.DataFrame(list(table_rows(store)), columns=columns_of(store.tags))
+    rows, tags = read_rows(folder)
+    frame = pd.DataFrame(rows, columns=columns_of(tags))
     for name in frame.columns:
         if name in NUMBERS:
             frame[name] = frame[name].astype("float64")

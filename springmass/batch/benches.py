@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,39 +16,20 @@ from pipeline.numerics.estimate import Estimate, format_value
 from pipeline.results.compare import SpringRun
 from pipeline.results.course import Agreement, CourseRun, Disagreement, Suspect, agreement, judged
 from springmass.batch.rows import COURSE
-from springmass.errors import UNREADABLE, USAGE, ProgramError
-
-__all__ = ["CourseComparison", "compare_rows", "compared_json", "compared_text"]
+from springmass.errors import UNREADABLE, ProgramError
 
 BENCHES = ("bench", "group", "section", COURSE)
 """Candidate columns that distinguish benches; the first one that the course has is used."""
-NEEDED = (
-    "run", COURSE, "status", "law", "unit", "clock", "u_clock", "drag_points",
-    *(name for x in ("spring_constant", "natural_angular_frequency", "own_mass_kg", "bob_mass_kg", "spring_mass_kg",
-                     "disc_diameter_m", "amplitude") for name in (x, f"{x}_u")),
-)  # fmt: skip
-"""Columns that a comparison reads, next to the course's own."""
 SCATTERED = 0.1  # maximum scatter of a spring's constants, over their mean: beyond it they have no common value
 
 
 @dataclass(frozen=True, slots=True)
 class CourseComparison:
-    """A comparison of many runs.
+    """A comparison of the runs with a period; ``bench`` is the column that distinguishes benches.
 
-    Parameters
-    ----------
-    runs : int
-        Number of runs with a period.
-    bench : str
-        The column that distinguishes benches.
-    agreements : tuple of Agreement
-        Agreement of spring constants for each spring and of drag coefficients for each disc, without the suspects.
-    suspects : tuple of Suspect
-        Runs with an implausible mass, and runs that differ from their course.
-    disagreements : tuple of Disagreement
-        Benches whose other runs of one spring disagree.
-    laws : mapping of str to int
-        Number of runs for which each damping law was selected.
+    The agreements are of the spring constants of each spring and the drag coefficients of each disc, without the
+    suspects: runs with an implausible mass, and runs that differ from their course. ``disagreements`` are benches whose
+    other runs of one spring disagree, and ``laws`` counts for how many runs each damping law was selected.
     """
 
     runs: int
@@ -58,28 +40,16 @@ class CourseComparison:
     laws: Mapping[str, int]
 
 
-def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None) -> CourseComparison:
-    """Compare the runs of a course.
+def compare_rows(rows: Sequence[Mapping[str, Any]]) -> CourseComparison:
+    """Compare the runs of one course or of several, given as rows of their tables with the column ``course``.
 
-    Parameters
-    ----------
-    rows : sequence of mapping
-        Rows of the table by column. The columns ``spring`` and ``disc`` distinguish springs and discs if a row has
-        them; otherwise the spring's mass and the disc's diameter do.
-    bench : str, optional
-        The column that distinguishes benches; if omitted, the first of :data:`BENCHES` that exists.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if the column does not exist, 3 if fewer than two runs have a period.
+    The columns ``spring`` and ``disc`` distinguish springs and discs if a row has them; otherwise the spring's mass and
+    the disc's diameter do.
     """
     moving = [row for row in rows if row["status"] == "ok"]
     if len(moving) < 2:
-        raise ProgramError(f"compare needs two runs with a period, got {len(moving)}; see --where", UNREADABLE)
-    if bench is not None and bench not in moving[0]:
-        raise ProgramError(f"--bench: the course has no column {bench!r}; name another", USAGE)
-    by = bench or next(name for name in BENCHES if name in moving[0])
+        raise ProgramError(f"compare needs two runs with a period, got {len(moving)}; name a larger course", UNREADABLE)
+    by = next(name for name in BENCHES if any(name in row for row in moving))
     courses = {row[COURSE] for row in moving}
     runs = [_run(row, by, alone=len(courses) == 1) for row in moving]
     differing, disagreements = judged(runs)
@@ -92,10 +62,7 @@ def compare_rows(rows: Sequence[Mapping[str, Any]], *, bench: str | None = None)
                 groups.setdefault(getattr(run, label), []).append(run)
         for name, group in sorted(groups.items()):
             agreements.append(_agreement(quantity, name, [run for run in group if run.name not in named]))
-    counts: dict[str, int] = {}
-    for row in moving:
-        if row["law"]:
-            counts[row["law"]] = counts.get(row["law"], 0) + 1
+    counts = Counter(row["law"] for row in moving if row.get("law"))
     laws = dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
     return CourseComparison(len(runs), by, tuple(agreements), differing, disagreements, laws)
 
@@ -123,21 +90,21 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
     name = row["run"] if alone else f"{row[COURSE]}: {row['run']}"
     k, omega, mass = (_estimate(row, x) for x in ("spring_constant", "natural_angular_frequency", "own_mass_kg"))
     bob, spring = _estimate(row, "bob_mass_kg"), _estimate(row, "spring_mass_kg")
-    points = np.array(json.loads(row["drag_points"] or "[]"))
+    points = np.array(json.loads(row.get("drag_points") or "[]"))
     middle = points[len(points) // 2] if len(points) else None
     on_spring = own = None
     if k is not None and omega is not None and mass is not None:
-        on_spring = SpringRun(name, omega, mass, row["u_clock"] or 0.0, row["clock"] or "")
+        on_spring = SpringRun(name, omega, mass, row.get("u_clock") or 0.0, row.get("clock") or "")
         own = Estimate(k.value, k.value * math.hypot(2.0 * omega.u / omega.value, mass.u / mass.value), "N/m")
     return CourseRun(
         name=name,
         spring=_label(row, "spring", "spring_mass_kg"),
         disc=_label(row, "disc", "disc_diameter_m"),
-        bench=str(row[bench] or ""),
+        bench=str(row.get(bench) or ""),
         spring_constant=own,
         drag=None if middle is None else Estimate(float(middle[2]), float(middle[3])),
         amplitude=_estimate(row, "amplitude"),
-        unit=row["unit"] or "",
+        unit=row.get("unit") or "",
         on_spring=on_spring,
         spring_mass_kg=spring,
         implausible="; ".join(Scene(bob_mass_kg=bob).unusual()),
@@ -145,23 +112,13 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
 
 
 def _label(row: Mapping[str, Any], tag: str, scene: str) -> str:
-    label = row.get(tag)
-    if label is None:
-        label = row[scene]
+    label = row.get(scene) if row.get(tag) is None else row[tag]
     return "" if label is None else str(label)
 
 
 def _estimate(row: Mapping[str, Any], name: str) -> Estimate | None:
-    value, u = row[name], row[f"{name}_u"]
-    return None if value is None or u is None else Estimate(float(value), float(u))
-
-
-def compared_json(comparison: CourseComparison) -> dict[str, Any]:
-    """Return a comparison as a JSON-serialisable mapping."""
-    from springmass.runs.json_results import SCHEMA, plain
-
-    fields: dict[str, Any] = plain(comparison)
-    return {"schema": SCHEMA, **fields}
+    value, u = row.get(name), row.get(f"{name}_u")
+    return None if value is None or u is None else Estimate(value, u)
 
 
 def compared_text(comparison: CourseComparison) -> str:

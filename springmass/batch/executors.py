@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -14,41 +14,24 @@ from typing import Any, TypeVar
 from springmass.errors import SOME_FAILED, USAGE, ProgramError
 from springmass.runs.processes import cores, pool
 
-__all__ = ["BATCH", "LOST", "Lost", "Workers", "dask_workers", "local_workers", "outcomes"]
-
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-BATCH = 100  # maximum tasks per batch; to hand out a single run, dask takes three times as long as its analysis
+BATCH = 25  # tasks per batch: what is lost if the program is killed, per process
 AHEAD = 2  # batches handed out per worker, so that no worker waits for its next batch
 FEW = 3  # up to this many tasks, starting a second process takes longer than it saves
 
 
-class Lost:
-    """Placeholder for the result of a task whose worker died."""
-
-
-LOST = Lost()
-
-
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """The workers that do the tasks.
+    """Who does the tasks: ``start`` makes an executor, again after a worker has died.
 
-    Parameters
-    ----------
-    start : callable
-        Returns a context manager for an executor; called again for a new one after a worker has died.
-    count : int or None
-        Number of tasks done at the same time; None if workers come and go.
-    died : tuple of type
-        Exceptions that a future raises if the worker of its task died.
-    address : str
-        Address of the scheduler; empty if all work is done on this machine.
+    ``count`` tasks are done at the same time; None if workers come and go. ``died`` is what a future raises if its
+    worker died. The address of a scheduler is empty if all work is done on this machine.
     """
 
     start: Callable[[], AbstractContextManager[Executor]]
     count: int | None
-    died: tuple[type[BaseException], ...] = (BrokenExecutor,)
+    died: type[BaseException] = BrokenExecutor
     address: str = ""
 
 
@@ -61,12 +44,17 @@ class _ThisProcess(Executor):
         return future
 
 
-def local_workers(tasks: int, processes: int | None = None) -> Workers:
-    """Return processes of this machine, by default one per core; for a few tasks, return only this process."""
+@contextlib.contextmanager
+def workers(tasks: int, processes: int | None = None, dask: str | None = None) -> Iterator[Workers]:
+    """Yield those of a dask cluster, or processes of this machine, by default one per core."""
     number = min(processes or cores(), tasks)
-    if number <= 1 or tasks <= FEW:
-        return Workers(_ThisProcess, 1)
-    return Workers(lambda: _pool(number), number)
+    if dask is not None:
+        with _dask(dask) as cluster:
+            yield cluster
+    elif number <= 1 or tasks <= FEW:
+        yield Workers(_ThisProcess, 1)
+    else:
+        yield Workers(lambda: _pool(number), number)
 
 
 @contextlib.contextmanager
@@ -83,14 +71,8 @@ def _pool(processes: int) -> Iterator[Executor]:
 
 
 @contextlib.contextmanager
-def dask_workers(address: str) -> Iterator[Workers]:
-    """Yield the workers of a dask cluster, which must find the inputs at the same paths as this process.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if dask is not installed or no scheduler answers at the address.
-    """
+def _dask(address: str) -> Iterator[Workers]:
+    """Yield the workers of a cluster, which must find the inputs at the same paths as this process."""
     try:
         from distributed import Client, KilledWorker
     except ImportError as error:
@@ -111,81 +93,59 @@ def dask_workers(address: str) -> Iterator[Workers]:
             executor.shutdown(wait=False)
 
     with client:
-        yield Workers(start, None, (KilledWorker,), address)
+        yield Workers(start, None, KilledWorker, address)
 
 
 def outcomes(
-    work: Callable[[Sequence[Task]], Result], tasks: Sequence[Task], workers: Workers, *, batch: int = BATCH
-) -> Iterator[tuple[Sequence[Task], Result | Lost]]:
-    """Yield batches of tasks with their results, as they are finished.
+    work: Callable[[Sequence[Task]], Result], tasks: Sequence[Task], by: Workers, size: int = BATCH
+) -> Iterator[tuple[Sequence[Task], Result | None]]:
+    """Yield batches of tasks with their results, as they are finished; ``work`` is picklable.
 
-    If a worker dies, the batches that were handed out are lost. Their tasks are repeated, each as a separate batch. If
-    a worker dies again during such a task, its result is :data:`LOST`.
-
-    Parameters
-    ----------
-    work : callable
-        Picklable function that takes a batch and returns its result.
-    tasks : sequence
-    workers : Workers
-    batch : int
-        Maximum number of tasks per batch. If the number of workers is known, each gets at least four batches, so that
-        none waits long for the last worker. Only :data:`AHEAD` batches per worker are then handed out at a time;
-        otherwise all batches are handed out immediately.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 1 if the workers of a cluster disappear or cannot do this work.
+    If a worker dies, the tasks of the batches that were handed out are repeated one by one. If a worker dies again
+    during such a task, its result is None. Each worker gets at least four batches, so that none waits long for the
+    last one; :data:`AHEAD` batches per worker are handed out at a time, or all of them if workers come and go.
     """
-    size = batch if workers.count is None else max(1, min(batch, len(tasks) // (4 * workers.count)))
-    waiting: deque[Sequence[Task]] = deque(tasks[at : at + size] for at in range(0, len(tasks), size))
+    if by.count is not None:
+        size = max(1, min(size, len(tasks) // (4 * by.count)))
+    waiting = deque(tasks[at : at + size] for at in range(0, len(tasks), size))
     while waiting:
-        interrupted: list[Task] = []
-        ahead = len(waiting) if workers.count is None else AHEAD * workers.count
-        for done, result in _until_one_dies(work, waiting, workers, ahead):
-            if isinstance(result, Lost):
-                interrupted += done
-            else:
-                yield done, result
-        alone: deque[Sequence[Task]] = deque([task] for task in interrupted)
+        lost = yield from _until_one_dies(work, waiting, by, AHEAD * by.count if by.count else len(waiting))
+        alone: deque[Sequence[Task]] = deque([task] for batch in lost for task in batch)
         while alone:
-            yield from _until_one_dies(work, alone, workers, 1)
+            twice = yield from _until_one_dies(work, alone, by, 1)
+            yield from ((batch, None) for batch in twice)
 
 
 def _until_one_dies(
-    work: Callable[[Sequence[Task]], Result], waiting: deque[Sequence[Task]], workers: Workers, ahead: int
-) -> Iterator[tuple[Sequence[Task], Result | Lost]]:
-    """Yield batches and results of one executor until a worker dies.
-
-    Batches lost with the worker are yielded last, with :data:`LOST`; batches not yet handed out stay in ``waiting``.
-    """
+    work: Callable[[Sequence[Task]], Result], waiting: deque[Sequence[Task]], by: Workers, ahead: int
+) -> Generator[tuple[Sequence[Task], Result], None, list[Sequence[Task]]]:
+    """Yield batches and results of one executor until a worker dies; return the batches that were lost with it."""
     running: dict[Future[Result], Sequence[Task]] = {}
     lost: list[Sequence[Task]] = []
-    with workers.start() as executor:
+    with by.start() as executor:
         try:
             while running or (waiting and not lost):
                 while waiting and not lost and len(running) < ahead:
                     batch = waiting.popleft()
                     try:
                         running[executor.submit(work, batch)] = batch
-                    except workers.died:
+                    except by.died:
                         lost.append(batch)
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     batch = running.pop(future)
                     try:
                         result = future.result()
-                    except workers.died:
+                    except by.died:
                         lost.append(batch)
                     except (CancelledError, Exception) as error:
-                        if not workers.address:
+                        if not by.address:
                             raise
                         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-                        message = f"{workers.address}: a batch of runs failed ({reason}); run springmass batch again"
+                        message = f"{by.address}: a batch of runs failed ({reason}); run springmass batch again"
                         raise ProgramError(message, SOME_FAILED) from error
                     else:
                         yield batch, result
         finally:
             for future in running:
                 future.cancel()
-    yield from ((batch, LOST) for batch in lost)
+    return lost

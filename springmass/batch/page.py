@@ -1,93 +1,102 @@
-"""Write the page of a course: a sortable table of all runs, with those that most need inspection first."""
+"""Write the page of a course, with the runs that most need inspection first, and what to tell each group."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 from urllib.parse import quote
+
+import numpy as np
 
 from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.course import LITTLE
 from springmass.batch.benches import BENCHES, CourseComparison
-from springmass.batch.reports import REPORTS, Need, need_of, report_name
 from springmass.batch.rows import COURSE, FAILED
-from springmass.batch.store import GROUPS, PAGE, Store
 from springmass.charts.chart import Chart
+from springmass.charts.drag_map import DragRun, drag_map
 from springmass.charts.several import course
 from springmass.report.advice import sentence
 from springmass.terminal.printing import visible_lines
-from storage.atomic import writing
+from storage.atomic import write_whole
 
-SHOWN = (
-    ("period", "T", "s"),
-    ("spring_constant", "k", "N/m"),
-    ("amplitude", "A₀", ""),
-    ("damping_rate", "λ", "1/s"),
-    ("drag_coefficient", "C_d", ""),
-)
-"""Estimates with a column: name, symbol and unit; an empty unit means none, or that of the run."""
-
+PAGE, GROUPS = "index.html", "groups.txt"
+SHOWN = {
+    "period": "T / s",
+    "spring_constant": "k / (N/m)",
+    "amplitude": "A₀",
+    "damping_rate": "λ / (1/s)",
+    "drag_coefficient": "C_d",
+}
+"""Estimates with a column, and its heading; amplitudes have the unit of their run."""
 LOOKS = ("failed", "error", "warning", "fine")
+_STATUS = {"ok": 0, "no_oscillation": 1}
 
 
-def write_page(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[str], reports: set[str]) -> None:
-    """Write ``index.html``."""
+def write_page(
+    folder: Path, rows: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]], tags: Sequence[str]
+) -> None:
+    """Write ``index.html``; the link of a line is empty if its run has no report."""
     from springmass.report.html import Figures, drawn_by_script, template
     from springmass.report.script import SHARED
 
-    there = [i for i in range(len(SHOWN)) if any(line["cells"][i][1] for line in lines)]  # only with numbers
-    shown = [
-        {**line, "cells": [line["cells"][i] for i in there], "link": _link(line["name"], reports)} for line in lines
-    ]
-    shown.sort(key=lambda line: (*(-x for x in line["need"]), line["name"]))
+    there = [name for name in SHOWN if any(line["cells"][name] for line in lines)]  # only with numbers
+    shown = [{**line, "link": quote(line["link"])} for line in lines]
     figures = Figures()
-    chart = _chart(lines)
-    figure = None if chart is None else figures.add(chart)
-    counts = {kind: sum(line["look"] == kind for line in shown) for kind in LOOKS}
+    differing = {visible(line["name"]): line["differs"] for line in lines if line["differs"]}
+    drawn = [figures.add(chart) for chart in (_of_all(rows, differing), _of_drag(rows)) if chart is not None]
     page = template("course.html.j2").render(
-        title=store.folder.resolve().name,
-        lines=shown,
+        title=folder.resolve().name,
+        lines=sorted(shown, key=lambda line: (*(-x for x in line["need"]), line["name"])),
         tags=tags,
-        quantities=[SHOWN[i] for i in there],
-        counts=counts,
-        figure_of_runs=figure,
+        quantities={name: SHOWN[name] for name in there},
+        counts={kind: sum(line["look"] == kind for line in shown) for kind in LOOKS},
+        figures={figure["name"]: figure for figure in drawn},
         **drawn_by_script(figures.charts, SHARED),
     )
-    with store.output(PAGE) as temporary, writing(store.folder / PAGE):
-        temporary.write_bytes(page.encode("utf-8", "backslashreplace"))
+    write_whole(folder / PAGE, page.encode("utf-8", "backslashreplace"))
 
 
-def _chart(lines: Sequence[Mapping[str, Any]]) -> Chart | None:
+def _of_all(rows: Sequence[Mapping[str, Any]], differing: Mapping[str, str]) -> Chart | None:
     """Return the chart of all spring constants, or else of all periods, if at least two runs have one."""
     for name, label in (("spring_constant", "spring constant / (N/m)"), ("period", "period / s")):
-        rows = [(line["name"], *line["estimates"].get(name, (None, None))) for line in lines]
-        known = [(visible(run), value, u or 0.0) for run, value, u in rows if value is not None]
+        known = [(visible(row["run"]), row[name], row[f"{name}_u"] or 0.0) for row in rows if row.get(name) is not None]
         if len(known) > 1:
-            return course(label, known)
+            return course(label, known, differing)
     return None
 
 
-def _link(name: str, reports: set[str]) -> str:
-    report = report_name(name)
-    return f"{REPORTS}/{quote(report)}/report.html" if report in reports else ""
+def _of_drag(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
+    """Return the map of the drag coefficients of all runs that have some."""
+    return drag_map(
+        [
+            DragRun(row.get("disc") or f"{1e3 * row['disc_diameter_m']:.4g} mm", np.array(json.loads(points)))
+            for row in rows
+            if (points := row.get("drag_points"))
+        ]
+    )
 
 
 def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
-    """Return the line that the page shows for a run, from its row and the course's own columns."""
+    """Return the line that the page shows for a run; the larger ``need``, the more it needs inspection.
+
+    That is whether it has no period, its errors, its findings that change a result, and its misfit, in this order.
+    """
     failed = row["status"] in FAILED
     look = "failed" if failed else "error" if row["errors"] else "warning" if row["tell"] else "fine"
     return {
         "name": row["run"],
+        "link": "",
         "look": look,
-        "need": need_of(row),
+        "need": [_STATUS.get(row["status"], 2), row["errors"], len(row["tell"]), row.get("reduced_chi2") or 0.0],
         "tell": [row["error"]] if failed else row["tell"],
-        "notes": [message for _, message in row["messages"]],
-        "codes": "" if failed else ", ".join(row["findings"]),
-        "tags": [row["job"]["tags"].get(tag, "") for tag in tags],
-        "cells": [_cell(row, quantity, unit) for quantity, _, unit in SHOWN],
+        "notes": [message for _, message in json.loads(row.get("messages") or "[]")],
+        "differs": "",
+        "tags": [row[tag] or "" for tag in tags],
+        "cells": {name: _cell(row, name) for name in SHOWN},
         "law": row.get("law") or "",
-        "estimates": row["estimates"],
         "thumbnail": row["thumbnail"],
     }
 
@@ -105,12 +114,11 @@ def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
             line["tell"] = [sentence(message), *line["tell"]]
         if LOOKS.index(look) < LOOKS.index(line["look"]):
             line["look"] = look
-        need: Need = line["need"]
-        counted = {"errors": need.errors + 1} if look == "error" else {"harmful": need.harmful + 1}
-        line["need"] = need._replace(**counted)
+        line["need"][1 if look == "error" else 2] += 1
+        line["differs"] = line["differs"] or (message if look == "error" else "")
 
 
-def write_groups(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequence[str]) -> None:
+def write_groups(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequence[str]) -> None:
     """Write ``groups.txt``: a paragraph for each group, with what to tell it."""
     column = next((tags.index(name) for name in BENCHES if name in tags), None)
     groups: dict[str, list[Mapping[str, Any]]] = {}
@@ -126,15 +134,13 @@ def write_groups(store: Store, lines: Sequence[Mapping[str, Any]], tags: Sequenc
         title = "All runs" if column is None else f"{tags[column]} {name}" if name else f"without {tags[column]}"
         texts = [f"  {', '.join(names)}: {text}" for text, names in runs_of.items()] or ["  nothing to mend"]
         paragraphs.append("\n".join([f"{title}: {runs}", *texts]))
-    with store.output(GROUPS) as temporary, writing(store.folder / GROUPS):
-        temporary.write_bytes(visible_lines("\n\n".join(paragraphs)).encode("utf-8", "backslashreplace") + b"\n")
+    text = visible_lines("\n\n".join(paragraphs))
+    write_whole(folder / GROUPS, text.encode("utf-8", "backslashreplace") + b"\n")
 
 
-def _cell(row: Mapping[str, Any], quantity: str, unit: str) -> tuple[str, str, str]:
-    """Return an estimate's label, its text, and its value as the sort key."""
-    value, u = row["estimates"].get(quantity, (None, None))
-    label = next(symbol for name, symbol, _ in SHOWN if name == quantity)
+def _cell(row: Mapping[str, Any], name: str) -> tuple[str, str] | None:
+    """Return an estimate's text, and its value as the sort key."""
+    value, u = row.get(name), row.get(f"{name}_u")
     if value is None or u is None:
-        return label, "", ""
-    unit = unit or (row["unit"] if quantity == "amplitude" else "")
-    return label, repr(Estimate(value, u, unit)), repr(value)
+        return None
+    return repr(Estimate(value, u, row["unit"] if name == "amplitude" else "")), repr(value)

@@ -1,53 +1,40 @@
-"""Turn inputs into jobs: find the runs and the known values of each."""
+"""Turn inputs into jobs: find the runs and the known values of each, and what its row depends on."""
 
 from __future__ import annotations
 
 import functools
 import glob
 import hashlib
+import json
 import os
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from acquisition.recordings.base import dialect_folder
-from acquisition.regular_file import open_regular_text, read_regular
+from acquisition.regular_file import open_regular, open_regular_text, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import SceneError
-from springmass.batch.course import POSITION, Entry, join, read_course
-from springmass.batch.rows import dumped
+from springmass.batch.runs_csv import ANSWERS, LAW, POSITION, Values, join, read_table
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 from springmass.layout import PACKAGES, part
+from springmass.runs.about import about_path
 from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.outputs import numbered
 from springmass.runs.scenes import read_scene
 
-__all__ = ["Job", "Plan", "code_sha256", "names_of", "plan"]
-
-_GLOB = "*?["
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
+_CODE = (".py", ".toml", ".j2", ".css", ".js")
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One run to analyse.
+    """One run to analyse: its path as the inputs name it, and what is known of it.
 
-    Parameters
-    ----------
-    path : str
-        Path as given in the inputs.
-    folder : str
-        Start of relative paths: the folder in which the plan was made.
-    answers : mapping
-        Answers to what the recording leaves open: reading options of :class:`springmass.runs.options.ReadOptions`.
-    scene : mapping or None
-        Scene given for this run, by table and key; None: the scene that the recording carries.
-    tags : mapping of str to str
-    accuracy : str
-    law : str or None
-        Stated damping law, in the form that :func:`springmass.runs.analysing.with_law` takes.
+    Relative paths start from ``folder``. ``answers`` are reading options, and ``scene`` is the given one by table and
+    key, or None for the one that the recording carries.
     """
 
     path: str
@@ -56,13 +43,12 @@ class Job:
     scene: Mapping[str, Any] | None
     tags: Mapping[str, str]
     accuracy: str
-    law: str | None = None
+    law: str | None
 
     @property
     def key(self) -> str:
-        """Key that distinguishes this run from others: its path, and the run and channel within the file."""
-        which = [self.answers.get(name) for name in ("run", "channel")]
-        return dumped([self.path, *which]) if any(which) else self.path
+        """What distinguishes this run from others: its path, and the run and channel within the file."""
+        return json.dumps([self.path, self.answers.get("run"), self.answers.get("channel")])
 
     @property
     def scene_sha256(self) -> str:
@@ -74,14 +60,11 @@ class Job:
         """Digest of accuracy, answers and stated law."""
         return _digest({"accuracy": self.accuracy, "answers": self.answers, "law": self.law})
 
-    def to_mapping(self) -> dict[str, Any]:
-        """Return the job as stored in a row for a later analysis: everything except the folder, which may change."""
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "folder"}
-
-    @classmethod
-    def from_mapping(cls, job: Mapping[str, Any], folder: str) -> Job:
-        """Return the job stored in a row; its relative paths start from the folder."""
-        return cls(**job, folder=folder)
+    def made_of(self) -> str:
+        """Return a digest of all on which the run's row and report depend; this reads the files."""
+        files = (self.path, self.answers.get("velocity"), str(about_path(Path(self.path))))
+        read = [digest_of(self.whole(path)) if path else "" for path in files]
+        return _digest([*read, self.scene_sha256, self.parameters_sha256, code_sha256()])
 
     def whole(self, path: str) -> str:
         """Return a path that every process can find."""
@@ -90,17 +73,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The jobs of a course.
-
-    Parameters
-    ----------
-    jobs : tuple of Job
-        Jobs sorted by path.
-    tags : tuple of str
-        The course's own columns.
-    notes : tuple of str
-        Messages for the user before the work begins, one line each.
-    """
+    """The jobs of a course sorted by path, the course's own columns, and lines for the user."""
 
     jobs: tuple[Job, ...]
     tags: tuple[str, ...]
@@ -116,62 +89,42 @@ def plan(
     law: str | None = None,
     answers: Mapping[str, Any] | None = None,
     known: Collection[str] = (),
-    but: Collection[str] = (),
+    output: str | None = None,
 ) -> Plan:
     """Find the runs of a course and the known values of each.
 
-    Parameters
-    ----------
-    inputs : sequence of str
-        Files, folders with all their contents, patterns, and lists: ``@FILE`` names a file with one path per line. If
-        there are no inputs, the files that the table of runs names are used.
-    runs_csv : str, optional
-        Table of runs, see :func:`springmass.batch.course.read_course`.
-    scene : str, optional
-        Scene file for all runs; values in the table take precedence.
-    accuracy : str
-    law : str, optional
-        Damping law of all runs; the table takes precedence.
-    answers : mapping, optional
-        Reading options for all runs; the table takes precedence.
-    known : collection of str
-        Paths that an earlier pass identified as recordings.
-    but : collection of str
-        Absolute paths of files and folders to leave out.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 or 3 and a message of one line.
+    Inputs are files, folders with all their contents, patterns, and lists: ``@FILE`` names a file with one path per
+    line; without inputs, the files that the table of runs names. Scene, law and answers are for all runs, and the table
+    takes precedence. ``known`` are paths that an earlier pass identified as recordings, ``output`` is left out.
     """
-    course = None if runs_csv is None else read_course(runs_csv)
-    out = {*but, *(() if runs_csv is None else (os.path.abspath(runs_csv),))}
-    texts = list(_expanded(inputs)) if inputs or course is None else course.files()
+    table = None if runs_csv is None else read_table(runs_csv)
+    out = {os.path.abspath(path) for path in (output, runs_csv) if path is not None}
+    texts = list(_expanded(inputs)) if inputs or table is None else table.files()
     # A file that the table names is a run even if it cannot be read.
-    named = {os.path.abspath(path) for path in (*known, *(() if course is None else course.files()))}
+    named = {os.path.abspath(path) for path in (*known, *(() if table is None else table.files()))}
     recordings, notes = files_of(texts, deep=True, known=named, but=out)
     first: dict[str, InputFile] = {}
     for recording in recordings:  # a file named by several inputs is one run
         first.setdefault(os.path.abspath(recording.path), recording)
     files = sorted(first.values(), key=lambda recording: recording.path)
-    if course is None:
-        tags: tuple[str, ...] = ()
-        joined = [(recording, Entry()) for recording in files]
-    else:
-        joined, unused, without = join(course, files)
-        tags = course.tags
-        notes += [f"{course.path}, {row}: no file of the inputs belongs to this row" for row in unused]
-        notes += [f"{course.path}: no row belongs to {path}" for path in without]
-        if tags:
-            notes.append(f"{course.path}: tags: {', '.join(tags)}")
+    joined: list[tuple[InputFile, int, Values]] = [(recording, 0, {}) for recording in files]
+    tags: tuple[str, ...] = ()
+    if table is not None:
+        joined, said = join(table, files)
+        tags = table.tags
+        notes += [*said, *([f"{table.path}: tags: {', '.join(tags)}"] if tags else [])]
     shared = None if scene is None else read_scene(scene)
     if shared is not None and shared.damping_law is not None and law is None:
         notes.insert(0, f"damping law {shared.damping_law}: stated in {scene}")
-    jobs = tuple(
-        replace(_job(file, entry, shared, accuracy, answers or {}, str(runs_csv)), law=entry.law or law)
-        for file, entry in joined
-    )
-    return Plan(jobs, tags, tuple(notes))
+    given = {name: value for name, value in (answers or {}).items() if value not in (None, False)}
+    jobs = []
+    for file, line, values in joined:
+        read = given | ({} if file.velocity is None else {"velocity": file.velocity})
+        read |= {name: values[name] for name in ANSWERS if name in values}
+        stated = _scene(values, shared, f"{runs_csv}, line {line}")
+        of_tags = {name: values[name] for name in tags if name in values}
+        jobs.append(Job(file.path, os.getcwd(), read, stated, of_tags, accuracy, values.get(LAW, law)))
+    return Plan(tuple(jobs), tags, tuple(notes))
 
 
 def _expanded(inputs: Sequence[str]) -> list[str]:
@@ -179,7 +132,7 @@ def _expanded(inputs: Sequence[str]) -> list[str]:
     for text in inputs:
         if text.startswith("@") and not os.path.exists(text):
             texts += _listed(Path(text[1:]))
-        elif any(mark in text for mark in _GLOB) and not os.path.exists(text):
+        elif any(mark in text for mark in "*?[") and not os.path.exists(text):
             matched = sorted(glob.glob(text, recursive=True))
             if not matched:
                 raise ProgramError(f"{text}: no file matches this pattern", UNREADABLE)
@@ -198,41 +151,23 @@ def _listed(path: Path) -> list[str]:
     return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
 
 
-def _job(
-    file: InputFile, entry: Entry, shared: Scene | None, accuracy: str, answers: Mapping[str, Any], where: str
-) -> Job:
-    given = read_scene(entry.scene_file) if entry.scene_file else shared
+def _scene(values: Values, shared: Scene | None, where: str) -> dict[str, Any] | None:
+    """Return the scene that a run is given, with the values of the table in place of those of a file."""
+    given = read_scene(values["scene"]) if "scene" in values else shared
     tables = {} if given is None else given.to_mapping()
-    for name, value in entry.scene.items():
-        table, key = ("sensor", "position") if name == POSITION else PLACES[name]
-        number = value if name == POSITION else {"value": value[0], "u": value[1]} if value[1] else value[0]
-        tables.setdefault(table, {})[key] = number
+    if POSITION in values:
+        tables.setdefault("sensor", {})["position"] = values[POSITION]
+    for name in PLACES.keys() & values.keys():
+        (table, key), (value, u) = PLACES[name], values[name]
+        tables.setdefault(table, {})[key] = {"value": value, "u": u} if u else value
     try:
-        scene = Scene.from_mapping(tables, where=f"{where}, line {entry.line}") if tables else None
+        return Scene.from_mapping(tables, where=where).to_mapping() if tables else None
     except SceneError as error:
         raise ProgramError(str(error), USAGE) from error
-    known = {name: value for name, value in answers.items() if value not in (None, False)}
-    if file.velocity is not None:
-        known["velocity"] = file.velocity
-    return Job(
-        file.path,
-        os.getcwd(),
-        {**known, **entry.answers},
-        None if scene is None else scene.to_mapping(),
-        dict(entry.tags),
-        accuracy,
-    )
 
 
 def names_of(jobs: Sequence[Job]) -> list[str]:
-    """Return a name per run: its path below the common folder, without suffix, with repeated names numbered.
-
-    Examples
-    --------
-    >>> jobs = [Job(path, "/", {}, None, {}, "fast") for path in ("c/a/1.txt", "c/b/1.txt", "c/b/1.csv")]
-    >>> names_of(jobs)
-    ['a/1', 'b/1', 'b/1-2']
-    """
+    """Return a name per run: its path below the common folder, without suffix, with repeated names numbered."""
     if not jobs:
         return []
     whole = [os.path.abspath(job.whole(job.path)) for job in jobs]
@@ -242,16 +177,24 @@ def names_of(jobs: Sequence[Job]) -> list[str]:
 
 @functools.cache
 def code_sha256() -> str:
-    """Return the digest of a row's dependencies except its run: program, library versions and the user's dialects."""
+    """Return the digest of the program, the versions of its libraries and the user's dialects."""
     # In a wheel the packages are in another place; without ``part``, rows of an older program would count as unchanged.
-    rooms = [*map(part, PACKAGES), *(Path(__file__).resolve().parents[1] / room for room in ("batch", "runs"))]
-    parts = [f"{name} {version(name)}".encode() for name in _LIBRARIES]
-    files = [file for room in rooms for file in sorted(room.rglob("*.py"))]
+    rooms = [*map(part, PACKAGES), Path(__file__).resolve().parents[1]]
+    files = [file for room in rooms for file in sorted(room.rglob("*")) if file.suffix in _CODE]
     if (dialects := dialect_folder()).is_dir():
         files += sorted(dialects.glob("*.toml"))
-    parts += [read_regular(file) for file in files]
-    return hashlib.sha256(b"\0".join(parts)).hexdigest()
+    versions = [f"{name} {version(name)}".encode() for name in _LIBRARIES]
+    return hashlib.sha256(b"\0".join([*versions, *map(read_regular, files)])).hexdigest()
+
+
+def digest_of(path: str) -> str:
+    """Return the SHA-256 of a file in hexadecimal digits; empty if it cannot be read."""
+    try:
+        with open_regular(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except (OSError, ValueError):
+        return ""
 
 
 def _digest(value: object) -> str:
-    return hashlib.sha256(dumped(value).encode("utf-8", "backslashreplace")).hexdigest()
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()

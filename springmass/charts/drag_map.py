@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.errors import visible
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, line_of
+
+POINTS = 8  # of one run
+LARGEST = 1e100  # whose square is still finite
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,6 +23,29 @@ class DragRun:
 
     disc: str
     points: F8
+
+
+def drag_points(analysis: Analysis) -> list[list[float]]:
+    """Return Re, KC, drag coefficient and its u at amplitudes spaced evenly on a logarithmic scale."""
+    motion, diameter, estimates = analysis.motion, analysis.scene.disc_diameter_m, analysis.estimates
+    if not isinstance(motion, Oscillation):
+        return []
+    derived = motion.derived
+    curve = derived.drag_curve(motion.damping, motion.demodulated)
+    if curve is None or diameter is None or derived.displacement is None or "reynolds_number" not in estimates:
+        return []
+    lengths: F8 = curve.x * derived.displacement.value
+    order = np.argsort(lengths)
+    if not lengths[order[0]] > 0:
+        return []
+    at = np.geomspace(lengths[order[0]], lengths[order[-1]], POINTS)
+    value, u = (np.interp(at, lengths[order], each[order]) for each in (curve.y, curve.u))
+    # The Re estimate uses the rms velocity of the whole run; at amplitude A the rms velocity is omega A / sqrt 2.
+    per_velocity = estimates["reynolds_number"].value / estimates["velocity_rms"].value
+    reynolds = per_velocity * estimates["angular_frequency"].value * at / np.sqrt(2.0)
+    points = np.column_stack([reynolds, 2.0 * np.pi * at / diameter.value, value, u])
+    kept = np.isfinite(points).all(axis=1) & (np.abs(points).max(axis=1) <= LARGEST)
+    return [[float(f"{x:.6g}") for x in point] for point in points[kept].tolist()]
 
 
 def drag_of_disc_at_rest(reynolds: F8) -> F8:
@@ -40,23 +67,21 @@ def drag_of_plate(keulegan_carpenter: F8) -> F8:
     return np.maximum(10.0 * keulegan_carpenter ** (-1.0 / 3.0), 1.95)
 
 
-def drag_map(runs: Sequence[DragRun]) -> Chart:
-    """Return the map: one line per disc with the band of each run; ValueError without a positive coefficient."""
-    if not any((run.points[:, 2] > 0).any() for run in runs):
-        raise ValueError("a map of drag needs a run with a positive drag coefficient")
+def drag_map(runs: Sequence[DragRun]) -> Chart | None:
+    """Return the map, with one line per disc and the band of each run; None without a positive coefficient."""
+    runs = [run for run in runs if len(run.points) and (run.points[:, 2] > 0.0).any()]
+    if not runs:
+        return None
     panels = []
     for column, label in enumerate(("Reynolds number", "Keulegan-Carpenter number")):
         series, ends, heights = [], [], []
         for disc in dict.fromkeys(run.disc for run in runs):
             parts = [run.points[run.points[:, 2] > 0][:, [column, 2, 3]] for run in runs if run.disc == disc]
-            rows = np.concatenate(
-                [np.vstack([part, np.full((1, 3), np.nan)]) for part in parts if len(part)] or [np.empty((0, 3))]
-            )
-            if len(rows):
-                words = f"disc {visible(disc)}" if disc else "runs"
-                series.append(Series(words, rows[:, 0], rows[:, 1], "other", line=True, u=rows[:, 2]))
-                ends += [np.nanmin(rows[:, 0]), np.nanmax(rows[:, 0])]
-                heights.append(rows[:, 1])
+            rows = np.concatenate([np.vstack([part, np.full((1, 3), np.nan)]) for part in parts])
+            words = f"disc {visible(disc)}" if disc else "runs"
+            series.append(Series(words, rows[:, 0], rows[:, 1], "other", line=True, u=rows[:, 2]))
+            ends += [np.nanmin(rows[:, 0]), np.nanmax(rows[:, 0])]
+            heights.append(rows[:, 1])
         grid = np.geomspace(0.8 * min(ends), 1.25 * max(ends), 200)
         if column == 0:
             line, words = drag_of_disc_at_rest(grid), "disc, steady stream (limits)"
@@ -68,4 +93,8 @@ def drag_map(runs: Sequence[DragRun]) -> Chart:
         low, high = np.nanquantile(np.concatenate(heights), (0.01, 0.99)).tolist()
         shown = (0.7 * min(low, float(line.min())), 1.4 * max(high, STEADY_DISC_DRAG))
         panels.append(Panel("effective drag coefficient", tuple(series), 3.6, label, log=True, log_x=True, range=shown))
-    return Chart("drag-map", "Drag of discs", "", tuple(panels))
+    caption = (
+        "Effective drag coefficient of every run from its first to its last amplitude, with bands of u. It counts all "
+        "damping as drag of the disc, that of spring and hook too."
+    )
+    return Chart("drag-map", "Drag of discs", caption, tuple(panels))

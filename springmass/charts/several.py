@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -65,9 +65,17 @@ def comparison(found: Comparison) -> Chart:
     return Chart("comparison", "Comparison", caption, panels)
 
 
-def course(label: str, rows: Sequence[tuple[str, float, float]]) -> Chart:
-    """One quantity of all runs of a course, each row a name with the value and its uncertainty."""
+def course(label: str, rows: Sequence[tuple[str, float, float]], differing: Mapping[str, str]) -> Chart:
+    """One quantity of all runs of a course, each row a name with value and uncertainty.
+
+    Runs that differ from the others are given by name with a sentence each; those beyond the axis stand at its edge.
+    """
     names, y, u = zip(*rows, strict=True)
-    series = Series("value ± u", np.arange(1.0, len(rows) + 1.0), np.array(y), u=np.array(u))
-    panel = Panel(label, (series,), x_label="run", names=names)
+    x, values, us = np.arange(1.0, len(rows) + 1.0), np.array(y), np.array(u)
+    apart = np.array([name in differing for name in names])
+    good, why = ~apart, tuple(f"{name}: {differing[name]}" for name in names if name in differing)
+    series = [Series("value ± u", x[good], values[good], u=us[good])]
+    if apart.any():
+        series.append(Series("differs from its course", x[apart], values[apart], "flagged", u=us[apart], why=why))
+    panel = Panel(label, tuple(series), x_label="run", names=names)
     return Chart("course", "All runs", "Point at a run to read its name.", (panel,))

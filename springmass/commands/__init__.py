@@ -33,9 +33,6 @@ FIRST = {
 }
 """The commands that a student, a course and a bench need, with their help."""
 FURTHER = {
-    "report": "Write the full report of one run of a course.",
-    "catalog": "Search, filter and list the runs of courses.",
-    "map": "Draw the drag coefficients of a course against Reynolds and Keulegan-Carpenter number.",
     "recover": "Build a run file from a wire log, even from a damaged one.",
     "replay": "Play a recording through the interface of a live sensor.",
     "convert": "Convert a recording to a run file or another format, or extract the original from a run file.",

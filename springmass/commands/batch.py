@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from springmass.batch.course import template
+from springmass.batch.page import GROUPS, PAGE
 from springmass.batch.plan import plan
-from springmass.batch.rows import FAILED
+from springmass.batch.rows import CSV, FAILED
 from springmass.batch.running import run_course
-from springmass.batch.store import CSV, GROUPS, PAGE
-from springmass.commands.options import File, StatedLaw, Tier, argument, flag, option, output, refuse
+from springmass.batch.runs_csv import template
+from springmass.batch.store import DATABASE, opened
+from springmass.commands.options import File, argument, flag, option, output, refuse
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, manner, suggest, tell
-from springmass.runs.options import ReadOptions
+from springmass.runs.options import How
+from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
 from springmass.terminal.progress import TaskProgress
 from springmass.values import Count, WholeNumber
@@ -35,11 +37,8 @@ class BatchOptions:
     runs: Annotated[File | None, option("FILE", "CSV table with what you know about each run")] = None
     template: Annotated[bool, flag("print an empty table for --runs to fill in")] = False
     scene: Annotated[File | None, option("FILE", "scene file for all runs; values in the table take precedence")] = None
-    accuracy: Tier = "standard"
-    law: StatedLaw = None
     jobs: Annotated[Count | None, option("N", "number of processes (default: one per core)")] = None
     dask: Annotated[str | None, option("ADDRESS", "analyse on the workers of this dask scheduler")] = None
-    rehash: Annotated[bool, flag("read every file again to check whether it has changed")] = False
     reports: Annotated[
         WholeNumber, option("N", "write full reports of the N runs that most need a look (default: 20)")
     ] = 20
@@ -50,10 +49,10 @@ def batch(
         File, argument("INPUT", "recordings, folders (with subfolders), patterns, or @FILE (a list)")
     ],
     options: BatchOptions = BatchOptions(),
-    read: ReadOptions = ReadOptions(),
+    how: How = How(),
 ) -> int:
     """Analyse new and changed runs, and write the table and the page of all runs."""
-    refuse("batch", read, "velocity")
+    refuse("batch", how, "velocity")
     inputs = [str(each) for each in recordings]
     if not inputs and options.runs is None:
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them", USAGE)
@@ -67,7 +66,20 @@ def batch(
     if options.dask is not None and options.jobs:
         raise ProgramError("--dask brings its workers, got --jobs too; leave out --jobs", USAGE)
     quiet = manner()[0]
-    with contextlib.ExitStack() as shown:
+    folder = make_folder(options.output)
+    with contextlib.ExitStack() as shown, opened(folder) as store:
+        course = plan(
+            inputs,
+            runs_csv=None if options.runs is None else str(options.runs),
+            scene=None if options.scene is None else str(options.scene),
+            accuracy=how.accuracy,
+            law=how.law,
+            answers={name: value for name, value in how.given().items() if name not in ("accuracy", "law")},
+            known=[json.loads(key)[0] for key in store.made_of()],
+            output=str(folder),
+        )
+        for line in course.notes:
+            tell(line)
         runs = shown.enter_context(TaskProgress("runs", lines=True, quiet=quiet))
         reports: list[TaskProgress] = []
 
@@ -83,31 +95,22 @@ def batch(
                 reports.append(shown.enter_context(TaskProgress("reports", lines=True, quiet=quiet)))
             reports[0].update(done, total)
 
-        outcome = run_course(
-            inputs,
-            str(options.output),
-            runs_csv=None if options.runs is None else str(options.runs),
-            scene=None if options.scene is None else str(options.scene),
-            accuracy=options.accuracy,
-            law=options.law,
-            answers=read.given(),
+        rows, made, unwritten = run_course(
+            course,
+            store,
+            folder,
             jobs=options.jobs,
             dask=options.dask,
-            rehash=options.rehash,
             reports=options.reports,
-            note=tell,
             progress=analysed,
             reported=reported,
         )
-    folder = Path(options.output)
-    for name, kept in outcome.edited:
-        complain(f"{folder / name}: was edited; kept as {kept} and written again")
-    for line in (*outcome.damaged, *outcome.unwritten):
+    for line in unwritten:
         complain(line)
-    failed = len(outcome.failures)
-    tell(f"{outcome.runs} runs: {outcome.unchanged} unchanged, {outcome.analysed} analysed, {failed} failed")
-    tell(f"written: {folder / CSV}, {folder / PAGE}, {folder / GROUPS}")
+    failed = sum(row["status"] in FAILED for row in rows)
+    tell(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
     suggest(f"open {folder / PAGE} in a browser")
-    if failed and failed == outcome.runs:
+    tell(f"written: {folder / PAGE}, {folder / GROUPS}, {folder / CSV}; the data are in {folder / DATABASE}")
+    if failed and failed == len(rows):
         return UNREADABLE
-    return SOME_FAILED if failed or outcome.unwritten else OK
+    return SOME_FAILED if failed or unwritten else OK

@@ -12,7 +12,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from acquisition.errors import visible
-from springmass.batch.store import is_course
+from springmass.batch.rows import COURSE, is_course, read_rows
 from springmass.commands.options import (
     Figures,
     File,
@@ -27,7 +27,7 @@ from springmass.commands.options import (
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import law_line
 from springmass.runs.comparing import Compared, compare_runs, comparison_json
-from springmass.runs.json_results import provenance_of, rejected
+from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
 from springmass.runs.options import How
 from springmass.runs.outputs import distinct_names, make_folder, now_utc
 from springmass.runs.run import Run
@@ -40,10 +40,6 @@ from springmass.values import Share
 class CompareOptions:
     """The options of ``springmass compare``."""
 
-    where: Annotated[str, option("EXPR", "for courses: compare only runs for which this expression is true")] = ""
-    bench: Annotated[
-        str | None, option("NAME", "for courses: column that names the bench (default: bench, group or section)")
-    ] = None
     scene: Scenes = ()
     mass_correlation: Annotated[
         Share, option("R", "correlation between the errors of two bobs' masses (default: 0)")
@@ -66,8 +62,6 @@ def compare(
     inputs = [str(each) for each in recordings]
     if all(is_course(path) for path in inputs):
         return _run_courses(inputs, options)
-    if options.where or options.bench:
-        raise ProgramError("--where and --bench choose among the results of courses; name folders of batch", USAGE)
     if len(inputs) < 2:
         raise ProgramError(
             f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one", USAGE
@@ -106,20 +100,25 @@ def compare(
 
 
 def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
-    from springmass.batch.benches import compare_rows, compared_json, compared_text
-    from springmass.batch.search import search
+    from springmass.batch.benches import compare_rows, compared_text
     from springmass.terminal.printing import visible_lines
 
     if options.output is not None or options.scene:
         raise ProgramError("-o and --scene go with single runs; a course has its page and its scenes", USAGE)
-    found = compare_rows(search(inputs, where=options.where).rows, bench=options.bench)
-    print(json.dumps(compared_json(found), allow_nan=False) if options.json else visible_lines(compared_text(found)))
+    rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
+    found = compare_rows(rows)
+    print(
+        json.dumps({"schema": SCHEMA, **plain(found)}, allow_nan=False)
+        if options.json
+        else visible_lines(compared_text(found))
+    )
     wrong = {one.name for one in found.suspects}.union(*(one.names for one in found.disagreements))
     if options.strict and wrong:
         complain(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
         return REJECTED
     for suspect in found.suspects[:1]:
-        suggest(f"springmass report {shlex.join([*inputs[:1], suspect.name])}")
+        path = next(row["path"] for row in rows if suspect.name in (row["run"], f"{row[COURSE]}: {row['run']}"))
+        suggest(f"springmass analyse {shlex.quote(path)}")
     return OK
 
 

@@ -42,7 +42,7 @@ def rows(folder: str | Path) -> list[dict[str, str]]:
 
 
 def test_a_folder_becomes_a_table_a_page_and_reports(runs, cli):
-    """One row a run in CSV and Parquet, equal to an analysis of the run alone; reports of the worst."""
+    """One row a run, equal to an analysis of the run alone; reports of the worst."""
     done = cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "1")
     assert done.code == 0
     table = rows("out")
@@ -62,14 +62,16 @@ def test_a_folder_becomes_a_table_a_page_and_reports(runs, cli):
 
 
 def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli):
-    """What was touched is read, and kept; another content, scene or accuracy is analysed."""
+    """What was touched is kept; another content, scene or accuracy is analysed; an edited table is written again."""
     command = ("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
     cli(*command)
     before = contents(Path("out"))
     assert "6 unchanged, 0 analysed" in cli(*command).err
     assert contents(Path("out")) == before
     os.utime(runs / "run001.txt", ns=(1, 1))
+    Path("out/results.csv").write_text("edited")
     assert "6 unchanged, 0 analysed" in cli(*command).err
+    assert contents(Path("out")) == before
     shutil.copy(runs / "run000.txt", runs / "run005.txt")
     assert "5 unchanged, 1 analysed" in cli(*command).err
     table = rows("out")
@@ -196,14 +198,17 @@ def test_a_wrong_table_is_one_line(runs, cli, table, named):
 
 
 def test_two_passes_do_not_share_a_folder(runs, cli):
-    """The second pass is refused while the first one runs."""
+    """The second pass is refused while the first one runs, and told which process that is."""
     cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
     before = contents(Path("out"))
-    with next(Path("out").rglob("lock")).open("rb") as lock:
+    holder = Path("out/course.lock").read_text()
+    assert f"process {os.getpid()} on " in holder
+    with Path("out/course.lock").open("rb") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         done = cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "0")
     assert (done.code, contents(Path("out"))) == (2, before)
-    assert str(Path("out")) in done.complaint
+    assert "out: in use by" in done.complaint
+    assert holder in done.complaint
 
 
 def test_a_file_with_brackets_in_its_name_is_a_file_and_no_pattern(runs, cli):

@@ -73,11 +73,10 @@ def test_a_full_disk_is_one_line_and_the_next_pass_completes_the_course(
 @pytest.mark.parametrize(
     ("place", "kind", "expected"),
     [
-        ("parts", "file", USAGE),
-        ("parts/lock", "folder", USAGE),
+        ("course.db", "folder", USAGE),
+        ("course.lock", "folder", USAGE),
         ("results.csv", "folder", USAGE),
         ("index.html", "folder", USAGE),
-        ("batch.log", "folder", SOME_FAILED),
     ],
 )
 def test_a_place_that_cannot_be_written_is_named(

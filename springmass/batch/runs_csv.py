@@ -1,0 +1,211 @@
+"""Read ``runs.csv``, a table of known values for the runs of a course, with rows for files or patterns."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from acquisition.regular_file import open_regular_text
+from pipeline.bench.scene import PLACES
+from pipeline.registry.laws import LAW_NAMES
+from springmass.batch.rows import RESERVED
+from springmass.errors import USAGE, ProgramError
+from springmass.runs.inputs import InputFile
+from springmass.values import ANY_LAW
+
+NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
+ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", *NUMBERS)
+POSITION = "sensor_position"
+LAW = "law"
+_U = tuple(f"{name}_u" for name in PLACES)
+KNOWN = ("path", "scene", POSITION, LAW, *ANSWERS, *PLACES, *_U)
+TEMPLATE = (
+    "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
+    "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
+)  # fmt: skip
+LARGEST = 64 << 20  # maximum size of a table of runs, bytes
+Values = Mapping[str, Any]
+_UNIT = re.compile(r"_(kg|g|m|mm|cm|s|hz|c|pa|n_per_m|per_s)(_u)?$")
+_TAG = re.compile(r"[a-z][a-z0-9_]*")
+
+
+@dataclass(frozen=True, slots=True)
+class RunsTable:
+    """A table of runs: its file, the columns that are tags, and for each row line, path or pattern, and values.
+
+    Values are by column, those of a quantity with its standard uncertainty.
+    """
+
+    path: Path
+    tags: tuple[str, ...]
+    rows: tuple[tuple[int, str, Values], ...]
+
+    def files(self) -> list[str]:
+        """Return the files named without a pattern; relative paths start from the table's folder."""
+        named = [os.path.join(self.path.parent, text) for _, text, _ in self.rows if not self.is_pattern(text)]
+        return list(dict.fromkeys(named))
+
+    def is_pattern(self, text: str) -> bool:
+        """Return whether a row's path is a pattern rather than the name of a file such as ``run [1].txt``."""
+        return any(mark in text for mark in "*?[") and not os.path.exists(self.whole(text))
+
+    def whole(self, text: str) -> str:
+        """Return the absolute path or pattern of a row."""
+        return os.path.abspath(os.path.join(self.path.parent, text))
+
+
+def template(paths: Sequence[str]) -> str:
+    """Return a ``runs.csv`` to fill in, with one row per path."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(TEMPLATE)
+    writer.writerows([path, *[""] * (len(TEMPLATE) - 1)] for path in paths)
+    return out.getvalue()
+
+
+def read_table(path: str | Path) -> RunsTable:
+    """Read a table of runs separated by commas, semicolons or tabs; errors name row, column and value.
+
+    Numbers may have a decimal comma unless commas separate the columns.
+    """
+    path = Path(path)
+    table = list(_lines(path))
+    if not table:
+        raise ProgramError(f"{path}: expected a table of runs, got an empty file; see batch --template", USAGE)
+    (_, head, comma), *lines = table
+    names = [name.strip() for name in head]
+    while names and not names[-1]:
+        names.pop()
+    tags = _tags(path, names)
+    rows = []
+    for line, cells, _ in lines:
+        where = f"{path}, line {line}"
+        if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
+            wrong = f"expected {len(names)} columns, got {len(cells)}; put quotes around a text with a separator"
+            raise ProgramError(f"{where}: {wrong}", USAGE)
+        texts = {name: cell.strip() for name, cell in zip(names, cells, strict=False) if cell.strip()}
+        if texts and "path" not in texts:
+            raise ProgramError(f"{where}: the path of the run is missing; fill it in", USAGE)
+        if texts:
+            rows.append((line, texts["path"], _values(path.parent, where, texts, decimal_comma=comma)))
+    return RunsTable(path, tags, tuple(rows))
+
+
+def _lines(path: Path) -> Iterator[tuple[int, list[str], bool]]:
+    """Yield line number, cells and whether numbers may have a decimal comma, for each row."""
+    try:
+        if path.stat().st_size > LARGEST:
+            raise ProgramError(f"{path}: a table of runs must be at most {LARGEST >> 20} MB", USAGE)
+        with open_regular_text(path, "utf-8-sig") as file:
+            text = file.read()
+    except OSError as error:
+        raise ProgramError(f"{path}: no table of runs can be read ({error.strerror}); check the name", USAGE) from error
+    except UnicodeDecodeError as error:
+        raise ProgramError(f"{path}: not in UTF-8; save the sheet as CSV UTF-8", USAGE) from error
+    first = text.partition("\n")[0]
+    mark = max(",;\t", key=first.count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark)
+    try:
+        for cells in reader:
+            if cells and not cells[0].lstrip().startswith("#"):
+                yield reader.line_num, cells, mark != ","
+    except csv.Error as error:
+        raise ProgramError(f"{path}, line {reader.line_num}: not a row of a table ({error})", USAGE) from error
+
+
+def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the tags among the column names; refuse unknown or repeated columns."""
+    if "path" not in names:
+        raise ProgramError(f"{path}: no column path, got {', '.join(names)}; see batch --template", USAGE)
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ProgramError(f"{path}: the column {twice[0]} is there twice; leave one out", USAGE)
+    tags = tuple(name for name in names if name not in KNOWN)
+    for name in tags:
+        near = get_close_matches(name, KNOWN, n=1, cutoff=0.85)
+        if near or _UNIT.search(name):
+            hint = f"did you mean {near[0]}?" if near else f"allowed with a unit are {', '.join(PLACES)}"
+            raise ProgramError(f"{path}: unknown column {name!r}; {hint}", USAGE)
+        if name in RESERVED:
+            raise ProgramError(f"{path}: {name!r} is a column of the results; rename the column", USAGE)
+        if not _TAG.fullmatch(name):
+            raise ProgramError(f"{path}: a tag has lower-case letters, digits and _, got {name!r}; rename it", USAGE)
+    return tags
+
+
+def _values(folder: Path, where: str, texts: Mapping[str, str], *, decimal_comma: bool) -> Values:
+    def number(name: str) -> float:
+        text = texts[name].replace(",", ".") if decimal_comma else texts[name]
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise ProgramError(f"{where}: {name} must be a finite number, got {texts[name]!r}", USAGE)
+        return value
+
+    values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
+    values |= {name: number(name) for name in NUMBERS if name in texts}
+    values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
+    for name in PLACES:
+        if name in texts:
+            values[name] = (number(name), number(f"{name}_u") if f"{name}_u" in texts else 0.0)
+        elif f"{name}_u" in texts:
+            raise ProgramError(f"{where}: {name}_u is there without {name}; fill in both", USAGE)
+    if (law := texts.get(LAW)) not in (None, ANY_LAW, *LAW_NAMES):
+        laws = ", ".join((*LAW_NAMES, ANY_LAW))
+        raise ProgramError(f"{where}: {LAW} must be one of {laws}, got {law!r}", USAGE)
+    return values
+
+
+def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[InputFile, int, Values]], list[str]]:
+    """Return each file with line and values from the table; a note for each row without file and file without row.
+
+    A file has one run for each row that names its path with a different ``run`` or ``channel``. A row with a path
+    takes precedence over a row with a pattern; other rows that contradict each other are refused.
+    """
+    exact: dict[str, list[tuple[int, Values]]] = {}
+    patterns: list[tuple[int, str, Values]] = []
+    for line, text, values in table.rows:
+        if table.is_pattern(text):
+            patterns.append((line, text if "/" not in text else table.whole(text), values))
+        else:
+            exact.setdefault(table.whole(text), []).append((line, values))
+    used: set[int] = set()
+    joined: list[tuple[InputFile, int, Values]] = []
+    notes = []
+    for file in files:
+        path, first = os.path.abspath(file.path), 0
+        base: Values = {}
+        for line, text, values in patterns:
+            # A pattern without a slash is compared only with the file name.
+            if not fnmatchcase(path if "/" in text else os.path.basename(path), text):
+                continue
+            if clash := sorted(x for x in base.keys() & values.keys() if base[x] != values[x]):
+                wrong = f"lines {first} and {line} both match {file.path} and differ in {clash[0]}"
+                raise ProgramError(f"{table.path}: {wrong}; narrow one of the patterns", USAGE)
+            base, first = {**base, **values}, first or line
+            used.add(line)
+        lines: dict[tuple[Any, Any], int] = {}
+        for line, values in exact.get(path, []):
+            which = (values.get("run"), values.get("channel"))
+            if which in lines:
+                wrong = f"lines {lines[which]} and {line} both name {file.path}"
+                raise ProgramError(f"{table.path}: {wrong}; leave one out, or give each another run or channel", USAGE)
+            lines[which] = line
+            joined.append((file, line, {**base, **values}))
+        used |= set(lines.values())
+        if not lines:
+            joined.append((file, first, base))
+        if not lines and not first:
+            notes.append(f"{table.path}: no row belongs to {file.path}")
+    unused = [f"line {line}: {text}" for line, text, _ in table.rows if line not in used]
+    return joined, [*(f"{table.path}, {row}: no file of the inputs belongs to this row" for row in unused), *notes]
