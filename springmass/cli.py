@@ -18,22 +18,20 @@ from springmass.errors import (
     UNREADABLE,
     USAGE,
     ProgramError,
-    adopt,
     complain,
     internal_error,
-    manner,
+    printing,
 )
 from springmass.stops import STOPS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit code; a user's error and a program defect each give one line on stderr."""
-    before = manner()
     STOPS.begin()
     try:
-        return _run(arguments)
+        with printing():
+            return _run(arguments)
     finally:
-        adopt(*before)
         STOPS.end(program=arguments is None)
 
 

@@ -15,37 +15,14 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import sys
 from collections.abc import Iterator
 
 from failure import Error as Error
 
-__all__ = [
-    "INTERNAL",
-    "INTERRUPTED",
-    "NO_MEMORY",
-    "OK",
-    "REJECTED",
-    "SENSOR",
-    "SOME_FAILED",
-    "UNREADABLE",
-    "USAGE",
-    "ProgramError",
-    "adopt",
-    "complain",
-    "detail",
-    "internal_error",
-    "manner",
-    "quietly",
-    "suggest",
-    "tell",
-]
-
-_quiet = False
-_verbose = False
 OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 4, 5, 70, 130
-
-
+_log = logging.getLogger("springmass")
 NO_MEMORY = "there is not enough memory; end other programs, or raise the limit"
 
 
@@ -70,42 +47,67 @@ class ProgramError(Error):
 
 
 def complain(message: object) -> None:
-    """Write a message to stderr as one line, even if a file name or a library's message contains line breaks."""
-    _write(f"springmass: {' '.join(str(message).splitlines())}")
+    """Report a problem as one line, even if a file name or a library's message contains line breaks."""
+    _log.warning("%s", " ".join(str(message).splitlines()))
 
 
 def tell(message: str) -> None:
-    """Write one line to stderr with control characters made visible, unless ``-q`` is set."""
-    if not _quiet:
-        _write(message)
+    """Report what was done, which ``-q`` leaves out."""
+    _log.info("%s", message)
 
 
 def detail(message: str) -> None:
-    """Write one line about the current step to stderr, only under ``-v``."""
-    if _verbose:
-        _write(message)
+    """Report the current step, which only ``-v`` prints."""
+    _log.debug("%s", message)
+
+
+class _Stderr(logging.Handler):
+    """Prints messages on stderr, whatever it is at the moment, with control characters made visible."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a line; a problem begins with the name of the program."""
+        _write(f"{'springmass: ' if record.levelno >= logging.WARNING else ''}{record.getMessage()}")
+
+
+_PRINTS = _Stderr()
 
 
 def manner() -> tuple[bool, bool]:
     """Return whether this process prints only errors and warnings, and whether it also prints details."""
-    return _quiet, _verbose
+    return not _log.isEnabledFor(logging.INFO), _log.isEnabledFor(logging.DEBUG)
 
 
 def adopt(quiet: bool, verbose: bool) -> None:
-    """Set quiet and verbose to what :func:`manner` returned earlier, or in the process that started this one."""
-    global _quiet, _verbose
-    _quiet, _verbose = quiet, verbose
+    """Print messages from now on: problems alone, or details too."""
+    if _PRINTS not in _log.handlers:
+        _log.addHandler(_PRINTS)
+    _log.propagate = False
+    _log.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
+
+
+@contextlib.contextmanager
+def printing() -> Iterator[None]:
+    """Print messages until the ``with`` block ends, as a program does; a library leaves them to ``logging``."""
+    before, printed = _log.level, _PRINTS in _log.handlers
+    adopt(quiet=False, verbose=False)
+    try:
+        yield
+    finally:
+        _log.setLevel(before)
+        if not printed:
+            _log.removeHandler(_PRINTS)
+            _log.propagate = True
 
 
 @contextlib.contextmanager
 def quietly() -> Iterator[None]:
-    """Print only errors and warnings until the ``with`` block ends."""
-    global _quiet
-    before, _quiet = _quiet, True
+    """Report only problems until the ``with`` block ends."""
+    before = _log.level
+    _log.setLevel(logging.WARNING)
     try:
         yield
     finally:
-        _quiet = before
+        _log.setLevel(before)
 
 
 def internal_error(error: BaseException) -> str:

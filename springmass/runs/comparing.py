@@ -45,14 +45,7 @@ class Compared:
     runs: Mapping[str, Run]
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return one row per run, and a row "together" for their mean.
-
-        Returns
-        -------
-        pandas.DataFrame
-            A frame with the columns period and u_period (s), spring_constant, u and u_own (N/m), pull and agree; the
-            mean is NaN where the runs disagree.
-        """
+        """Return one row per run, and a row "together" for their mean."""
         return comparison_frame(self.comparison, {name: run["period"] for name, run in self.runs.items()})
 
     def __repr__(self) -> str:

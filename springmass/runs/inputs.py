@@ -13,8 +13,6 @@ from acquisition.recordings.identify import sniff
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.runs.loading import kind_of
 
-__all__ = ["InputFile", "files_of"]
-
 NAMED = 5  # maximum number of files that a message names
 _LATER_LOG = re.compile(r"\.\d{3,}\.wire$")
 
@@ -42,24 +40,7 @@ def files_of(
 ) -> tuple[list[InputFile], list[str]]:
     """Return the files that the inputs name, and messages about the files in folders that are not recordings.
 
-    Parameters
-    ----------
-    inputs : sequence of str
-        Files and folders. Every recording in a folder is taken, sorted by name.
-    deep : bool
-        Whether subfolders are searched too.
-    known : collection of str
-        Absolute paths of files that count as recordings; they are not opened for this check.
-    but : collection of str
-        Absolute paths of files and subfolders to leave out when a folder is searched.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 3 if a folder contains no recording or cannot be read.
-
-    Notes
-    -----
+    ``known`` absolute paths count as recordings without being opened; ``but`` are files and subfolders to leave out.
     In a folder, ``X_velocity.txt`` belongs to ``X_position.txt``, and a log belongs to the run file or the first log of
     the same name.
     """

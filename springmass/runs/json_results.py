@@ -21,18 +21,6 @@ from pipeline.results.derive import Derived
 from springmass import __version__
 from springmass.runs.loading import Loaded
 
-__all__ = [
-    "SCHEMA",
-    "input_of",
-    "parameters_json",
-    "picked",
-    "plain",
-    "provenance_of",
-    "rejected",
-    "result_of",
-    "with_traps",
-]
-
 SCHEMA = 3
 _REJECTED_WARNINGS = frozenset({"sensor_lost"})
 

@@ -81,13 +81,7 @@ class ReadOptions:
 
     @classmethod
     def of(cls, answers: Mapping[str, Any]) -> Self:
-        """Return the options given as keyword arguments.
-
-        Raises
-        ------
-        TypeError
-            If one of the names is not an option; the message lists the options.
-        """
+        """Return the options given as keyword arguments."""
         known = [each.name for each in fields(cls)]
         if unknown := [name for name in answers if name not in known]:
             raise TypeError(f"{unknown[0]!r} is no option of reading; the options are {', '.join(known)}")

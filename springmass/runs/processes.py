@@ -10,8 +10,6 @@ from multiprocessing import get_context, parent_process
 
 from springmass.errors import adopt, manner
 
-__all__ = ["cores", "pool"]
-
 
 def cores() -> int:
     """Return the number of processors that this process may use."""

@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 
 from acquisition.recordings.questions import Question
 
-__all__ = ["as_arguments", "as_options", "for_command", "for_course", "for_python", "option_of", "quoted"]
-
 
 def option_of(name: str) -> str:
     """Return the option for a keyword argument: ``--rate-hz`` for ``rate_hz``, ``--from`` for ``from_s``."""
@@ -19,8 +17,6 @@ def option_of(name: str) -> str:
 def quoted(word: str) -> str:
     """Return a word quoted for a shell, with double quotes where they suffice, since these work on Windows too.
 
-    Examples
-    --------
     >>> quoted("run.csv"), quoted("column 2"), quoted('5" disc')
     ('run.csv', '"column 2"', '\\'5" disc\\'')
     """
@@ -32,8 +28,6 @@ def quoted(word: str) -> str:
 def as_options(answers: Mapping[str, object]) -> str:
     """Return keyword arguments of :func:`springmass.load` as command-line options.
 
-    Examples
-    --------
     >>> as_options({"channel": "column 2", "rate_hz": 50.0, "unverified": False, "unit": None})
     '--channel "column 2" --rate-hz 50'
     """
@@ -51,8 +45,6 @@ def as_options(answers: Mapping[str, object]) -> str:
 def as_arguments(answers: Mapping[str, object]) -> str:
     """Return keyword arguments of :func:`springmass.load` as Python source text.
 
-    Examples
-    --------
     >>> as_arguments({"channel": "column 2", "rate_hz": 50.0})
     'channel="column 2", rate_hz=50.0'
     """
@@ -62,18 +54,6 @@ def as_arguments(answers: Mapping[str, object]) -> str:
 def for_command(question: Question, words: Sequence[str], given: Mapping[str, object]) -> str:
     """Return the command line that answers a question.
 
-    Parameters
-    ----------
-    question : Question
-    words : sequence of str
-        The command with its file and every word that does not describe how to read the file:
-        ``["springmass", "convert", "a.csv", "a.h5"]``.
-    given : mapping
-        Keyword arguments of :func:`springmass.load` that the user has already given. Those that the question asks for
-        again are left out.
-
-    Examples
-    --------
     >>> from acquisition.recordings.questions import Missing, MissingItem
     >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
     >>> for_command(question, ["springmass", "convert", "run.csv", "run.h5"], {"channel": "theta"})
@@ -96,16 +76,6 @@ def for_course(question: Question) -> str:
 def for_python(question: Question, function: str, given: Mapping[str, object]) -> str:
     """Return the Python call that answers a question.
 
-    Parameters
-    ----------
-    question : Question
-    function : str
-        Name of the function that was called with the path and the answers, for example ``springmass.load``.
-    given : mapping
-        As in :func:`for_command`.
-
-    Examples
-    --------
     >>> from acquisition.recordings.questions import Missing, MissingItem
     >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
     >>> for_python(question, "springmass.load", {"channel": "theta"})

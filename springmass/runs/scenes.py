@@ -13,21 +13,13 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import USAGE, ProgramError, complain
 
-__all__ = ["Amendments", "amended", "ask_about", "read_scene", "read_scenes", "read_tables", "stated_keys"]
-
 Amendments = Mapping[tuple[str, str], Any]
 """Mapping of a scene's (table, key) to a value as a scene file states it."""
 LONGEST_SCENE = 1 << 14  # maximum size of a scene file in bytes; some longer files take seconds to parse
 
 
 def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
-    """Return one scene per run, read from one file for all runs or one file for each in order; None without a file.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 for any other number of files, or as in :func:`read_scene`.
-    """
+    """Return one scene per run, read from one file for all runs or one file for each in order; None without a file."""
     if len(paths) not in (0, 1, count):
         raise ProgramError(
             f"--scene was given {len(paths)} times for {count} runs; give it once for all of them, "
@@ -39,14 +31,7 @@ def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
 
 
 def read_scene(path: str | Path) -> Scene:
-    """Read a scene file (TOML).
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if the file is missing, is not TOML, or states something impossible. The message names the
-        file, key and value.
-    """
+    """Read a scene file (TOML)."""
     return _scene_of(read_tables(path), str(path))
 
 
@@ -58,13 +43,7 @@ def scene_from(given: Any) -> Scene | None:
 
 
 def read_tables(path: str | Path) -> dict[str, Any]:
-    """Read a small TOML file of a scene or of notes.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if the file is missing, is longer than any scene, or is not TOML.
-    """
+    """Read a small TOML file of a scene or of notes."""
     try:
         with open_regular(path) as file:
             content = file.read(LONGEST_SCENE + 1) or b""
@@ -95,21 +74,7 @@ def _scene_of(tables: Any, where: str) -> Scene:
 
 
 def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
-    """Return a scene with some values replaced.
-
-    Parameters
-    ----------
-    scene : Scene
-    values : mapping
-        A number, ``{"value": ..., "u": ...}`` or a text for each (table, key).
-    where : str
-        Source of the values, named in errors.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 for an impossible value.
-    """
+    """Return a scene with some values replaced."""
     tables = scene.to_mapping()
     for (table, key), value in values.items():
         tables.setdefault(table, {})[key] = value

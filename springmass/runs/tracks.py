@@ -12,8 +12,6 @@ from acquisition.live.clock_fit import fit_clock
 from acquisition.source import SourceInfo
 from pipeline.track import Track
 
-__all__ = ["to_track"]
-
 MOTION_SENSOR = "motion-sensor"  # family that assumes a fixed speed of sound
 LINE_PROTOCOL = "line-protocol"  # family that sends echo times
 COMPARED = {"rate_error_ppm", "u_rate_error_ppm", "span_s", "held_readings", "longest_stall_s"}  # of two clocks
@@ -24,18 +22,6 @@ def to_track(
 ) -> Track:
     """Return samples as a track for the pipeline.
 
-    Parameters
-    ----------
-    samples : Block
-    info : SourceInfo
-    recorded_format : str
-        Family of the recording that the samples come from, if any. It determines the speed of sound with which the
-        distances were calculated.
-    provenance : mapping, optional
-        Origin stated in a run file: the sensor that recorded it, and the largest rate error of its clock.
-
-    Notes
-    -----
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
     return Track(
