@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from pipeline.bench.scene import Scene
     from pipeline.damping.laws import LAWS
     from pipeline.damping.laws.of_function import make_law
-    from springmass.api.results import results
+    from springmass.api.courses import batch, results
     from springmass.api.sources import analyse, compare, load
+    from springmass.api.stream import Stream
     from springmass.errors import Error
     from springmass.runs.loading import sample_data
     from springmass.runs.run import Run
@@ -31,11 +32,13 @@ else:
         "LAWS": "pipeline.damping.laws",
         "Run": "springmass.runs.run",
         "Scene": "pipeline.bench.scene",
+        "Stream": "springmass.api.stream",
         "analyse": "springmass.api.sources",
+        "batch": "springmass.api.courses",
         "compare": "springmass.api.sources",
         "load": "springmass.api.sources",
         "make_law": "pipeline.damping.laws.of_function",
-        "results": "springmass.api.results",
+        "results": "springmass.api.courses",
         "sample_data": "springmass.runs.loading",
     }
 
@@ -57,8 +60,10 @@ __all__ = [
     "Error",
     "Run",
     "Scene",
+    "Stream",
     "__version__",
     "analyse",
+    "batch",
     "compare",
     "load",
     "make_law",

@@ -83,7 +83,7 @@ def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, An
 def _analyse_one(job: Job) -> dict[str, Any]:
     row = blank_row(job)
     row["input_sha256"] = digest_of(job.whole(job.path)) or None
-    failure = _attempt(job, lambda: _fill(row, analyse_job(job)))
+    failure = _attempt(job, lambda: fill(row, analyse_job(job)))
     return row | {"error": failure} if failure else row
 
 
@@ -104,7 +104,8 @@ def _attempt(job: Job, do: Callable[[], None]) -> str:
     return line if job.path in line else f"{job.path}: {line}"
 
 
-def _fill(row: dict[str, Any], run: Run) -> None:
+def fill(row: dict[str, Any], run: Run) -> None:
+    """Fill the row of a run with its results."""
     loaded, analysis = run.loaded, run.analysis
     track, motion, findings = analysis.track, analysis.motion, analysis.findings
     moves = isinstance(motion, (Oscillation, Overdamped))
@@ -134,7 +135,7 @@ def _fill(row: dict[str, Any], run: Run) -> None:
     if isinstance(motion, Oscillation):
         _fill_damping(row, analysis, motion)
     row["status"] = "ok" if moves else "no_oscillation"
-    row["error"] = "" if moves else f"{row['path']}: no oscillation: {motion.why}"
+    row["error"] = "" if moves else f"{row['path']}: no oscillation: {run.why}"
 
 
 def _fill_damping(row: dict[str, Any], analysis: Analysis, motion: Oscillation) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 import shutil
 import sys
 import tempfile
@@ -147,7 +148,7 @@ def sample_data() -> Path:
     raise ProgramError(f"{folder}: the bundled recordings are missing; install springmass again", UNREADABLE)
 
 
-def kind_of(path: Path) -> Literal["run", "wire", "recording"]:
+def kind_of(path: str | os.PathLike[str]) -> Literal["run", "wire", "recording"]:
     """Return whether a file is a run file, a wire log or a recording, by its first bytes."""
     try:
         with open_regular(path) as file:

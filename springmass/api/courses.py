@@ -1,0 +1,113 @@
+"""Courses of many runs for scripts: analysed here, or read from the folder that ``springmass batch`` made."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, Unpack
+
+from failure import Error
+from springmass.api.sources import Analysing, analyse
+from springmass.batch.rows import NUMBERS, UNITS, WHOLE, columns_of, read_rows
+from springmass.batch.worker import fill
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from springmass.api.sources import AnyScene, AnySource
+
+
+def batch(
+    sources: Sequence[AnySource],
+    scene: AnyScene | None = None,
+    *,
+    executor: Executor | None = None,
+    **how: Unpack[Analysing],
+) -> pd.DataFrame:
+    """Analyse many runs into one table.
+
+    Parameters
+    ----------
+    sources : sequence
+        Sources that :func:`springmass.analyse` takes.
+    scene : optional
+        As for :func:`springmass.analyse`: one for all runs; default: each run's own scene.
+    executor : concurrent.futures.Executor, optional
+        Where to work: a ``ProcessPoolExecutor``, or ``dask.distributed.Client(...).get_executor()``; default: here.
+    **how
+        Keyword arguments of :func:`springmass.analyse`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per run in the order of the sources, with the columns of :func:`springmass.results` that some run has.
+        A run that cannot be analysed has its reason in the column ``error``.
+
+    Examples
+    --------
+    >>> from springmass import sample_data
+    >>> frame = batch(sorted(sample_data().glob("*_position.txt")))
+    >>> [round(period, 4) for period in frame["period"]]
+    [0.7901, 0.7585]
+    """
+    work = partial(_row, scene=scene, how=how)
+    rows = list((map if executor is None else executor.map)(work, sources))
+    frame = _frame(rows, ())
+    return frame.loc[:, frame.notna().any() | (frame.columns == "error")]
+
+
+def _row(source: Any, *, scene: Any, how: Any) -> dict[str, Any]:
+    path = os.fspath(source) if isinstance(source, str | os.PathLike) else getattr(source, "name", "")
+    row: dict[str, Any] = {"run": os.path.basename(path), "path": path, "status": "failed", "error": ""}
+    try:
+        fill(row, analyse(source, scene, **how))
+    except (Error, OSError, MemoryError) as error:
+        row["error"] = " ".join(str(error).split())
+    return row
+
+
+def results(
+    folder: str | os.PathLike[str], *, form: Literal["frame", "dataset"] = "frame"
+) -> pd.DataFrame | xr.Dataset:
+    """Return the table that ``springmass batch`` made, with one row per run.
+
+    Parameters
+    ----------
+    folder : path
+        The folder of results.
+    form : {"frame", "dataset"}
+        A :class:`pandas.DataFrame`, or an :class:`xarray.Dataset` with the dimension ``run`` and attributes ``units``.
+
+    Returns
+    -------
+    pandas.DataFrame or xarray.Dataset
+        Columns as in the reference of a course's results: NAME and NAME_u in SI units, NaN where a run has no value.
+
+    Raises
+    ------
+    springmass.Error
+        If the folder contains no course, or its table is damaged.
+    """
+    frame = _frame(*read_rows(folder))
+    if form == "frame":
+        return frame
+    for name in WHOLE:  # xarray has no integers that may be missing
+        frame[name] = frame[name].astype("float64")
+    texts = [name for name in frame.columns if name not in NUMBERS and name not in WHOLE]
+    frame[texts] = frame[texts].astype(object).where(frame[texts].notna(), "")
+    data: Any = frame.set_index("run").to_xarray()
+    for name, unit in UNITS.items():
+        data[name].attrs["units"] = unit
+        if f"{name}_u" in data:
+            data[f"{name}_u"].attrs["units"] = unit
+    return data
+
+
+def _frame(rows: Sequence[dict[str, Any]], tags: Sequence[str]) -> pd.DataFrame:
+    import pandas as pd
+
+    frame = pd.DataFrame(rows, columns=columns_of(tags))
+    return frame.astype({name: "float64" if name in NUMBERS else "Int64" for name in (*NUMBERS, *WHOLE)})

@@ -1,0 +1,75 @@
+"""Many runs in one table, estimates while samples arrive, and every recording in xarray."""
+
+from __future__ import annotations
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import springmass as sm
+
+DATA = sm.sample_data()
+PAIR = [DATA / "undamped_simulated_position.txt", DATA / "damped_simulated_position.txt"]
+
+
+def test_a_course_is_a_frame_with_errors_as_rows(tmp_path: Path) -> None:
+    """A row a source in their order, with the numbers of an analysis, on any executor."""
+    empty = tmp_path / "empty.txt"
+    empty.touch()
+    t = np.arange(1000) / 100
+    sources = [*PAIR, empty, (t, np.full(t.size, 0.2))]
+    frame = sm.batch(sources, accuracy="fast")
+    assert list(frame["status"]) == ["ok", "ok", "failed", "no_oscillation"]
+    assert "empty" in frame.loc[2, "error"]
+    assert frame.loc[0, "period"] == sm.analyse(PAIR[0], accuracy="fast")["T"].value
+    with ThreadPoolExecutor(2) as executor:
+        pd.testing.assert_frame_equal(sm.batch(sources, executor=executor, accuracy="fast"), frame)
+
+
+def test_two_threads_give_the_numbers_of_one() -> None:
+    """To the last bit."""
+    alone = [sm.analyse(path).result["estimates"] for path in PAIR]
+    with ThreadPoolExecutor(2) as executor:
+        runs = list(executor.map(sm.analyse, PAIR))
+    assert [run.result["estimates"] for run in runs] == alone
+    assert [pickle.loads(pickle.dumps(run)).result["estimates"] for run in runs] == alone
+
+
+def test_a_stream_gives_the_estimates_so_far() -> None:
+    """At its end those of an analysis; the analyses of a run twice as long are only a few more."""
+    rng, stream, seen = np.random.default_rng(2), sm.Stream({"bob": {"mass_kg": 0.2}}), []
+    t = np.arange(12000) / 100
+    y = 0.2 + 0.05 * np.exp(-0.01 * t) * np.cos(8.3 * t) + 1e-4 * rng.standard_normal(t.size)
+    for part in np.split(np.arange(t.size), 120):
+        run = stream.push(t[part], y[part])
+        seen.append(None if run is None else len(run.loaded.samples))
+    assert seen[0] == 100
+    assert seen[-1] is not None
+    assert seen[-1] > 12000 / 1.2
+    assert len({*seen}) < 50
+    found, whole = stream.finish(), sm.analyse((t, y), {"bob": {"mass_kg": 0.2}}, accuracy="fast")
+    assert found.result["estimates"] == whole.result["estimates"]
+    assert sm.Stream().push([0.0], [0.2]) is None
+
+
+def test_xarray_opens_every_recording_by_name(tmp_path: Path) -> None:
+    """A text as its dataset, a file of several channels as a tree; only run files are opened without a name."""
+    found = xr.open_dataset(str(PAIR[1]), engine="springmass", drop_variables="quality")
+    assert sm.analyse(found)["T"].value == sm.analyse(PAIR[1])["T"].value
+    assert found["time"].attrs["units"] == "s"
+    table = tmp_path / "two.csv"
+    t = np.arange(200) / 50
+    table.write_text("time (s),a (cm),b (cm)\n" + "".join(f"{x:.2f},{20 + x:.3f},{30 - x:.3f}\n" for x in t))
+    tree = xr.open_datatree(str(table), engine="springmass")
+    assert set(tree.children) == {"a", "b"}
+    assert float(tree["b"]["distance"][0]) == pytest.approx(0.3)
+    engine = xr.backends.list_engines()["springmass"]
+    run = sm.load(PAIR[0]).save(tmp_path / "run.h5")
+    found.to_netcdf(tmp_path / "other.h5", engine="h5netcdf")
+    opened = [engine.guess_can_open(str(path)) for path in (run, PAIR[0], tmp_path / "other.h5")]
+    assert opened == [True, False, False]
