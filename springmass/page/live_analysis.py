@@ -221,8 +221,7 @@ class Watcher:
         track, scene, traps = self._view.track(), self._scene, self._view.traps
         if self._run is not None:
             track, scene, traps = self._run.loaded.track, self._run.scene, self._run.loaded.traps
-        whole = self._run is not None or self._view.recorded is not None
-        accuracy = WHOLE_TIER if whole else LIVE_TIER
+        accuracy = LIVE_TIER if self._run is None and self._view.recorded is None else WHOLE_TIER
         track = between(track, low, high)
         return motion_of(track, scene, self._wanted_u_s, traps, law=self._law, accuracy=accuracy, charts=charts)
 

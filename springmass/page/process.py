@@ -107,7 +107,7 @@ class PageProcess:
                 self._failures.note("page", error)
         code = process.wait()
         if not self._over:
-            self._lost(RuntimeError(f"its process ended with {code}"))
+            self._lost(ChildProcessError(f"its process ended with {code}"))
 
     def _take(self, message: dict[str, Any]) -> None:
         kind = message["type"]

@@ -21,7 +21,6 @@ from storage.wire_log.wire_samples import Origin
 
 VERSION = 2  # of the messages
 MOST_PER_MESSAGE = 50_000
-SAMPLES = 1  # first number of a binary message that contains samples
 _HEAD = struct.Struct("<4I")
 
 
@@ -64,7 +63,7 @@ class Series:
         """
         stop = min(self._count, first + MOST_PER_MESSAGE)
         t, y = (column[first:stop].astype("<f8", copy=False).tobytes() for column in self._columns[:2])
-        return _HEAD.pack(SAMPLES, sensor, first, stop - first) + t + y
+        return _HEAD.pack(1, sensor, first, stop - first) + t + y
 
 
 @dataclass(eq=False)

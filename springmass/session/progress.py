@@ -20,12 +20,11 @@ from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
 from storage.recorder import Recorder, RecorderStatus
+from storage.wire_log.wire_samples import Origin
 
 SECOND_NS = 1_000_000_000
 USELESS_S = 0.8
 """Time in s after which a lack of targets or of changes is a trouble; the display's first turn can report it."""
-FIRST_SAMPLES = 1000
-"""Number of samples whose timestamps define t = 0, as in the run file; later ones would add the clocks' difference."""
 MOTION_EVERY_NS = 1_900_000_000
 """Interval between analyses of the motion, about two progress lines or one swing; each takes a few milliseconds."""
 
@@ -118,14 +117,13 @@ class Usefulness:
 
 
 class LiveState:
-    """The state derived from the samples so far; ``zero_ns`` is the host time at the run's t = 0, once it is known."""
+    """The state derived from the samples so far; ``origin`` is the host time at the run's t = 0."""
 
     def __init__(self, rate_hz: float) -> None:
         self.samples = self.missing = 0
         self._rate_hz = rate_hz
         self.useful: dict[int, Usefulness] = {}
-        self.zero_ns: int | None = None
-        self._early = 0
+        self.origin = Origin()
         self._begin(0)
 
     def _begin(self, channel: int) -> None:
@@ -155,12 +153,9 @@ class LiveState:
                 continue
             self.missing_share = missing / len(block)
             self._motion.push(block.t, block.distance, block.flags)
+            if channel == 0:
+                self.origin.push(block)
             if block.host_ns is not None:
-                if channel == 0 and self._early < FIRST_SAMPLES:
-                    # A timestamp may be late but never early.
-                    zero_ns = int((block.host_ns - 1e9 * block.t)[: FIRST_SAMPLES - self._early].min())
-                    self.zero_ns = zero_ns if self.zero_ns is None else min(zero_ns, self.zero_ns)
-                    self._early += len(block)
                 self._stamps.append(block.host_ns)
                 self._last_ns = int(block.host_ns[-1])
 
@@ -216,7 +211,7 @@ def progress_of(
             return NotYet(f"no motion shown ({type(error).__name__})")
 
     shown.follow(tee.first)
-    zero_ns = start_ns if shown.zero_ns is None else shown.zero_ns
+    zero_ns = start_ns if shown.origin.ns is None else shown.origin.ns
     return Progress(
         seconds=(now_ns - start_ns) * 1e-9,
         samples=shown.samples,

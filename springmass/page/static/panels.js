@@ -13,7 +13,7 @@ function begin_anew() {
   shown_zero = bench().rest_m;
   play_time = null;
   if (run.source === "REPLAY") window_index = WINDOWS.length - 1, show_window();
-  const what = `${shown_zero === undefined ? KINDS[run.quantity] || run.quantity : "displacement"} / ${unit()}`;
+  const what = `${shown_zero === undefined ? KINDS[run.quantity] || run.quantity.replaceAll("_", " ") : "displacement"} / ${unit()}`;
   if (position) for (const chart of [position, amplitude, phase, spectrum]) chart.destroy();
   // The page's own cursor stays at its sample; uPlot's cursor stays at its place on the screen, so it is turned off.
   const select = { cursor: { x: false, y: false, points: { show: false }, drag: { x: true, y: false, setScale: false } }, hooks: { setSelect: [selected], drawAxes: [draw_selection, draw_fits], draw: [draw_cursors] } };
@@ -23,7 +23,7 @@ function begin_anew() {
   phase = make("phase", `velocity / (${unit()}/s)`, what, still, { equal: true });
   spectrum = make("spectrum", `amplitude / ${unit()}`, "frequency / Hz", still, { log: true });
   forget_selection();
-  [amplitude, spectrum].forEach(name_series);
+  for (const shown of [amplitude, spectrum]) show_chart(shown, null);
   show_motion();
   dirty = true;
 }
@@ -70,7 +70,7 @@ function show_motion() {
   show_ages();
   const findings = (motion.findings || []).map((f) => item(f.advice ? `${f.message.replace(/\.$/, "")}. ${f.advice}` : f.message, f.severity));
   $("findings").replaceChildren(...(findings.length ? findings : [item(motion.count ? "No warnings." : "No analysis yet.")]));
-  for (const [shown, name] of [[amplitude, "amplitude"], [spectrum, "spectrum"]]) if (motion.charts && motion.charts[name]) show_chart(shown, motion.charts[name].panels[0]);
+  for (const shown of [amplitude, spectrum]) show_chart(shown, motion.charts && motion.charts[shown.box.id]);
   if (selection) show_region_fits();
 }
 
@@ -102,11 +102,13 @@ function stopping(stop, age_s) {
   return left > 0 ? `About ${seconds(left)} s more for ${wanted}.` : "";
 }
 
-// A chart of the report; its label names the unit, which the analysis chooses.
-function show_chart(shown, panel) {
+// A chart of the report, whose label names the unit that the analysis chose; without a motion there is none.
+function show_chart(shown, chart) {
+  shown.box.closest("section").hidden = !chart;
+  if (!chart) return;
   const label = shown.panel.label;
-  shown.show(panel);
-  if (panel.label !== label) shown.build();
+  shown.show(chart.panels[0]);
+  if (shown.panel.label !== label) shown.build();
   name_series(shown);
 }
 
