@@ -166,9 +166,9 @@ def test_runs_of_a_course_sort_and_are_filtered(page: Page, page_of: PageOf) -> 
     page.goto(page_of("course").as_uri())
     names = page.locator("tbody th")
     assert names.all_text_contents()[:2] == ["bad", "still"]
-    page.get_by_role("button", name="T", exact=True).click()
+    page.get_by_role("button", name="T / s", exact=True).click()
     assert names.all_text_contents()[:3] == ["run2", "run1", "run0"]
-    page.get_by_role("button", name="T", exact=True).click()
+    page.get_by_role("button", name="T / s", exact=True).click()
     assert names.all_text_contents()[:3] == ["run0", "run1", "run2"]
     page.get_by_label("Show runs that contain").fill("TUE")
     assert page.locator("tbody tr:visible th").all_text_contents() == ["run1"]

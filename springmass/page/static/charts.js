@@ -59,6 +59,13 @@ function powers(plot, splits, axis) {
   return splits.map((v) => (v !== null && (few ? [1, 2, 5] : [1]).some((m) => Math.abs(Math.log10(v / m) - Math.round(Math.log10(v / m))) < 1e-9) ? v : null));
 }
 
+// All 1 to 9 of each power of ten: uPlot's own begin at the end of the axis, which is no round number.
+function decades(_, axis, min, max) {
+  const found = [];
+  for (let power = Math.floor(Math.log10(min)); 10 ** power <= max; power++) for (let m = 1; m < 10; m++) found.push(Number(`${m}e${power}`));
+  return found.filter((v) => v >= min && v <= max);
+}
+
 // One pair of axes. ``more`` may have: scale (of all sizes, for paper), dark, size, hooks, cursor, hidden (labels that are
 // switched off), joined (samples as a line), group (panels with one range), range of x.
 class Panel {
@@ -120,7 +127,7 @@ class Panel {
     const axis = (label, log) => ({
       label, stroke: ink, font: `${12 * k}px ${FONT}`, labelFont: `${12 * k}px ${FONT}`, labelSize: 18 * k, gap: 4 * k,
       grid: { stroke: grey + "40", width: k, ...(log && { filter: powers }) }, ticks: { stroke: grey, width: k, size: 5 * k, ...(log && { filter: powers }) },
-      values: ticks, ...(log && { filter: powers }),
+      values: ticks, ...(log && { filter: powers, splits: decades }),
     });
     // All panels of a chart have the width of the widest numbers, so that their axes stand beneath one another.
     const left = (_, values) => (more.group.left = Math.max(more.group.left, k * (14 + 7 * Math.max(2, ...(values || []).map((v) => String(v).length)))));
