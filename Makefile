@@ -81,7 +81,7 @@ docs-figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/figures/screenshots.py
 
 docs-trade: $(VENV)/.installed-dev
-	$(BIN)/python docs/figures/trade.py
+	$(BIN)/python benchmarks/trade.py
 
 # Needs no network and no .venv. The tests build it anew and compare it with the one that travels.
 firmware:

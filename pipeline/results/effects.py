@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
 from pipeline.bench.air import air_viscosity, speed_of_sound
-from pipeline.bench.derived_drag import STEADY_DISC_DRAG, DerivedDrag, needs_drag
+from pipeline.bench.derived_drag import STEADY_DISC_DRAG, DerivedDrag
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
@@ -82,7 +82,6 @@ def simulated_effects(
     terms: Sequence[Term],
     seconds: float,
     drag: DerivedDrag | None,
-    without: Sequence[str],
 ) -> tuple[Effect, ...]:
     """Return the effects table of a simulation, whose terms are empty for a named method, which solves all of them.
 
@@ -97,9 +96,7 @@ def simulated_effects(
         return 2.0 * math.sin(min(0.25 * share * omega * seconds, 0.5 * math.pi))
 
     def moved(name: str, share: float, what: str) -> Effect:
-        included = {"spring_mass": "spring-mass", "added_mass": "disc"}[name] not in without
-        why = f"{what}: {share:.2g} of the bob's mass" + ("" if included else "; left out by --without")
-        return Effect(name, turned(share), None, "1", included, why)
+        return Effect(name, turned(share), None, "1", True, f"{what}: {share:.2g} of the bob's mass")
 
     u_kelvin, length = scene_air(scene)[0].u, 4.0 * GRAVITY / omega**2
     softer = f"the air's u of {u_kelvin:g} K makes a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
@@ -145,9 +142,7 @@ def _disc(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | No
         hint = "" if any(problem.equation.laws()) else "; nothing damps the motion: add [disc] or [damping]"
         return Effect("disc_drag", None, None, "1", False, f"the scene names no disc{hint}")
     if drag is None:
-        left_out = needs_drag(scene)
-        why = "left out by --without" if left_out else "[damping] is stated, the disc's drag with it"
-        return Effect("disc_drag", None, None, "1", not left_out, why)
+        return Effect("disc_drag", None, None, "1", True, "[damping] is stated, the disc's drag with it")
     start = problem.amplitude_m() or 1.0
     law = np.array([[start, 0.0, *drag.joint.values]])  # it is derived where nothing else damps
     size = 1.0 - float(amplitudes(np.array([0.0, seconds]), law)[0, 1]) / start

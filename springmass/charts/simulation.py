@@ -11,8 +11,8 @@ from pipeline.dynamics import Trajectory
 from pipeline.dynamics.band import Band
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of
-from springmass.runs.simulating.eulers import EULERS, Eulers, beside_exact
-from springmass.runs.simulating.simulation import Against, Simulation
+from springmass.runs.simulating.against import Against
+from springmass.runs.simulating.simulation import EULERS, Eulers, Simulation, beside_exact
 
 PERIODS, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
 POINTS = 1500

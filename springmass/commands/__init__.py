@@ -21,25 +21,24 @@ if TYPE_CHECKING:
 
 EVERY_COMMAND = Group("Every command", sort_key=5)
 FIRST = {
-    "demo": "Replay, analyse and compare the bundled recordings, and print the results.",
-    "analyse": "Analyse recordings: print results and findings, and write a report.",
-    "explain": "Explain a warning: meaning, cause, advice and an example. Without a code, list all warnings.",
-    "scene": "Print a scene template, check a scene, or save a scene and marks next to a recording.",
-    "compare": "Compare runs of one spring: whether they agree, and whether one damping law fits them all.",
-    "batch": "Analyse a course of many runs into one table and a page; you can interrupt and resume it.",
-    "ports": "List the serial ports and the sensors that answer on them.",
-    "record": "Record a run from the bench and store every byte that the sensor sends.",
+    "demo": "Analyse and compare the bundled recordings.",
+    "analyse": "Print period, damping and warnings of recordings; write a report.",
+    "explain": "Explain a warning, or list all of them.",
+    "scene": "Print or check a scene: what is known of the bench; add notes.",
+    "compare": "Compare runs of one spring: do they agree on it and on one law?",
+    "batch": "Analyse a course of many runs into one table and a page.",
+    "ports": "List serial ports, what speaks on them, and the sensors known.",
+    "record": "Record a run from the bench, every byte of it.",
     "page": "Show a recording in a browser, live or afterwards.",
 }
 """The commands that a student, a course and a bench need, with their help."""
 FURTHER = {
     "recover": "Build a run file from a wire log, even from a damaged one.",
     "replay": "Play a recording through the interface of a live sensor.",
-    "convert": "Convert a recording to a run file or another format, or extract the original from a run file.",
-    "formats": "List the formats of recordings, or identify the format of a file.",
-    "simulate": "Solve the equation of motion of a scene, to a given tolerance or with a method that you choose.",
-    "trade": "Measure what accuracy costs on this machine: error relative to its lower bound, and computing time.",
-    "sensors": "List the families of rangefinders with rate, resolution, range and limits.",
+    "convert": "Convert a recording, or extract the original from a run file.",
+    "formats": "List the formats of recordings, or identify that of a file.",
+    "simulate": "Solve the equation of motion of a scene.",
+    "trade": "Measure what accuracy costs on this machine, in two tables.",
     "firmware": "Wire, flash and set the 100 Hz rangefinder.",
     "doctor": "Check this installation.",
 }

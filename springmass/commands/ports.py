@@ -1,4 +1,4 @@
-"""``springmass ports``: the serial ports of this machine and what speaks on them."""
+"""``springmass ports``: the serial ports of this machine, what speaks on them, and the sensors that can be recorded."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from acquisition.clock import SystemClock
-from acquisition.decoders.registry import describe_bytes, probe
+from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.errors import PortError, visible
 from acquisition.live.serial_port import SerialPort, list_ports
 from springmass.commands.options import Json, flag, option
 from springmass.errors import OK, SENSOR, ProgramError, suggest, tell
+from springmass.terminal.printing import wrapped
 
 PROBE_S = 1.0
 BAUDS = (115200, 9600)
@@ -26,11 +27,11 @@ def ports(
     port: Annotated[tuple[str, ...], option("P", "also listen on this address; may be repeated")] = (),
     as_json: Json = False,
 ) -> int:
-    """List ports and the sensors on them: listen to each port for a second at each of the usual speeds."""
+    """List ports, listening to each for a second at each of the usual speeds, and the families of sensors."""
     rows = [_row(each.device, each.description or "", not no_probe) for each in list_ports()]
     rows += [_row(address, "named on the command line", True) for address in port]
     if as_json:
-        print(json.dumps(rows))
+        print(json.dumps({"ports": rows, "sensors": [family.describe() for family in families()]}))
         return OK
     if not rows:
         print("no serial port on this machine; `springmass record --simulate` runs without one")
@@ -38,6 +39,11 @@ def ports(
         print(visible(f"{row['device']:<16} {row['description']}"))
         if row["heard"] is not None:
             print(visible(f"{'':<16} {row['heard']}"))
+    print(f"\n{'sensor':<18} {'rate / Hz':>9} {'step / mm':>9} {'range / m':>13} {'baud':>7}")
+    for family in families():
+        reach, step = "{:g} to {:g}".format(*family.range_m), f"{family.resolution_m * 1e3:.3g}"
+        print(f"{family.name:<18} {family.rate_hz:>9.3g} {step:>9} {reach:>13} {family.baud:>7}")
+        print(wrapped(f"    {family.title}. {family.limits}", "    "))
     known = [row["device"] for row in rows if row["families"]]
     suggest(f"springmass record --port {shlex.quote(known[0])}" if known else "springmass record --simulate")
     return OK

@@ -70,9 +70,7 @@ class RecordOptions:
     port: Annotated[
         tuple[str, ...], option("P", "port of a sensor; may be repeated (default: the port on which a sensor answers)")
     ] = ()
-    sensor: Annotated[
-        tuple[str, ...], option("NAME", "family of the sensor, from the list of `springmass sensors`")
-    ] = ()
+    sensor: Annotated[tuple[str, ...], option("NAME", "family of the sensor, from the list of `springmass ports`")] = ()
     simulate: Annotated[bool, flag("record a simulated bench instead of a port; --scene says which")] = False
     output: Annotated[
         File | None, output("RUN.h5", "run file to create, never overwritten (default: date, time and title)")

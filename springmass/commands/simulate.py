@@ -6,156 +6,122 @@ import json
 import math
 import shlex
 import sys
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from cyclopts import Parameter
 
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band, spread
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
-from springmass.commands.options import Figures, File, flag, option, output
+from springmass.commands.options import Figures, File, Json, Overwrite, flag, option
+from springmass.commands.options import output as output_option
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import ask_about, read_scene
-from springmass.runs.simulating.prepared import Prepared, prepare
 from springmass.runs.simulating.simulation import (
+    Prepared,
     Simulation,
     count_of,
     default_tolerance,
     demand_stable,
+    prepare,
+    simulated,
+    summary,
 )
-from springmass.runs.simulating.simulation import simulate as simulated
-from springmass.runs.simulating.summaries import summary
 from springmass.terminal.printing import wrapped
-from springmass.values import Finite, NotNegative, Positive
+from springmass.values import Finite, Positive
 
-FAR_BELOW = 0.01  # fraction of the band; a smaller tolerance gives no benefit
-OF_OUTPUT = ("sensor", "noise_m", "echoes")
+FAR_BELOW = 1e-3  # of the band; a smaller tolerance gives no benefit
 
 
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class SimulateOptions:
-    """The options of ``springmass simulate``."""
-
-    scene: Annotated[File, option("S.toml", "scene file: masses, spring, start, damping")]
-    method: Annotated[str, option("NAME", "integrator, or auto (default: auto)")] = "auto"
-    dt: Annotated[Finite, option("S", "sampling interval and step of the solver, s (default: 0.01)")] = 0.01
-    seconds: Annotated[Positive, option("N", "length of the simulation, s (default: 10)")] = 10.0
+def simulate(
+    *,
+    scene: Annotated[File, option("S.toml", "scene file: masses, spring, start, damping")],
+    method: Annotated[str, option("NAME", "integrator, or auto (default: auto)")] = "auto",
+    dt: Annotated[Positive, option("S", "sampling interval and step of the solver, s (default: 0.01)")] = 0.01,
+    seconds: Annotated[Positive, option("N", "length of the simulation, s (default: 10)")] = 10.0,
     tolerance: Annotated[
         Finite | None, option("E", "largest error relative to the amplitude (default: from the band)")
-    ] = None
-    check: Annotated[bool, flag("also measure the error; this takes longer than the simulation")] = False
-    trade: Annotated[bool, flag("measure error and time of every method on this scene")] = False
-    without: Annotated[
-        tuple[Literal["drag", "disc", "spring-mass"], ...],
-        option("EFFECT", "leave out an effect that the scene implies; may be repeated"),
-    ] = ()
-    force: Annotated[bool, flag("simulate even if the step is unstable")] = False
-    against: Annotated[File | None, option("RUN", "measured run to compare with the prediction")] = None
-    output: Annotated[File | None, output("RUN.h5", "write the readings of a rangefinder to a run file")] = None
-    overwrite: Annotated[bool, flag("replace an existing RUN.h5")] = False
-    sensor: Annotated[
-        Literal["ideal", "rangefinder"] | None, option("NAME", "the sensor of RUN.h5 (default: rangefinder)")
-    ] = None
-    noise_m: Annotated[NotNegative | None, option("S", "noise of the sensor, m (default: from the scene, or 8e-5)")] = (
-        None
-    )
-    echoes: Annotated[NotNegative | None, option("HZ", "false echoes per second (default: 0.1)")] = None
-    seed: Annotated[int, option("N", "seed of the noise (default: 0)")] = 0
+    ] = None,
+    check: Annotated[bool, flag("also measure the error; this takes longer than the simulation")] = False,
+    force: Annotated[bool, flag("simulate even if the step is unstable")] = False,
+    against: Annotated[File | None, option("RUN", "measured run to compare with the prediction")] = None,
+    output: Annotated[File | None, output_option("RUN.h5", "write the readings of a sensor to a run file")] = None,
+    overwrite: Overwrite = False,
+    sensor: Annotated[Literal["ideal", "rangefinder"], option("NAME", "sensor of RUN.h5 (default: rangefinder)")] = (
+        "rangefinder"
+    ),
+    seed: Annotated[int, option("N", "seed of the sensor's noise (default: 0)")] = 0,
     folder: Annotated[
         File | None, option("DIR", "folder for NAME.simulated (default: here; with --json or -o: none)")
-    ] = None
-    figures: Figures = ()
-    json: Annotated[bool, flag("print one JSON object on standard output")] = False
-
-
-def simulate(*, options: SimulateOptions, read: ReadOptions = ReadOptions()) -> int:
+    ] = None,
+    figures: Figures = (),
+    as_json: Json = False,
+    read: ReadOptions = ReadOptions(),
+) -> int:
     """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
-    _demand(options)
-    count = count_of(options.seconds, options.dt)
-    scene, analysis = read_scene(options.scene), None
-    ask_about(scene, options.scene)
-    seconds, where = options.seconds, str(options.scene)
-    if options.against is not None:
+    count, where, say = count_of(seconds, dt), str(scene), sys.stderr if as_json else sys.stdout
+    if output is not None and Path(output).exists() and not overwrite:
+        raise ProgramError(f"{visible(str(output))}: exists; take another name, or --overwrite", USAGE)
+    stated, analysis, longest_s = read_scene(scene), None, seconds
+    ask_about(stated, scene)
+    if against is not None:
         from springmass.runs.simulating.against import duration_s
 
-        analysis = Run.of(options.against, scene, How.of(read.given())).analysis
-        seconds = max(seconds, duration_s(analysis))
-    ready = prepare(scene, seconds, analysis=analysis, without=options.without, where=where)
+        analysis = Run.of(against, stated, How.of(read.given())).analysis
+        longest_s = max(seconds, duration_s(analysis))
+    ready = prepare(stated, longest_s, analysis=analysis, where=where)
     if ready.from_run:
-        tell(f"from {options.against}: {', '.join(ready.from_run)}")
-    if options.trade:
-        from springmass.commands.trade import trade_of_scene
-
-        return trade_of_scene(ready, where, options.dt, count, options.tolerance, options.folder, options.json)
-    say = sys.stderr if options.json else sys.stdout
-    band, of_band = _band(ready, seconds)
-    tolerance, words = _tolerance(options, band)
-    if not options.force:
-        named_step = options.dt if options.tolerance is None else None
-        demand_stable(ready.problem, options.method, named_step, where=where)
-    terms = required(ready.problem, options.dt * count, tolerance)[1] if options.method == "auto" and tolerance else ()
-    effects = simulated_effects(ready.stated, ready.problem, terms, options.dt * count, ready.drag, options.without)
+        tell(f"from {against}: {', '.join(ready.from_run)}")
+    band, of_band = _band(ready, longest_s)
+    wanted = default_tolerance(band) if tolerance is None and method == "auto" else tolerance
+    if not force:
+        demand_stable(ready.problem, method, dt if tolerance is None else None, where=where)
+    terms = required(ready.problem, dt * count, wanted)[1] if method == "auto" and wanted else ()
+    effects = simulated_effects(ready.stated, ready.problem, terms, dt * count, ready.drag)
     try:
-        simulation = simulated(
-            ready.problem,
-            options.method,
-            options.dt,
-            count,
-            tolerance,
-            check=options.check,
-            timer=time.perf_counter,
-        )
+        simulation = simulated(ready.problem, method, dt, count, wanted, check=check)
     except DynamicsError as error:
-        raise ProgramError(f"{options.scene}: {error}", USAGE) from error
+        raise ProgramError(f"{scene}: {error}", USAGE) from error
     print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
-    print(_before(words, effects), file=say)
+    print(_before(_tolerance(wanted, band, given=tolerance is not None), effects), file=say)
     print(_after(simulation, count), file=say)
-    against = None
+    results, over = summary(simulation, effects, wanted, band), None
     if analysis is not None:
         from springmass.runs.simulating.against import deviation_text, lay_over
 
-        against = lay_over(analysis, ready.problem, options.method, options.dt, tolerance, band, ready.values())
-        left = f"rms {against.rms_m * 1e3:.3g} mm, noise of a sample {against.noise_m * 1e3:.3g} mm"
-        print("\n".join([f"against the run  {left}", *deviation_text(against)]), file=say)
-    results = summary(simulation, against, band, effects, tolerance)
-    if options.output is not None:
-        _write_readings(ready, options, results)
-    if options.folder is not None or not (options.json or options.output is not None):
-        from springmass.runs.simulating.written import write_folder
+        over = lay_over(analysis, ready.problem, method, dt, wanted, band, ready.values())
+        left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"
+        print("\n".join([f"against the run  {left}", *deviation_text(over)]), file=say)
+        results["against"] = over.summary()
+    written: list[Path] = []
+    if output is not None:
+        from springmass.runs.simulating.writing import write_readings
 
-        folder = write_folder(
-            simulation, against, band, ready.solved, where, options.folder or ".", results, options.figures
-        )
-        print(f"written          {visible(str(folder))}", file=say)
-        suggest(f"springmass analyse {shlex.quote(str(folder / 'run.h5'))} --scene {shlex.quote(str(options.scene))}")
-    if options.json:
+        write_readings(Path(output), ready, simulation, sensor, seed, where, results)
+        written.append(Path(output))
+    if folder is not None or not (as_json or output is not None):
+        from springmass.runs.simulating.writing import write_folder
+
+        made = write_folder(simulation, over, band, ready.solved, where, folder or ".", results, figures)
+        written.append(made / "run.h5")
+        print(f"written          {visible(str(made))}", file=say)
+    elif output is not None:
+        print(f"written          {visible(str(output))}", file=say)
+    for path in written[:1]:
+        suggest(f"springmass analyse {shlex.quote(str(path))} --scene {shlex.quote(where)}")
+    if as_json:
         print(json.dumps(results))
     return OK
 
 
-def _demand(options: SimulateOptions) -> None:
-    """Refuse combinations of options that make no sense."""
-    if options.dt <= 0:
-        raise ProgramError(f"--dt must be more than 0 s, got {options.dt:g}", USAGE)
-    given = [f"--{name.replace('_', '-')}" for name in OF_OUTPUT if getattr(options, name) is not None]
-    if given and options.output is None:
-        raise ProgramError(f"{', '.join(given)}: of the readings in a run file, got none; add -o RUN.h5", USAGE)
-    if options.sensor == "ideal" and len(given) > 1:
-        raise ProgramError(f"--sensor ideal has neither noise nor echoes, got {', '.join(given[1:])}", USAGE)
-
-
 def _band(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
-    """The band from the uncertain inputs and how it was computed, or the reason why there is none."""
+    """Return the band from the uncertain inputs and how it was computed, or the reason why there is none."""
     if not ready.values():
         return None, "none: the scene states no uncertainties"
     try:
@@ -165,43 +131,38 @@ def _band(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
     return band, f"{band.members} motions drawn from the uncertainties of {', '.join(band.quantities)}"
 
 
-def _tolerance(options: SimulateOptions, band: Band | None) -> tuple[float | None, str]:
-    """The tolerance, with words on its origin or a hint that it is far below the band."""
-    if options.tolerance is None:
-        if options.method != "auto":
-            return None, ""
-        found = default_tolerance(band)
-        whence = "the default" if band is None else f"a hundredth of the band, {band.relative_u:.1g} of the amplitude"
-        return found, f"tolerance        {found:.1g} of the amplitude: {whence}"
-    found = float(options.tolerance)
-    words = f"tolerance        {found:g} of the amplitude"
-    if band is not None and 0.0 < found < 0.1 * FAR_BELOW * band.relative_u:
+def _tolerance(tolerance: float | None, band: Band | None, *, given: bool) -> str:
+    """Say where the tolerance comes from, or that it is far below the band."""
+    if tolerance is None:
+        return ""
+    words = f"tolerance        {tolerance:g} of the amplitude"
+    if not given:
+        of_band = "" if band is None else f"a hundredth of the band, {band.relative_u:.1g} of the amplitude"
+        return f"{words}: {of_band or 'the default'}"
+    if band is not None and 0.0 < tolerance < FAR_BELOW * band.relative_u:
         turns = dict(zip(band.quantities, np.abs(band.of_log[:, -1].imag).tolist(), strict=True))
         name = max(turns, key=lambda each: turns[each])
         words += (
             f", far below the band: u({name}) alone is {turns[name]:.1g} rad after {band.t[-1]:.3g} s; "
             f"{default_tolerance(band):.0e} is enough here"
         )
-    return found, words
+    return words
 
 
 def _before(tolerance: str, effects: Sequence[Effect]) -> str:
-    """The effects that act, and the tolerance."""
+    """Return the effects that act, and the tolerance."""
     lines = ["effects          change of the motion, of the amplitude"]
     for effect in effects:
         size = "" if effect.predicted is None else f"{effect.predicted:.2g}"
         mark = "in " if effect.included else "out"
         lines.append(wrapped(f"  {mark}  {effect.name:<30} {size:>8}  {effect.why}", " " * 48))
-    if tolerance:
-        lines.append(wrapped(tolerance, " " * 17))
-    return "\n".join(lines)
+    return "\n".join([*lines, *([wrapped(tolerance, " " * 17)] if tolerance else [])])
 
 
 def _after(simulation: Simulation, count: int) -> str:
-    """Method, step, errors and time."""
+    """Return method, step, errors and time."""
     solution, check = simulation.solution, simulation.check
-    lines = [f"method           {solution.integrator.words}"]
-    steps = f"{count} states"
+    lines, steps = [f"method           {solution.integrator.words}"], f"{count} states"
     if solution.integrator.order:
         steps = f"{solution.parts * count} steps"
         lines.append(f"step             {solution.step_s:.6g} s, {steps}")
@@ -212,37 +173,10 @@ def _after(simulation: Simulation, count: int) -> str:
     if check is not None:
         lines.append(f"measured error   {_errors(check.error, check.velocity_error)}, against {check.words}")
     took = f"{simulation.choosing_s * 1e3:.2g} ms to choose, {solution.running_s * 1e3:.2g} ms to run"
-    lines.append(f"price            {took}, {steps}")
-    return "\n".join(lines)
+    return "\n".join([*lines, f"price            {took}, {steps}"])
 
 
 def _errors(position: float, velocity: float) -> str:
     if not math.isfinite(position):
         return "beyond all bounds"
     return f"{position:.2g} of the amplitude, {velocity:.2g} of the greatest velocity"
-
-
-def _write_readings(ready: Prepared, options: SimulateOptions, results: dict[str, object]) -> None:
-    """Write the readings of a simulated rangefinder as a run of kind simulated."""
-    from springmass.runs.simulating.written import write_readings
-
-    assert options.output is not None
-    path = Path(options.output)
-    if path.exists() and not options.overwrite:
-        raise ProgramError(f"{visible(str(path))}: exists; take another name, or --overwrite", USAGE)
-    write_readings(
-        path,
-        ready,
-        method=options.method,
-        seconds=options.seconds,
-        spacing_s=options.dt,
-        sensor=options.sensor or "rangefinder",
-        noise_m=options.noise_m,
-        echoes_hz=options.echoes,
-        seed=options.seed,
-        where=str(options.scene),
-        results=results,
-    )
-    say = sys.stderr if options.json else sys.stdout
-    print(f"written          {visible(str(path))}", file=say)
-    suggest(f"springmass analyse {shlex.quote(str(path))} --scene {shlex.quote(str(options.scene))}")

@@ -89,7 +89,7 @@ class Sensor:
             what = describe_bytes(heard, self.options if self.family.name == "text-lines" else None)
         return (
             f"{self.port.name}: a {self.family.name} sensor at {self.baud} baud was expected, {what}; "
-            "see `springmass sensors` for --sensor and --baud"
+            "see `springmass ports` for --sensor and --baud"
         )
 
 

@@ -59,7 +59,7 @@ def bench_position(
     >>> f"{bench_position(scene)(0.1 * np.pi):.6f}"
     '0.200000'
     """
-    from springmass.runs.simulating.prepared import prepare
+    from springmass.runs.simulating.simulation import prepare
 
     problem = prepare(scene, seconds, where=where).problem
     step_s = 1.0 / (STEPS_A_RADIAN * problem.equation.angular_frequency_per_s)

@@ -218,7 +218,8 @@ def test_a_port_is_probed(cli: Callable) -> None:
     """Listening to a port says which family speaks on it."""
     with speaking("line-protocol") as sensor:
         sensor.start()
-        (rows,) = cli("ports", "--port", sensor.path, "--json").results
+        (found,) = cli("ports", "--port", sensor.path, "--json").results
+        rows = found["ports"]
     (row,) = [row for row in rows if row["device"] == sensor.path]
     assert row["families"][0] == "line-protocol"
 

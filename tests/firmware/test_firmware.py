@@ -244,7 +244,7 @@ def test_the_sketch_is_one_file_that_needs_no_library() -> None:
 
 
 def test_what_the_family_says_is_what_the_firmware_does(emulate: Emulate) -> None:
-    """Rate and step, as `springmass sensors` prints them."""
+    """Rate and step, as `springmass ports` prints them."""
     run = emulate(3.0)
     device_us = np.array([row[1] for row in run.readings()])
     assert set(1e6 / np.diff(device_us)) == {FAMILY.rate_hz}

@@ -16,7 +16,7 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics.band import spread
 from pipeline.numerics.estimate import Estimate
 from pipeline.track import Track
-from springmass.runs.simulating.prepared import prepare
+from springmass.runs.simulating.simulation import prepare
 
 FOLDER = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "AyushPandhi__Pandhi_Ayush_PHY224"
 ASSUMED_KG = {"bare": Estimate(0.2007, 5e-5, "kg"), "disc": Estimate(0.2176, 5e-5, "kg")}

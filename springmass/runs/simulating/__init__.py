@@ -1,5 +1,5 @@
-"""Simulations: preparing a scene, solving and checking its motion, and comparing it with a measured run.
+"""Simulations: solving the motion of a scene, laying it over a measured run, and writing both.
 
-In: a scene and options. Out: a trajectory with its errors, the effects, the uncertainty band, and a comparison of a
-measured run with the prediction. To add an effect, add one row to ``pipeline.results.simulated_effects``.
+In: a scene and options. Out: a trajectory with its errors, effects and uncertainty band. To add an effect, add one row
+to ``pipeline.results.effects.simulated_effects``.
 """

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analysis import Analysis, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem
 from pipeline.dynamics.band import C16, Band
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.runs.simulating.simulation import FINE, Against, Move, count_of, solve
-
-__all__ = ["completed", "deviation_text", "duration_s", "lay_over"]
+from springmass.runs.simulating.simulation import FINE, count_of, solve
 
 WIDER = 1.96  # standard deviations of the noise by which the band is widened, for 95 %
 HALF = 0.5
@@ -28,27 +26,55 @@ FARTHEST = 1e300  # m; residual assigned to a change that gives no finite residu
 COEFFICIENTS = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
 
 
+@dataclass(frozen=True, slots=True)
+class Move:
+    """The change of one input alone that brings the prediction closest to the run, and the rms that is then left."""
+
+    name: str
+    given: float
+    value: float
+    in_u: float
+    rms_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Against:
+    """A measured run with a prediction laid over it, at the samples used (n,), in s and m.
+
+    ``band`` has the quantiles (4, n) of the predicted distance relative to ``predicted``; ``inside`` is the share of
+    the samples within its 95 % widened by the noise, and ``leaves_s`` the time from which the run leaves it.
+    """
+
+    t: F8
+    measured: F8
+    predicted: F8
+    rms_m: float
+    noise_m: float
+    band: F8 | None = None
+    inside: float | None = None
+    leaves_s: float | None = None
+    moves: tuple[Move, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """Return the comparison as the JSON of ``springmass simulate`` has it."""
+        return {
+            "rms_m": self.rms_m,
+            "noise_m": self.noise_m,
+            "inside_95": self.inside,
+            "leaves_s": self.leaves_s,
+            "moves": [
+                {"name": move.name, "from": move.given, "to": move.value, "in_u": move.in_u, "rms_m": move.rms_m}
+                for move in self.moves
+            ],
+        }
+
+
 def completed(scene: Scene, analysis: Analysis, *, damping: bool = True) -> tuple[Scene, Joint]:
     """Return a scene completed with values from a run's analysis, and the joint distribution of those values.
 
-    The start is always taken from the run, because nobody releases a bob exactly at the first sample. The damping is
-    taken from the run only if ``damping`` is true.
+    The start is always taken from the run, because nobody releases a bob exactly at the first sample; the damping only
+    if ``damping`` is true.
 
-    Returns
-    -------
-    Scene
-    Joint
-        Values and covariance of the scene's attributes taken from the run: start, spring constant and damping.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 3 if the run does not oscillate.
-    TrackError
-        If the measured quantity is not a length.
-
-    Notes
-    -----
     With :math:`y_0 = A\\cos\\varphi` and :math:`v_0 = -\\omega A\\sin\\varphi`, the start takes its uncertainty from
     amplitude and phase. A spring constant :math:`k = \\omega^2 m` takes only the uncertainty of the frequency, because
     that of the masses is part of the scene. The phase at the first sample comes from the straight line through all
@@ -99,26 +125,10 @@ def lay_over(
     band: Band | None,
     values: Mapping[str, Estimate] | None = None,
 ) -> Against:
-    """Overlay a prediction on a measured run, starting at the run's first used sample.
+    """Lay a prediction over a measured run from its first used sample on; ``problem`` is of the completed scene.
 
-    Parameters
-    ----------
-    analysis : Analysis
-        Analysis of the run.
-    problem : Problem
-        Problem of the scene that :func:`completed` returned.
-    method, step_s, tolerance
-        As in :func:`springmass.runs.simulating.simulation.solve`; the step of ``auto`` is short enough for
-        interpolation.
-    band : Band or None
-        Uncertainty band of the prediction.
-    values : mapping, optional
-        The inputs of the band by name, for which the best-fitting values are sought.
-
-    Raises
-    ------
-    DynamicsError
-        If the method cannot solve the problem, or the numbers diverge.
+    The step of ``auto`` is short enough for interpolation. ``values`` are the inputs of the band by name, for which
+    the best-fitting values are sought.
     """
     motion = _oscillation(analysis)
     used = analysis.conditioned.used

@@ -1,83 +1,107 @@
-"""A simulation: the problem, the integrator, the error estimate and the measured error."""
+"""A simulation: the scene prepared, its motion solved, and the error stated and measured."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pipeline.bench.derived_drag import DerivedDrag, derive_drag, needs_drag
+from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem, Trajectory, get_integrator
-from pipeline.dynamics.band import Band
+from pipeline.dynamics.band import Band, uncertain
 from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
 from pipeline.dynamics.solve_ivp import DOP853
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
+from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.results.effects import Effect
 from pipeline.track import F8
 from springmass.errors import USAGE, ProgramError
 
-__all__ = [
-    "FINE",
-    "Against",
-    "Check",
-    "Move",
-    "Simulation",
-    "checked",
-    "count_of",
-    "default_tolerance",
-    "demand_stable",
-    "reference",
-    "simulate",
-    "solve",
-]
+if TYPE_CHECKING:
+    from pipeline.analysis import Analysis
 
 DEFAULT_TOLERANCE = 1e-6
 FINE = 24.0  # states per radian; interpolation between them has an error of 1e-8 of the amplitude
 BAND_SHARE, LARGEST_DEFAULT = 0.01, 1e-3
 MOST_SAMPLES = 20_000_000
 REFERENCE_RTOL = 1e-13
+EULERS = (("forward-euler", "forward Euler"), ("symplectic-euler", "symplectic Euler"))
+ROUGH, EXACT = 1e-3, 1e-9  # errors over the amplitude: one that is visible, and one that is called exact
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """A scene that is ready to be solved: as stated, completed from a run, and with its derived drag.
+
+    ``measured`` is the joint distribution of what was taken from the run, whose names are ``from_run``, and of the
+    derived drag.
+    """
+
+    stated: Scene
+    solved: Scene
+    drag: DerivedDrag | None
+    measured: Joint | None
+    from_run: tuple[str, ...]
+    problem: Problem
+
+    def values(self) -> dict[str, Estimate]:
+        """Return the uncertain attributes of the scene by name."""
+        joint = uncertain(self.solved, self.measured)
+        return {name: joint[name] for name in joint.names}
+
+
+def prepare(scene: Scene, seconds: float, *, analysis: Analysis | None = None, where: str = "scene") -> Prepared:
+    """Return a scene prepared for solving; ``SceneError`` or ``DynamicsError`` if it describes no motion.
+
+    The analysis of a run supplies the start, and spring constant and damping if the scene does not state them. Drag
+    that disc and air imply is not taken from the run, for that would be no prediction.
+    """
+    derived, measured = needs_drag(scene), None
+    if analysis is not None:
+        from springmass.runs.simulating.against import completed
+
+        scene, measured = completed(scene, analysis, damping=not derived)
+    from_run = () if measured is None else measured.names
+    solved, problem, drag = scene, Problem.from_scene(scene, where=where), None
+    if derived:
+        drag = derive_drag(scene, problem.amplitude_m(), seconds)
+        gamma, beta = drag.joint["gamma_per_s"], replace(drag.joint["beta_per_m_s"], unit="1/(m s)")
+        solved = replace(scene, gamma_per_s=gamma, beta_per_m_s=beta)
+        measured = _together(measured, drag.joint)
+        problem = Problem.from_scene(solved, where=where)
+    return Prepared(scene, solved, drag, measured, from_run, problem)
+
+
+def _together(one: Joint | None, other: Joint) -> Joint:
+    """Return both joint distributions as one, with no correlation between the two."""
+    if one is None:
+        return other
+    size = len(one.names)
+    covariance = np.zeros((size + len(other.names),) * 2)
+    covariance[:size, :size], covariance[size:, size:] = one.covariance, other.covariance
+    values = np.concatenate([one.values, other.values])
+    return Joint((*one.names, *other.names), values, covariance, (*one.units, *other.units))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Check:
-    """The error of a trajectory, measured against another method.
-
-    Parameters
-    ----------
-    reference : Trajectory
-        Reference solution at the times of the trajectory.
-    words : str
-        How the reference was made.
-    error, velocity_error : float
-        Maximum differences of displacement and velocity, relative to the starting amplitude and to its product with the
-        angular frequency; never below the resolution.
-    resolution : float
-        Possible error of the reference itself, relative to the starting amplitude.
-    """
+    """The errors of a trajectory over amplitude and greatest velocity, measured against a reference."""
 
     reference: Trajectory
     words: str
     error: float
     velocity_error: float
-    resolution: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """A trajectory with its error.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem with everything that the scene states.
-    solution : Solution
-        Trajectory, integrator, step, stated error, and the terms that were solved.
-    check : Check or None
-        The measured error, if it was requested.
-    choosing_s : float
-        Time spent on choosing method and step, s; it covers all runs except the one that is returned.
-    """
+    """A solved problem, its measured error if that was requested, and the time spent on choosing method and step."""
 
     problem: Problem
     solution: Solution
@@ -90,69 +114,8 @@ class Simulation:
         return self.solution.trajectory
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Against:
-    """A measured run with a prediction overlaid.
-
-    Parameters
-    ----------
-    t, measured, predicted : (n,) float64
-        Time in s, measured and predicted distance in m, of the samples used.
-    rms_m : float
-        Root mean square of measured minus predicted, m.
-    noise_m : float
-        Noise of one sample from the analysis, m.
-    band : (4, n) float64 or None
-        Quantiles of the predicted distance relative to ``predicted``, m, as in :class:`pipeline.dynamics.band.Band`.
-    inside : float or None
-        Fraction of the samples within the 95 % band widened by the noise; None without a band.
-    leaves_s : float or None
-        Time at which the record leaves the widened band, s; None if it never does.
-    moves : tuple of Move
-        The change in each input alone that fits the record best, with the input that explains the most first.
-    """
-
-    t: F8
-    measured: F8
-    predicted: F8
-    rms_m: float
-    noise_m: float
-    band: F8 | None = None
-    inside: float | None = None
-    leaves_s: float | None = None
-    moves: tuple[Move, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Move:
-    """The change of one input that brings the prediction closest to the record.
-
-    Parameters
-    ----------
-    name : str
-    given, value : float
-        The scene's value, and the value that fits the record best.
-    in_u : float
-        The change in standard uncertainties.
-    rms_m : float
-        Root mean square of the remaining residuals, m.
-    """
-
-    name: str
-    given: float
-    value: float
-    in_u: float
-    rms_m: float
-
-
 def count_of(seconds: float, spacing_s: float) -> int:
-    """Return the number of spacings in a run.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if the number is zero, or too large for the memory of a machine.
-    """
+    """Return the number of spacings in a run; refuse none, and more than the memory of a machine holds."""
     count = round(seconds / spacing_s) if spacing_s > 0 else 0
     if not 1 <= count <= MOST_SAMPLES:
         raise ProgramError(
@@ -161,44 +124,20 @@ def count_of(seconds: float, spacing_s: float) -> int:
     return count
 
 
-def solve(
-    problem: Problem,
-    method: str,
-    spacing_s: float,
-    count: int,
-    tolerance: float | None,
-    timer: Callable[[], float] = lambda: 0.0,
-) -> Solution:
-    """Solve a motion with ``auto`` or with a named method.
+def solve(problem: Problem, method: str, spacing_s: float, count: int, tolerance: float | None) -> Solution:
+    """Solve a motion with ``auto`` or with a named method; ``DynamicsError`` if that cannot keep the tolerance.
 
-    Parameters
-    ----------
-    problem : Problem
-    method : str
-        "auto" or a name of :data:`pipeline.dynamics.INTEGRATORS`.
-    spacing_s : float
-        Time between samples, s. It is also the step if a method is named without a tolerance.
-    count : int
-        Number of spacings.
-    tolerance : float or None
-        Maximum error relative to the amplitude; None: 1e-6 for "auto" and for methods without a step, and no limit for
-        methods with a step.
-    timer : callable
-        Returns a time in seconds.
-
-    Raises
-    ------
-    DynamicsError
-        If the method is unknown, or the tolerance cannot be reached at all or not by this method.
+    Without a tolerance a method with a step takes the spacing as its step, and the others keep 1e-6.
     """
+    wanted = DEFAULT_TOLERANCE if tolerance is None else tolerance
     if method == "auto":
-        return auto(problem, spacing_s, count, DEFAULT_TOLERANCE if tolerance is None else tolerance, timer)
+        return auto(problem, spacing_s, count, wanted, time.perf_counter)
     integrator = get_integrator(method)
     if tolerance is None and integrator.order:
-        return solved_once(problem, integrator, spacing_s, count, timer)
+        return solved_once(problem, integrator, spacing_s, count, time.perf_counter)
     if tolerance is not None:
         demand_tolerance(problem, spacing_s, count, tolerance)
-    return halved(problem, integrator, spacing_s, count, DEFAULT_TOLERANCE if tolerance is None else tolerance, timer)
+    return halved(problem, integrator, spacing_s, count, wanted, time.perf_counter)
 
 
 def default_tolerance(band: Band | None) -> float:
@@ -209,109 +148,56 @@ def default_tolerance(band: Band | None) -> float:
 
 
 def demand_stable(problem: Problem, method: str, step_s: float | None, *, where: str) -> None:
-    """Refuse a step beyond the stability limit of its method.
-
-    Parameters
-    ----------
-    problem : Problem
-    method : str
-    step_s : float or None
-        None: the method may take any sufficiently short step.
-    where : str
-        Name of the scene in the error.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if the step is unstable; the message names the limit and the remedy.
-    """
+    """Refuse a step beyond the limit of its method; without a step it may take any that is short enough."""
     if method == "auto":
         return
     integrator = get_integrator(method)
     limit = integrator.stable_step(problem)
     if limit > 0.0 and (step_s is None or step_s <= limit):
         return
-    limit_text = (
-        f"its limit here is {_rounded_down(limit)} s" if limit > 0.0 else "it grows at any step without damping"
-    )
-    remedy = f"take --dt {_rounded_down(limit)} or less, " if limit > 0.0 else "take "
+    known, remedy = "it grows at any step without damping", "take "
+    if limit > 0.0:
+        power = 10.0 ** (math.floor(math.log10(limit)) - 2)
+        rounded = f"{math.floor(limit / power) * power:.3g}"  # down, so that it is stable
+        known, remedy = f"its limit here is {rounded} s", f"take --dt {rounded} or less, "
     other = "auto" if integrator is STRANG else "strang"
     if math.isinf(STRANG.stable_step(problem)):
         other += ", which has no limit"
     step = "a step" if step_s is None else f"a step of {step_s:g} s"
     raise ProgramError(
-        f"{where}: {integrator.words} is unstable with {step}: {limit_text}; {remedy}--method {other}, "
+        f"{where}: {integrator.words} is unstable with {step}: {known}; {remedy}--method {other}, "
         "or --force to run it all the same",
         USAGE,
     )
 
 
-def simulate(
-    problem: Problem,
-    method: str,
-    spacing_s: float,
-    count: int,
-    tolerance: float | None,
-    *,
-    check: bool,
-    timer: Callable[[], float],
+def simulated(
+    problem: Problem, method: str, spacing_s: float, count: int, tolerance: float | None, *, check: bool
 ) -> Simulation:
-    """Solve a motion, and optionally measure the error.
-
-    Parameters
-    ----------
-    problem, method, spacing_s, count, tolerance
-        As in :func:`solve`.
-    check : bool
-        Whether to measure the error, which takes longer than the run.
-    timer : callable
-        Returns seconds; the difference between two calls is the time elapsed.
-
-    Raises
-    ------
-    DynamicsError
-        If no method keeps the tolerance, or the numbers diverge.
-    """
-    started = timer()
-    solution = solve(problem, method, spacing_s, count, tolerance, timer)
-    choosing_s = timer() - started - solution.running_s
-    found = checked(problem, solution, spacing_s, count) if check else None
-    return Simulation(problem, solution, found, choosing_s)
+    """Solve a motion, and measure its error if that is requested."""
+    started = time.perf_counter()
+    solution = solve(problem, method, spacing_s, count, tolerance)
+    choosing_s = time.perf_counter() - started - solution.running_s
+    return Simulation(problem, solution, _checked(problem, solution, spacing_s, count) if check else None, choosing_s)
 
 
-def checked(problem: Problem, solution: Solution, spacing_s: float, count: int) -> Check:
-    """Return the error of a solution relative to the reference."""
-    trajectory = solution.trajectory
+def _checked(problem: Problem, solution: Solution, spacing_s: float, count: int) -> Check:
     parts = solution.parts if solution.integrator is STRANG else None
     other, words, resolution = reference(problem, spacing_s, count, parts)
-    start = problem.amplitude_m()
+    start, found = problem.amplitude_m(), solution.trajectory
     if start == 0.0:
-        return Check(other, words, 0.0, 0.0, 0.0)
-    speed = start * problem.equation.angular_frequency_per_s
-    error = _apart(trajectory, other)
-    velocity = float(np.max(np.abs(trajectory.v - other.v))) / speed
-    return Check(other, words, max(error, resolution), max(velocity, resolution), resolution)
+        return Check(other, words, 0.0, 0.0)
+    velocity = float(np.max(np.abs(found.v - other.v))) / (start * problem.equation.angular_frequency_per_s)
+    return Check(other, words, max(_apart(found, other), resolution), max(velocity, resolution))
 
 
 def reference(
     problem: Problem, spacing_s: float, count: int, strang_parts: int | None = None
 ) -> tuple[Trajectory, str, float]:
-    """Return a highly accurate reference solution, how it was made, and its possible error.
+    """Return a highly accurate solution, how it was made, and its possible error.
 
-    The method is DOP853 with a relative tolerance of 1e-13. With friction, or if DOP853 fails, it is Strang splitting
-    with a quarter of the step.
-
-    Parameters
-    ----------
-    problem, spacing_s, count
-        As in :func:`solve`.
-    strang_parts : int or None
-        Steps per spacing of the run to check; None if that run does not use Strang splitting.
-
-    Raises
-    ------
-    DynamicsError
-        If neither solves the motion.
+    The method is DOP853 at a relative tolerance of 1e-13. With friction, or if DOP853 fails, it is Strang splitting
+    with a quarter of the step of the run to check, which takes ``strang_parts`` steps a spacing.
     """
     rounding = rounding_error(problem, spacing_s * count)
     if not problem.equation.friction_m_per_s2:
@@ -335,7 +221,85 @@ def _apart(one: Trajectory, other: Trajectory) -> float:
     return float(np.max(np.abs(one.y - other.y))) / start if start else 0.0
 
 
-def _rounded_down(limit: float) -> str:
-    """Return a limit rounded down to three digits."""
-    power = 10.0 ** (math.floor(math.log10(limit)) - 2)
-    return f"{math.floor(limit / power) * power:.3g}"
+@dataclass(frozen=True, slots=True)
+class Eulers:
+    """Both Euler methods with the step of a simulation, and the motion with which they are compared."""
+
+    exact: Trajectory
+    words: str
+    eulers: tuple[Trajectory, ...]
+
+
+def beside_exact(found: Simulation) -> Eulers:
+    """Run both Euler methods beside the reference, the run itself, or auto's solution if the run is inaccurate."""
+    run, words, error = found.trajectory, "exact", found.solution.error
+    if found.check is not None:
+        run = found.check.reference
+    else:
+        if error is None or not error <= ROUGH:
+            better = auto(found.problem, run.spacing_s, len(run.y) - 1, ROUGH)
+            run, error = better.trajectory, better.error
+        if error is None or error >= EXACT:
+            words = f"solved to {error:.0e}"
+    return Eulers(run, words, tuple(_euler(found.problem, run, name) for name, _ in EULERS))
+
+
+def _euler(problem: Problem, exact: Trajectory, name: str) -> Trajectory:
+    """Run a method with the run's spacing; if it diverges, halve the duration until it can be solved."""
+    count = len(exact.y) - 1
+    while True:
+        try:
+            return get_integrator(name).run(problem, exact.spacing_s, count)
+        except DynamicsError:
+            if count < 2:
+                raise
+            count //= 2
+
+
+def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | None, band: Band | None) -> dict[str, Any]:
+    """Return a simulation as the JSON of ``springmass simulate``, compared with no run."""
+    solution, check = found.solution, found.check
+    return {
+        "schema": 1,
+        "method": solution.integrator.name,
+        "step_s": solution.step_s,
+        "steps": solution.parts * (len(found.trajectory.y) - 1),
+        "samples": len(found.trajectory.y),
+        "spacing_s": found.trajectory.spacing_s,
+        "stable_step_s": _finite(solution.integrator.stable_step(solution.problem)),
+        "predicted_error": _finite(solution.error),
+        "predicted_velocity_error": _finite(solution.velocity_error),
+        "no_estimate": solution.no_estimate or None,
+        "measured_error": None if check is None else check.error,
+        "measured_velocity_error": None if check is None else check.velocity_error,
+        "reference": None if check is None else check.words,
+        "tolerance": tolerance,
+        "choosing_s": found.choosing_s,
+        "running_s": solution.running_s,
+        "amplitude_m": found.problem.amplitude_m(),
+        "equation": {name: getattr(found.problem.equation, name) for name in found.problem.equation.__slots__},
+        "terms": [{key: getattr(term, key) for key in ("name", "size", "included", "why")} for term in solution.terms],
+        "effects": [
+            {key: getattr(effect, key) for key in ("name", "predicted", "measured", "unit", "included", "why")}
+            for effect in effects
+        ],
+        "against": None,
+        "band": None if band is None else _band_summary(band, found.trajectory.t),
+    }
+
+
+def _band_summary(band: Band, t: F8) -> dict[str, Any]:
+    """Return the band as JSON; each half-width is the largest of the run."""
+    around, (_, of_amplitude) = band.displacement_at(t), band.amplitude_at(t)
+    widths = {
+        f"{name}_half_width_{share}_m": float(0.5 * np.max(found[high] - found[low]))
+        for name, found in (("displacement", around), ("amplitude", of_amplitude))
+        for share, low, high in ((68, 1, 2), (95, 0, 3))
+    }
+    phase = band.phase_at(t)
+    widths["phase_half_width_95_rad"] = float(0.5 * np.max(phase[3] - phase[0]))
+    return {"members": band.members, "seed": band.seed, "quantities": list(band.quantities), **widths}
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

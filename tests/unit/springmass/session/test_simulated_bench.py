@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.bench.scene import Scene
 from pipeline.dynamics.strang import STRANG
-from springmass.runs.simulating.prepared import prepare
+from springmass.runs.simulating.simulation import prepare
 from springmass.session.simulated_bench import REST_M, bench_position
 
 

@@ -1,0 +1,235 @@
+"""What accuracy costs on this machine: errors over their lower bound and times, of the tiers and of the integrators.
+
+Records are simulated from one motion, clean and spoilt in ways that benches know; each tier evaluates each of them.
+The integrators solve the equation of the same motion.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pipeline.analyse import Analysis, analyse
+from pipeline.analysis import Oscillation
+from pipeline.damping.laws import Law, find_law
+from pipeline.dynamics import INTEGRATORS, Equation, Problem
+from pipeline.dynamics.halving import auto
+from pipeline.dynamics.solve_ivp import SolveIvp
+from pipeline.errors import DynamicsError, PipelineError
+from pipeline.options import TIERS, options_for
+from pipeline.track import F8, Track
+from springmass.runs.simulating.simulation import reference
+
+QUANTITIES = ("frequency", "amplitude", "damping_rate")
+PARTS, RTOLS, TOLERANCES = (1, 4, 16), (1e-6, 1e-9, 1e-12), (1e-3, 1e-6, 1e-9, 1e-12)
+LONGEST_ADAPTIVE = 2e4  # rad; a longer motion takes adaptive methods minutes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """A free oscillation as it is sampled: ``theta`` has the law's parameters, the amplitude at t = 0 in m first."""
+
+    frequency_hz: float = 1.3183
+    law: Law = field(default_factory=partial(find_law, "linear"))
+    theta: F8 = field(default_factory=lambda: np.array([0.05, 0.01463]))
+    noise_m: float = 3e-4
+    rate_hz: float = 100.0
+    seconds: float = 60.0
+
+    @property
+    def t(self) -> F8:
+        """The times of the samples, s."""
+        return np.arange(round(self.seconds * self.rate_hz)) / self.rate_hz
+
+    def truth(self) -> dict[str, float]:
+        """Return the true frequency in Hz, amplitude in m and damping rate, both at t = 0, in 1/s."""
+        return {
+            "frequency": self.frequency_hz,
+            "amplitude": float(self.theta[0]),
+            "damping_rate": _rate(self.law, self.theta),
+        }
+
+    def problem(self) -> Problem | None:
+        """Return the equation of the motion and its start; None if its law is no sum of drags."""
+        names = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
+        drags = dict(zip([*self.law.parameters][1:], self.theta[1:].tolist(), strict=True))
+        if not drags.keys() <= names.keys():
+            return None
+        found = {names[name]: max(value, 0.0) for name, value in drags.items()}
+        return Problem(Equation.from_laws(2.0 * math.pi * self.frequency_hz, **found), float(self.theta[0]))
+
+
+def motion_of(analysis: Analysis, oscillation: Oscillation) -> Motion:
+    """Return the motion that an analysis found, by the law that it selected."""
+    law, t = oscillation.damping.best, analysis.track.t
+    seconds = float(t[-1] - t[0])
+    return Motion(
+        frequency_hz=analysis.estimates["frequency"].value,
+        law=find_law(law.name),
+        theta=np.asarray(law.joint.values),
+        noise_m=analysis.estimates["noise"].value,
+        rate_hz=(t.size - 1) / seconds,
+        seconds=seconds,
+    )
+
+
+def motion_of_problem(problem: Problem, noise_m: float | None, seconds: float) -> Motion:
+    """Return the motion of an equation, released at its greatest displacement."""
+    drags = {"mu": 0.0, "gamma": 0.0, "beta": 0.0}
+    drags["gamma"], drags["beta"], drags["mu"] = problem.equation.laws()
+    names = {"gamma": "linear", "beta": "quadratic", "mu": "friction"}
+    law = find_law("+".join(names[each] for each in names if drags[each]) or "none")
+    theta = np.array([problem.amplitude_m(), *(drags[each] for each in list(law.parameters)[1:])])
+    frequency_hz = problem.equation.angular_frequency_per_s / (2.0 * math.pi)
+    return Motion(frequency_hz=frequency_hz, law=law, theta=theta, noise_m=noise_m or 3e-4, seconds=seconds)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """What spoils a record; lengths are relative to the amplitude."""
+
+    periods: float | None = None
+    noise_db: float | None = None  # power of the noise over that of the motion
+    echoes: float = 0.0  # share of false echoes
+    clip: float = math.inf  # displacement beyond which crests are cut off
+    quantum: float = 0.0
+    drift: float = 0.0  # of the rest position
+    second: float = 0.0  # amplitude of a mode at six tenths of the frequency
+
+
+KINDS = {
+    "clean": Kind(),
+    "1.6 periods": Kind(periods=1.6),
+    "3 periods": Kind(periods=3.0),
+    "noise 10 dB above the motion": Kind(noise_db=10.0),
+    "5 % false echoes": Kind(echoes=0.05),
+    "20 % false echoes": Kind(echoes=0.2),
+    "crests clipped at 80 %": Kind(clip=0.8),
+    "quantised to 2 %": Kind(quantum=0.02),
+    "rest drifts by 4 %": Kind(drift=0.04),
+    "second mode of 2 %": Kind(second=0.02),
+}
+
+
+def spoilt(motion: Motion, kind: Kind) -> Motion:
+    """Return the motion with the length and the noise of a kind of records."""
+    if kind.periods is not None:
+        motion = replace(motion, seconds=kind.periods / motion.frequency_hz)
+    if kind.noise_db is not None:
+        size = float(np.sqrt(np.mean(motion.law.curve(motion.t, motion.theta)[0] ** 2) / 2.0))
+        motion = replace(motion, noise_m=size * 10.0 ** (kind.noise_db / 20.0))
+    return motion
+
+
+def record(motion: Motion, kind: Kind, rng: np.random.Generator) -> F8:
+    """Return the distances of one record in m, with a random phase."""
+    t, size = motion.t, float(motion.theta[0])
+    angle, rest = 2.0 * math.pi * motion.frequency_hz * t, 4.0 * size
+    y = motion.law.curve(t, motion.theta)[0] * np.cos(angle + rng.uniform(-math.pi, math.pi))
+    y = y + motion.noise_m * rng.standard_normal(t.size)
+    y = y + kind.second * size * np.cos(0.6 * angle + rng.uniform(-math.pi, math.pi))
+    y = np.minimum(y, kind.clip * size) + kind.drift * size * np.sin(0.5 * math.pi * t / t[-1]) + rest
+    if kind.quantum:
+        y = np.round(y / (kind.quantum * size)) * kind.quantum * size
+    false = rng.random(t.size) < kind.echoes
+    y[false] = rng.uniform(0.0, 10.0 * rest, np.count_nonzero(false))
+    return np.asarray(y)
+
+
+def bounds(motion: Motion, kind: Kind) -> dict[str, float]:
+    """Return the least standard deviations of unbiased estimates (Cramér-Rao) where the law is known.
+
+    They follow from the inverse Fisher information of frequency, phase, offset and the law's parameters in white noise,
+    averaged over the phase; a false echo gives no information. That of the damping rate r follows by
+    :math:`g^T C g` with :math:`g = dr/d\\theta`.
+    """
+    t, theta = motion.t, motion.theta
+    size, slopes = motion.law.curve(t, theta)
+    gradient = np.zeros(theta.size)
+    for i, value in enumerate(theta.tolist()):
+        step = np.zeros(theta.size)
+        step[i] = 1e-4 * (abs(value) or 1.0)
+        gradient[i] = (_rate(motion.law, theta + step) - _rate(motion.law, theta - step)) / (2.0 * step[i])
+    variances = []
+    for phase in np.linspace(-math.pi, math.pi, 9)[:-1]:
+        angle = 2.0 * math.pi * motion.frequency_hz * t + phase
+        cosine, sine = np.cos(angle), size * np.sin(angle)
+        columns = np.column_stack([-2.0 * math.pi * t * sine, -sine, np.ones(t.size), slopes * cosine[:, None]])
+        scale = np.linalg.norm(columns, axis=0)  # makes columns of different units comparable
+        covariance = np.linalg.pinv((columns / scale).T @ (columns / scale)) / np.outer(scale, scale)
+        variances.append([covariance[0, 0], covariance[3, 3], gradient @ covariance[3:, 3:] @ gradient])
+    u = motion.noise_m / math.sqrt(1.0 - kind.echoes) * np.sqrt(np.mean(variances, axis=0))
+    return dict(zip(QUANTITIES, u.tolist(), strict=True))
+
+
+def _rate(law: Law, theta: F8) -> float:
+    """Return the damping rate at the start, -(dA/dt)/A, 1/s."""
+    return float(-law.rate(theta[:1], theta)[0] / theta[0])
+
+
+def measure_tiers(motion: Motion, seeds: int) -> Iterator[list[dict[str, Any]]]:
+    """Yield for each kind of records the errors and the time of every tier; all evaluate the same records in turn."""
+    for name, kind in KINDS.items():
+        found = spoilt(motion, kind)
+        bound, truth = bounds(found, kind), found.truth()
+        asked = [each for each in QUANTITIES if bound[each] > 0.0]  # without damping there is no rate to find
+        errors: dict[str, list[list[float]]] = {tier: [] for tier in TIERS}
+        times = dict.fromkeys(TIERS, math.inf)
+        for seed in range(seeds):
+            track = Track.from_arrays(found.t, record(found, kind, np.random.default_rng(seed)), kind="simulated")
+            for tier in TIERS:
+                start = time.perf_counter()
+                try:
+                    estimates = analyse(track, options=options_for(tier)).estimates
+                except PipelineError:
+                    continue
+                times[tier] = min(times[tier], time.perf_counter() - start)
+                if all(each in estimates for each in asked):
+                    errors[tier].append([(estimates[each].value - truth[each]) / bound[each] for each in asked])
+        rows: list[dict[str, Any]] = []
+        for tier, each in errors.items():
+            rms = np.sqrt(np.mean(np.square(each), axis=0)).tolist() if each else []
+            rows.append({"record": name, "tier": tier, "error_over_bound": dict(zip(asked, rms, strict=False))})
+            rows[-1] |= {"time_s": times[tier] if each else None, "failed": seeds - len(each)}
+        yield rows
+
+
+def measure_integrators(problem: Problem, spacing_s: float, count: int) -> Iterator[dict[str, Any]]:
+    """Yield error over the amplitude, steps and time of every integrator, and of ``auto`` at several tolerances."""
+    truth = reference(problem, spacing_s, count, 4 * PARTS[-1])[0].y
+    long = spacing_s * count * problem.equation.angular_frequency_per_s > LONGEST_ADAPTIVE
+
+    def row(method: str, setting: str, y: F8, steps: int, seconds: float) -> dict[str, Any]:
+        error = float(np.max(np.abs(y - truth))) / problem.amplitude_m()
+        return {"method": method, "setting": setting, "error": error, "steps": steps, "time_s": seconds}
+
+    for name, integrator in INTEGRATORS.items():
+        if integrator.refusal(problem) or (long and isinstance(integrator, SolveIvp)):
+            continue
+        settings: list[tuple[str, Any, int]] = [("", integrator, 1)]
+        if integrator.order:
+            settings = [(f"step {spacing_s / parts:.3g} s", integrator, parts) for parts in PARTS]
+        elif isinstance(integrator, SolveIvp):
+            settings = [(f"rtol {rtol:g}", replace(integrator, rtol=rtol), 1) for rtol in RTOLS]
+        for setting, solver, parts in settings:
+            start = time.perf_counter()
+            try:
+                solved = solver.run(problem, spacing_s / parts, count * parts, every=parts)
+            except DynamicsError:
+                continue  # it diverges at this step
+            yield row(name, setting, solved.y, count * parts, time.perf_counter() - start)
+    for tolerance in TOLERANCES:
+        start = time.perf_counter()
+        try:
+            best = auto(problem, spacing_s, count, tolerance)
+        except DynamicsError:
+            break  # beyond double precision over this time; so are smaller tolerances
+        spent_s = time.perf_counter() - start
+        setting = f"{best.integrator.name}, step {best.step_s:.3g} s"
+        yield row(f"auto {tolerance:g}", setting, best.trajectory.y, best.parts * count, spent_s)
