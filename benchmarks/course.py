@@ -41,7 +41,6 @@ from springmass import load
 from springmass.batch.rows import DETAILS, columns_of
 from springmass.cli import main
 
-
 SAMPLES = 12_000
 PART = 500  # number of runs in a pass; the loop is timed after each pass
 SHARE = 2500  # number of runs in a pass by two processes, which alternates with two passes side by side

@@ -12,7 +12,7 @@ from pathlib import Path
 from cyclopts import Group
 from cyclopts.argument import Argument
 
-from pipeline.findings.finding import RANK, Kind, kinds
+from pipeline.findings.finding import RANK, Kind, kinds, usual_advice
 from springmass.commands import COMMANDS, app
 from springmass.commands.options import THE_PAGE
 from springmass.glossary import TERMS
@@ -142,7 +142,7 @@ def findings_page() -> str:
         parts.append(f"## {symptom}\n\n| code | severity | meaning | what to do |\n| --- | --- | --- | --- |")
         for code, kind in sorted(group, key=lambda item: (min(RANK[s] for s in item[1].severity), item[0])):
             severity = " or ".join(SHOWN[one] for one in sorted(kind.severity, key=RANK.__getitem__))
-            parts.append(f"| `{code}` | {severity} | {kind.meaning} | {kind.advice[-1] or '-'} |")
+            parts.append(f"| `{code}` | {severity} | {kind.meaning} | {usual_advice(code) or '-'} |")
         parts[-1] += "\n"
     return "\n".join([*parts, GONE])
 

@@ -21,6 +21,7 @@ from pipeline.numerics.estimate import Joint
 
 STEADY_DISC_DRAG = 1.17  # drag coefficient of a disc broadside on in steady flow, Re > 1000
 U_SHED = 0.2  # relative uncertainty: scatter of measured plates about the law, and its transfer to a disc
+SOURCES = "u 20 %; Graham 1980, de Bernardinis et al. 1981"
 DOWN_TO = 1e-3  # smallest amplitude at which the disc's law is matched, over the initial one
 
 
@@ -51,6 +52,23 @@ def disc_drag_coefficient(keulegan_carpenter: float) -> float:
     return max(16.0 * math.pow(2.0 / math.pi, 8.0 / 3.0) / math.cbrt(keulegan_carpenter), STEADY_DISC_DRAG)
 
 
+def disc_rate(scene: Scene, amplitude_m: float, angular_frequency: float) -> tuple[float, float]:
+    """Return the damping rate -dA/dt/A by the disc of a scene, 1/s, and the Keulegan-Carpenter number, at an amplitude.
+
+    The mean of the drag over a cycle gives :math:`4 \\omega A \\rho C S / (3\\pi\\,2m)`.
+    """
+    if scene.bob_mass_kg is None or scene.disc_diameter_m is None:
+        raise SceneError("scene: drag is derived for a [bob] mass_kg with a [disc] diameter_m; add both")
+    spring = 0.0 if scene.spring_mass_kg is None else scene.spring_mass_kg.value
+    mass = oscillating_mass_kg(spring, scene.bob_mass_kg.value + added_mass_kg(scene))
+    area, kc = (
+        0.25 * math.pi * scene.disc_diameter_m.value**2,
+        2.0 * math.pi * amplitude_m / scene.disc_diameter_m.value,
+    )
+    drag_per_m = 0.5 * scene_air_density(scene) * disc_drag_coefficient(kc) * area / mass
+    return 4.0 * drag_per_m * angular_frequency * amplitude_m / (3.0 * math.pi), kc
+
+
 def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag:
     """Return the damping of a motion of some amplitude and duration by the disc of a scene.
 
@@ -62,11 +80,9 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     spring = 0.0 if scene.spring_mass_kg is None else scene.spring_mass_kg.value
     mass = oscillating_mass_kg(spring, scene.bob_mass_kg.value + added_mass_kg(scene))
     omega = math.sqrt(scene.spring_constant_n_per_m.value / mass)
-    a, rho = 0.5 * scene.disc_diameter_m.value, scene_air_density(scene)
 
     def rate(amplitude: float) -> float:
-        drag_per_m = 0.5 * rho * disc_drag_coefficient(math.pi * amplitude / a) * math.pi * a * a / mass
-        return 4.0 * drag_per_m * omega * amplitude / (3.0 * math.pi)
+        return disc_rate(scene, amplitude, omega)[0]
 
     values, first = np.zeros(2), 0.0
     if amplitude_m > 0.0:
@@ -78,5 +94,5 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
         values = np.maximum(np.linalg.lstsq(columns, np.ones(40), rcond=None)[0], 0.0) / [1.0, amplitude_m]
     covariance = np.outer(U_SHED * values, U_SHED * values)  # the law's uncertainty moves both alike
     joint = Joint(("gamma_per_s", "beta_per_m_s"), values, covariance, ("1/s", "1/(m s)"))
-    number = f"KC {math.pi * amplitude_m / a:.3g}, {first:.2g} 1/s at the start"
-    return DerivedDrag(joint, f"disc at {number} (u 20 %; Graham 1980, de Bernardinis et al. 1981)")
+    kc = 2.0 * math.pi * amplitude_m / scene.disc_diameter_m.value
+    return DerivedDrag(joint, f"disc at KC {kc:.3g}, {first:.2g} 1/s at the start ({SOURCES})")

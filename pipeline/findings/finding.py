@@ -90,6 +90,12 @@ def word(found: Found, unit: str = "m") -> Finding:
     )
 
 
+def usual_advice(code: str) -> str:
+    """Return what to do about a finding of the example, in a recording of a length."""
+    kind = kinds()[code]
+    return word(Found(code, kind.example, kind.severity[-1])).advice or kind.advice[-1]
+
+
 def worded(unit: str, *groups: Iterable[Found]) -> tuple[Finding, ...]:
     """Put all that was found into words, the most severe first."""
     return by_severity(word(found, unit) for group in groups for found in group)
@@ -102,7 +108,9 @@ def by_severity(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 def _filled(sentences: Sequence[str], shown: Mapping[str, _Shown], unit: str) -> list[str]:
     """Return the sentences whose numbers are all there, with the numbers in their places."""
-    known = {"value": noun(unit), "values": plural(unit), **shown}
+    rest = "rest position" if unit in ("m", "rad") else f"mean {noun(unit)}"
+    echoes = {"echoes": "false echoes"} if unit == "m" else {}  # nothing else has any
+    known = {"value": noun(unit), "values": plural(unit), "rest": rest, **echoes, **shown}
     return [each.format_map(known) for each in sentences if _names(each) <= known.keys()]
 
 

@@ -58,6 +58,8 @@ def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Found]:
     errors = model_error(demodulated.amplitude, demodulated.decay, demodulated.angular_frequency)
     if rest.drifts and rest.drift_m > float(np.max(errors)):
         yield _rest_drift(rest, fitted.damping.best.damping_rate().u)
+    if rest.mean.unit == "m/s^2":
+        yield Found("one_axis")
     yield from _modes(fitted, rest.mean.unit)
 
 

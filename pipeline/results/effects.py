@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
-from pipeline.bench.air import air_viscosity, speed_of_sound
-from pipeline.bench.derived_drag import STEADY_DISC_DRAG, DerivedDrag
+from pipeline.bench.air import speed_of_sound
+from pipeline.bench.derived_drag import SOURCES, DerivedDrag, disc_rate
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
@@ -158,23 +158,29 @@ def _terms(problem: Problem, terms: Sequence[Term], seconds: float) -> Iterator[
 
 
 def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[Effect]:
-    gamma, beta, mu = (damping.best.drag_term(name) for name in ("gamma", "beta", "mu"))
+    yield _disc_drag(scene, damping, omega, unit)
     chosen = f"selected law: {damping.selected}; admissible: {', '.join(damping.admissible) or 'none'}"
-    predicted_gamma = predicted_beta = None
-    if scene.disc_diameter_m is not None and scene.bob_mass_kg is not None:
-        radius, mass = 0.5 * scene.disc_diameter_m.value, scene.bob_mass_kg.value
-        # Creeping flow past a disc that moves along its axis: F = 16 eta a v.
-        celsius, pascal, _ = scene_air(scene)
-        predicted_gamma = 8.0 * air_viscosity(celsius.value, pascal.value) * radius / mass
-        b = 0.5 * STEADY_DISC_DRAG * scene_air_density(scene) * math.pi * radius**2
-        # Converts to the recorded quantity: each time derivative is larger than the displacement by a factor omega.
-        share = {"m": 1.0, "m/s": omega**-1, "m/s^2": omega**-2}.get(unit)
-        predicted_beta = None if share is None else 4.0 * b * omega / (3.0 * math.pi * mass) * share
-    yield Effect("viscous_drag", predicted_gamma, gamma, "1/s", gamma is not None, chosen)
-    yield Effect("quadratic_drag", predicted_beta, beta, Unit(-1, -1).of(unit), beta is not None, chosen)
-    tried = any(fit.drag_term("mu") is not None for fit in damping.fits.values())
-    why = chosen if tried else "no law with friction is among those tried"
-    yield Effect("friction", None, mu, Unit(1, -1).of(unit), mu is not None, why)
+    for name, coefficient, of in (
+        ("viscous_drag", "gamma", "1/s"),
+        ("quadratic_drag", "beta", Unit(-1, -1).of(unit)),
+        ("friction", "mu", Unit(1, -1).of(unit)),
+    ):
+        value = damping.best.drag_term(coefficient)
+        tried = any(fit.drag_term(coefficient) is not None for fit in damping.fits.values())
+        why = chosen if tried else f"no law with {name.replace('_', ' ')} is among those tried"
+        yield Effect(name, None, value, of, value is not None, why)
+
+
+def _disc_drag(scene: Scene, damping: Damping, omega: float, unit: str) -> Effect:
+    """Return the damping rate at the start that the disc should cause, next to the whole one that was measured."""
+    share = {"m": 1.0, "m/s": omega**-1, "m/s^2": omega**-2}.get(unit)  # of the displacement in the recorded amplitude
+    measured, predicted = damping.best.rate_at_start(), None
+    if scene.disc_diameter_m is None or scene.bob_mass_kg is None or share is None:
+        why = "predicted for a disc and a mass of the bob in the scene only; measured: all damping at the start"
+    else:
+        predicted, kc = disc_rate(scene, share * damping.best.joint["A0"].value, omega)
+        why = f"a thin disc at KC {kc:.3g} ({SOURCES}); measured: all damping at the start, that of the spring too"
+    return Effect("disc_drag", predicted, measured, "1/s", len(damping.best.law.parameters) > 1, why)
 
 
 def _backbone(phase: Phase, damping: Damping) -> Effect:

@@ -50,6 +50,8 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
     t, y, used = track.t[rows], track.y[rows] * factor, _used(a)[rows]
     out = np.flatnonzero(~used)
     why = tuple(_reason(int(a.flags[rows[i]]), y[i]) for i in out)
+    if track.unit != "m":
+        why = tuple(words.removeprefix("false echo: ").replace(" the bob", " it") for words in why)
     what = "position" if track.unit == "m" else noun(track.unit)
     samples = Series("samples used", t, np.where(used, y, np.nan))
     # A missing distance has no place; its time is marked at the middle of the others.
@@ -85,7 +87,7 @@ def _used(a: Analysis) -> NDArray[np.bool_]:
 
 def _reason(flags: int, y: float) -> str:
     if not np.isfinite(y):
-        return "missing: the sensor gave no distance"
+        return "missing: the sensor gave no value"
     return next((words for bit, words in REASONS if flags & bit), "not usable")
 
 
@@ -329,7 +331,7 @@ def _energy_means(motion: Oscillation, smoothed: Smoothed | None) -> tuple[Serie
 def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     """Velocity and acceleration, and the difference of the velocity from the fitted law in its band of u."""
     smoothed, unit = smoothed or _smoothed(a), a.track.unit
-    if smoothed is None or not isinstance(a.motion, Oscillation):
+    if smoothed is None or not isinstance(a.motion, Oscillation) or unit not in ("m", "rad"):
         return None
     rows = np.flatnonzero(np.isfinite(smoothed.position))
     rows = rows[np.argsort(smoothed.t[rows], kind="stable")]

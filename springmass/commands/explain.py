@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Annotated
 
-from pipeline.findings.finding import Kind, kinds, word
+from pipeline.findings.finding import Kind, kinds, usual_advice, word
 from pipeline.registry.found import Found
 from springmass.commands.options import Json, argument
 from springmass.errors import OK, USAGE, ProgramError
@@ -46,7 +46,7 @@ def _fields(code: str, kind: Kind) -> dict[str, object]:
         "symptom": kind.symptom,
         "meaning": kind.meaning,
         "cause": kind.cause,
-        "advice": kind.advice[-1],
+        "advice": usual_advice(code),
         "example": word(Found(code, kind.example)).message,
         "figure": kind.figure,
     }
@@ -57,7 +57,7 @@ def _explained(code: str, kind: Kind) -> str:
     rows = [
         ("Meaning", kind.meaning),
         ("Cause", kind.cause),
-        ("Advice", kind.advice[-1] or "Nothing needs doing."),
+        ("Advice", usual_advice(code) or "Nothing needs doing."),
         ("Example", word(Found(code, kind.example)).message),
     ]
     if kind.figure:

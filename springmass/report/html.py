@@ -175,7 +175,7 @@ def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, s
         "laws": laws_of(motion) if isinstance(motion, Oscillation) else None,
         "budgets": budgets_of(analysis),
         "effects": analysis.effects,
-        "quality": [(_QUALITY.get(name, name.replace("_", " ")), quality[name]) for name in ordered],
+        "quality": [(_cause(name, analysis.track), quality[name]) for name in ordered],
         "notes": notes_of(run.recorded)[:MOST_NOTES],
         "more_notes": max(len(notes_of(run.recorded)) - MOST_NOTES, 0),
         "calibration": calibration_of(run.recorded),
@@ -186,7 +186,7 @@ def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, s
 
 
 def _subtitle(title: str, given: Mapping[str, Any], track: Track, quality: Mapping[str, int]) -> str:
-    causes = [f"{count} {_QUALITY.get(name, name)}" for name, count in quality.items() if count and name != "used"]
+    causes = [f"{count} {_cause(name, track)}" for name, count in quality.items() if count and name != "used"]
     left_out = f"{len(track) - quality['used']} left out{': ' if causes else ''}{', '.join(causes)}"
     duration_s = float(track.t[-1] - track.t[0])
     parts = [
@@ -195,6 +195,13 @@ def _subtitle(title: str, given: Mapping[str, Any], track: Track, quality: Mappi
         f"format {given['format']}" if given.get("format") else None,
     ]
     return " · ".join(str(part) for part in parts if part) + "."
+
+
+def _cause(name: str, track: Track) -> str:
+    """Return in words why samples were left out; only distances have false echoes."""
+    if track.unit != "m" and name in ("false_echo", "missing"):
+        return "far from the motion" if name == "false_echo" else "without a value"
+    return _QUALITY.get(name, name.replace("_", " "))
 
 
 def _classic_rows(run: Run) -> list[tuple[str, Estimate | None, Estimate]] | None:

@@ -20,7 +20,7 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
     if not isinstance(motion, Oscillation):
         why = sentence(typeset(motion.why))
         if isinstance(motion, Still) and "first_mode_period" not in analysis.estimates:
-            why = "Nothing oscillates in this recording; it gives rest position and noise only."
+            why = "Nothing oscillates in this recording; it gives mean and noise only."
         return (("Result", why), *((("What to do", to_do),) if to_do else ()))
     row = _largest(analysis)
     if not to_do:

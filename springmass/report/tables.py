@@ -68,7 +68,8 @@ class TableRow:
 def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     """Return the contents of Table 1 for a run: estimates and coefficients, each with its law."""
     found = _shown_estimates(analysis)
-    if is_about(analysis, "offset"):
+    moving = ("m/s", "m/s^2", "rad/s")  # what is recorded of a motion is zero on average, and a sensor's zero no result
+    if is_about(analysis, "offset") or analysis.track.unit in moving:
         found.pop(TableKey("offset"), None)
     return found
 

@@ -191,6 +191,21 @@ def test_table_1_is_ready_for_a_spreadsheet_and_says_what_may_be_quoted(page: st
     assert set(judged) <= {"sound", "uncertain", "do-not-quote"}
 
 
+def test_a_phone_has_no_echoes_no_rest_position_and_no_velocity_chart(tmp_path: Path) -> None:
+    """The report of an acceleration with knocks speaks of what an accelerometer measures."""
+    t, rng = np.arange(2000) / 100, np.random.default_rng(5)
+    y = 3.0 * np.exp(-0.02 * t) * np.cos(8.0 * t) + 0.02 * rng.standard_normal(t.size)
+    y[rng.choice(t.size, 300, replace=False)] += 4.0 * rng.standard_normal(300)
+    written = reported(table(tmp_path / "phone.csv", y, "Linear Acceleration z (m/s^2)"), tmp_path)
+    page = (written / "report.html").read_text("utf-8")
+    assert "m/s²" in page
+    assert "<code>false_echoes</code>" in page  # the code never changes its meaning: samples that were left out
+    words = re.sub(r"<style.*?</style>", "", page.partition('id="details"')[0], flags=re.DOTALL)
+    for wrong in ("false echo", "rest position", "bob", "distance"):
+        assert wrong not in words.lower(), wrong
+    assert "figure-motion-0" not in page
+
+
 def test_latex_is_balanced(folder: Path) -> None:
     """Both LaTeX tables close what they open, and state uncertainties in parentheses."""
     for name in ("table.tex", "budget.tex"):
