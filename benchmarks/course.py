@@ -38,7 +38,7 @@ import pandas
 from threadpoolctl import threadpool_limits
 
 from springmass import load
-from springmass.batch.rows import DETAILS, columns_of
+from springmass.course.rows import DETAILS, columns_of
 from springmass.cli import main
 
 SAMPLES = 12_000
@@ -53,8 +53,8 @@ HEAD = "Motion Sensor Data File Mar 12, 2024 2:05 PM\r\nTime (s)\tDistance (cm)\
 WHERE = "section = 'A' and period_u < 1e-5"
 WORKER = """
 import json, sys
-from springmass.batch.plan import plan
-from springmass.batch.worker import analyse_many
+from springmass.course.plan import plan
+from springmass.course.worker import analyse_many
 jobs = plan([sys.argv[1]], accuracy="standard").jobs
 peaks = []
 for part in (jobs[: len(jobs) // 2], jobs[len(jobs) // 2 :]):

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from failure import Error
 from springmass.api.sources import Analysing, analyse
-from springmass.batch.rows import NUMBERS, UNITS, WHOLE, columns_of, read_rows
-from springmass.batch.worker import fill
+from springmass.course.rows import NUMBERS, UNITS, WHOLE, columns_of, read_rows
+from springmass.course.worker import fill
 
 if TYPE_CHECKING:
     import pandas as pd

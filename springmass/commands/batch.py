@@ -11,13 +11,13 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from springmass.batch.page import GROUPS, PAGE
-from springmass.batch.plan import plan
-from springmass.batch.rows import CSV, FAILED
-from springmass.batch.running import run_course
-from springmass.batch.runs_csv import template
-from springmass.batch.store import DATABASE, opened
 from springmass.commands.options import File, argument, flag, option, output, refuse
+from springmass.course.page import GROUPS, PAGE
+from springmass.course.plan import plan
+from springmass.course.rows import CSV, FAILED
+from springmass.course.running import run_course
+from springmass.course.runs_csv import template
+from springmass.course.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, manner, suggest, tell
 from springmass.runs.options import How
 from springmass.runs.outputs import make_folder

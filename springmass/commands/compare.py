@@ -12,7 +12,6 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from acquisition.errors import visible
-from springmass.batch.rows import COURSE, is_course, read_rows
 from springmass.commands.options import (
     Figures,
     File,
@@ -24,6 +23,7 @@ from springmass.commands.options import (
     output,
     refuse,
 )
+from springmass.course.rows import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import law_line
 from springmass.runs.comparing import Compared, compare_runs, comparison_json
@@ -100,7 +100,7 @@ def compare(
 
 
 def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
-    from springmass.batch.benches import compare_rows, compared_text
+    from springmass.course.benches import compare_rows, compared_text
     from springmass.terminal.printing import visible_lines
 
     if options.output is not None or options.scene:

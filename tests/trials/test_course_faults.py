@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springmass.batch.benches import compare_rows
-from springmass.batch.rows import COURSE, read_rows
+from springmass.course.benches import compare_rows
+from springmass.course.rows import COURSE, read_rows
 from springmass.cli import main
 from tests.courses import write_recording
 

@@ -17,7 +17,7 @@ from typing import Any
 from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
 from pipeline.registry.laws import LAW_NAMES
-from springmass.batch.rows import RESERVED
+from springmass.course.rows import RESERVED
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.inputs import InputFile
 from springmass.values import ANY_LAW

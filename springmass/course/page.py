@@ -13,11 +13,11 @@ import numpy as np
 from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.course import LITTLE
-from springmass.batch.benches import BENCHES, CourseComparison
-from springmass.batch.rows import COURSE, FAILED
 from springmass.charts.chart import Chart
 from springmass.charts.drag_map import DragRun, drag_map
 from springmass.charts.several import course
+from springmass.course.benches import BENCHES, CourseComparison
+from springmass.course.rows import COURSE, FAILED
 from springmass.report.advice import sentence
 from springmass.terminal.printing import visible_lines
 from storage.atomic import write_whole

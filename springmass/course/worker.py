@@ -17,10 +17,10 @@ from pipeline.errors import AnalysisError, PipelineError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.threads import one_thread
 from pipeline.results.compare import SpringRun
-from springmass.batch.plan import Job, code_sha256, digest_of
-from springmass.batch.rows import ESTIMATES
 from springmass.charts.drag_map import drag_points
 from springmass.charts.outline import outline
+from springmass.course.plan import Job, code_sha256, digest_of
+from springmass.course.rows import ESTIMATES
 from springmass.errors import NO_MEMORY, ProgramError, internal_error, quietly
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.script import SHARED

@@ -17,7 +17,7 @@ from acquisition.recordings.base import dialect_folder
 from acquisition.regular_file import open_regular, open_regular_text, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import SceneError
-from springmass.batch.runs_csv import ANSWERS, LAW, POSITION, Values, join, read_table
+from springmass.course.runs_csv import ANSWERS, LAW, POSITION, Values, join, read_table
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 from springmass.layout import PACKAGES, part
 from springmass.runs.about import about_path

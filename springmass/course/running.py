@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from springmass.batch.benches import compare_rows
-from springmass.batch.executors import outcomes, workers
-from springmass.batch.page import line_of, mark, write_groups, write_page
-from springmass.batch.plan import Job, Plan, code_sha256, names_of
-from springmass.batch.rows import COURSE, write_rows
-from springmass.batch.store import Store
-from springmass.batch.worker import analyse_many, blank_row, write_reports
+from springmass.course.benches import compare_rows
+from springmass.course.executors import outcomes, workers
+from springmass.course.page import line_of, mark, write_groups, write_page
+from springmass.course.plan import Job, Plan, code_sha256, names_of
+from springmass.course.rows import COURSE, write_rows
+from springmass.course.store import Store
+from springmass.course.worker import analyse_many, blank_row, write_reports
 from springmass.errors import USAGE, ProgramError
 from springmass.report.script import SHARED, report_script
 from storage.atomic import write_whole, writing
