@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.numerics.quantity import SHOWN, Unit
 from pipeline.track import F8
-from springmass.report.tables import page_unit
+from springmass.typeset import page_unit
 
 Role = Literal["data", "law", "other", "rest", "flagged", "band", "mark"]
 """What a series is; its colours, dashes and marker stand in charts.js, and the drawer of files reads them there."""
@@ -195,3 +195,12 @@ def mark(label: str, x: Sequence[float], texts: Sequence[str]) -> Series:
     """Return vertical lines with their texts."""
     at = np.asarray(x, np.float64)
     return Series(label, at, np.full(at.size, np.nan), "mark", why=tuple(texts))
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A mark or an event of a recording."""
+
+    t_s: float
+    text: str
+    kind: str

@@ -16,10 +16,9 @@ from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
-from springmass.charts.chart import Chart, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
+from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
 from springmass.charts.spectrum import peaks_of, spectrum_of
-from springmass.report.recorded import Note
-from springmass.report.tables import law_status, pretty
+from springmass.typeset import law_status, pretty
 
 REASONS: tuple[tuple[int, str], ...] = (
     (int(Quality.CLIPPED), "clipped: cut off at the end of the range"),

@@ -54,7 +54,7 @@ from springmass.runs.scenes import read_scenes
 from storage.errors import WriteFailed
 
 if TYPE_CHECKING:
-    from springmass.report.tables import TableKey
+    from springmass.runs.rows import TableKey
 
 TOGETHER = "together.results"
 MOST_TOGETHER = 20  # inputs in one report: their samples are in memory together; batch is for more
@@ -147,7 +147,7 @@ def _several(
     out: Path | None,
 ) -> int:
     """Analyse many inputs: one Table 1, one file of numbers and, if they are few, one report."""
-    from springmass.report.tables import every_number, table_estimates
+    from springmass.runs.rows import every_number, table_estimates
     from springmass.terminal.progress import counted
 
     done: list[_Done] = []
@@ -223,10 +223,11 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.budgets import budget_text
     from springmass.report.trust import trust_text
-    from springmass.report.words import damping_sentence, typeset
+    from springmass.report.words import damping_sentence
     from springmass.terminal.printing import classic_text, findings_text, fitted, wrapped
     from springmass.terminal.style import style_of
     from springmass.terminal.table1 import text_table
+    from springmass.typeset import typeset
 
     style = style_of(sys.stdout, si=options.si)
     print(text_table([run.name], [run.analysis], style))
@@ -241,10 +242,10 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
 
 
 def _print_together(done: Sequence[_Done], options: AnalyseOptions) -> None:
-    from springmass.report.words import typeset
     from springmass.terminal.printing import shared_findings_text
     from springmass.terminal.style import style_of
     from springmass.terminal.table1 import text_table
+    from springmass.typeset import typeset
 
     for line in dict.fromkeys(one.law for one in done if one.law):
         print(line)
@@ -276,7 +277,7 @@ def _written(write: Callable[[], str], folder: Path) -> int:
 
 def _write_numbers(folder: Path, done: Sequence[_Done]) -> Path:
     """Write the numbers of all runs: results.csv for a table, results.json for programs."""
-    from springmass.report.tables import results_csv
+    from springmass.runs.rows import results_csv
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 

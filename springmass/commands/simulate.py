@@ -101,12 +101,12 @@ def simulate(
         results["against"] = over.summary()
     written: list[Path] = []
     if output is not None:
-        from springmass.runs.simulating.writing import write_readings
+        from springmass.report.simulated import write_readings
 
         write_readings(Path(output), ready, simulation, sensor, seed, where, results)
         written.append(Path(output))
     if folder is not None or not (as_json or output is not None):
-        from springmass.runs.simulating.writing import write_folder
+        from springmass.report.simulated import write_folder
 
         made = write_folder(simulation, over, band, ready.solved, where, folder or ".", results, figures)
         written.append(made / "run.h5")

@@ -13,7 +13,7 @@ from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
 from pipeline.registry.quantities import QUANTITIES
 from springmass.errors import UNREADABLE, USAGE, ProgramError
-from springmass.report.tables import cell
+from springmass.typeset import cell
 from storage.atomic import whole_file, writing
 
 CSV = "results.csv"

@@ -7,7 +7,7 @@ from collections.abc import Container, Iterable, Mapping
 from typing import Any
 
 from pipeline.findings.finding import kinds
-from springmass.report.words import typeset
+from springmass.typeset import typeset
 
 _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}
 

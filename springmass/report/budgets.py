@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.registry.quantities import INPUTS, QUANTITIES
 from pipeline.results.budget import Budget, Contribution
-from springmass.report.tables import cell, table_estimates
+from springmass.runs.rows import table_estimates
+from springmass.typeset import cell
 
 SAME = ("frequency", "angular_frequency")  # determined by the period alone
 LEAST_SHARE = 1e-3  # of the variance; smaller shares do not change a printed digit of u

@@ -18,15 +18,16 @@ from pipeline.track import Track
 from springmass.charts.chart import Chart, to_json
 from springmass.report.advice import notices_of
 from springmass.report.budgets import budgets_of
-from springmass.report.laws import laws_across, laws_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.summary import summary
-from springmass.report.tables import cells, page_unit, prefixed, pretty, pretty_number, table_rows
 from springmass.report.trust import trust_of
-from springmass.report.words import method, typeset
+from springmass.report.words import method
 from springmass.runs.comparing import Compared
 from springmass.runs.json_results import picked
+from springmass.runs.laws import laws_across, laws_of
+from springmass.runs.rows import table_rows
 from springmass.runs.run import Run
+from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset
 
 if TYPE_CHECKING:
     from jinja2 import Template

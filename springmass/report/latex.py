@@ -15,7 +15,7 @@ from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, forma
 from pipeline.registry.quantities import INPUTS
 from springmass.report.advice import by_harm, lab_report_line
 from springmass.report.budgets import budgets_of
-from springmass.report.tables import table_rows
+from springmass.runs.rows import table_rows
 from springmass.runs.run import Run
 
 if TYPE_CHECKING:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.errors import AnalysisError
 from pipeline.numerics.quantity import Unit, noun
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import UNUSABLE
@@ -47,16 +46,6 @@ def _spelt(unit: str) -> str:
     """Return a unit as the suffix of a column name; empty for a plain number."""
     spelt = unit.removeprefix("1").replace("/", "_per_").replace("^", "").strip("_")
     return f"_{spelt}" if spelt else ""
-
-
-def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
-    """Return the smoothed motion, or the reason in words why there is none."""
-    if not isinstance(analysis.motion, Oscillation):
-        return "nothing oscillates"
-    try:
-        return analysis.smoothed()
-    except AnalysisError as error:
-        return str(error)
 
 
 def row_step(analysis: Analysis) -> int:

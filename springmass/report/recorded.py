@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
 from acquisition.errors import visible
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
-from springmass.report.tables import pretty
+from springmass.charts.chart import Note
+from springmass.typeset import pretty
 
 _ON_THE_BENCH = (
     ("bob", "bob_mass_kg"),
@@ -25,15 +25,6 @@ _CALIBRATED = {
     "scale": ("scale", ""),
     "speed_of_sound_m_per_s": ("speed of sound", "m/s"),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Note:
-    """A mark or an event of a recording."""
-
-    t_s: float
-    text: str
-    kind: str
 
 
 def notes_of(recorded: Mapping[str, Any]) -> tuple[Note, ...]:

@@ -7,9 +7,10 @@ from pipeline.numerics.quantity import noun
 from pipeline.registry.quantities import INPUTS
 from springmass.report.advice import harm_of, sentence
 from springmass.report.budgets import BudgetRow, budgets_of
-from springmass.report.tables import is_about, prefixed
 from springmass.report.trust import trust_text
-from springmass.report.words import damping_sentence, kept, typeset
+from springmass.report.words import damping_sentence
+from springmass.runs.rows import is_about
+from springmass.typeset import kept, prefixed, typeset
 
 
 def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:

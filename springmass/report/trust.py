@@ -11,7 +11,7 @@ from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.quantity import Unit
 from pipeline.registry.quantities import INPUTS, QUANTITIES
 from springmass.report.advice import Harm, harm_of
-from springmass.report.tables import TableRow, table_estimates, table_rows
+from springmass.runs.rows import TableRow, table_estimates, table_rows
 
 Grade = Literal["sound", "uncertain", "do not quote"]
 UNCERTAIN = 0.05  # u over the value from which fewer than two digits are certain

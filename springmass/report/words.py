@@ -2,63 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.laws import words_of
-from pipeline.numerics.estimate import Estimate, UpperLimit
 from springmass.report.budgets import budgets_of
-from springmass.report.tables import is_about, page_unit, pretty, pretty_number, raised
-
-LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
-
-
-def kept(estimate: Estimate) -> str:
-    """Write an estimate so that no line breaks inside it."""
-    return unbroken(pretty(estimate))
-
-
-def unbroken(text: str) -> str:
-    """Let no line break in a text."""
-    return text.replace(" ", "\u00a0")
-
-
-def equation(name: str, estimate: Estimate) -> str:
-    """Write a parameter with its value or its upper limit.
-
-    Examples
-    --------
-    >>> equation("beta", Estimate(0.235, 0.012, "1/(m s)")), equation("mu", UpperLimit(1e-5, 2e-5, "m/s"))
-    ('β = 0.235 ± 0.012 m⁻¹ s⁻¹', 'μ < 4.7 × 10⁻⁵ m/s (95 %)')
-    """
-    sign = "" if isinstance(estimate, UpperLimit) else "= "
-    return f"{LETTERS.get(name, name)} {sign}{pretty(estimate)}"
-
-
-_SUBSTITUTES = (
-    (re.compile(r"(?<=[\d)] )(1/\(m s\)|1/s|m/s\^2|degC)(?!\w)"), lambda found: page_unit(found[1])),
-    (re.compile(r"(?<=[\d)])e([+-]\d+)\b"), lambda found: f" × 10{raised(int(found[1]))}"),
-    (re.compile(r"\+-"), "±"),
-    (re.compile(r"(?<![\w.+-])-(?=\d)"), "−"),
-    (re.compile(r"\b(gamma|beta|mu)(?= = )"), lambda found: LETTERS[found[1]]),
-    (re.compile(r"(?<=\d),(?=\d{3}(?!\d))"), "\u202f"),
-    (re.compile(r"(?<=\d)%"), "\u00a0%"),
-    (re.compile(r"\bchi-square\b"), "χ²"),
-)
-
-
-def typeset(message: str) -> str:
-    """Return a message with numbers and units typeset as in the page's tables.
-
-    Examples
-    --------
-    >>> typeset("gamma = (6.50 +- 0.12)e-03 1/s; left in, the amplitude changes by -0.4 mm (2.0%)")
-    'γ = (6.50 ± 0.12) × 10⁻³ s⁻¹; left in, the amplitude changes by −0.4 mm (2.0\xa0%)'
-    """
-    for pattern, by in _SUBSTITUTES:
-        message = pattern.sub(by, message)
-    return message
+from springmass.runs.rows import is_about
+from springmass.typeset import kept, pretty_number, unbroken
 
 
 def method(analysis: Analysis) -> tuple[str, ...]:

@@ -16,12 +16,13 @@ from springmass.errors import detail
 from springmass.report.budgets import budget_csv
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, lab_report_tex, table_tex
-from springmass.report.motion_table import amplitude_csv, motion_csv, smoothed_or_why
+from springmass.report.motion_table import amplitude_csv, motion_csv
 from springmass.report.recorded import notes_of
 from springmass.report.summary import summary as sentences
-from springmass.report.tables import results_csv
 from springmass.runs.comparing import Compared
+from springmass.runs.frames import smoothed_or_why
 from springmass.runs.json_results import plain
+from springmass.runs.rows import results_csv
 from springmass.runs.run import Run
 from storage.atomic import write_whole
 from storage.folder import whole_folder

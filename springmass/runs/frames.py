@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquisition.block import Flag
-from pipeline.analyse import Oscillation
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
+from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import Unit
 from pipeline.results.budget import Budget
 from pipeline.results.compare import Comparison
+from pipeline.results.kinematics import Smoothed
 from pipeline.track import Quality
-from springmass.report.motion_table import smoothed_or_why
 from springmass.runs.arrays import ABOUT, about_json
 from springmass.runs.estimates import Value
 from springmass.runs.loading import Loaded
@@ -128,3 +129,16 @@ def run_dataset(run: Run) -> xr.Dataset:
     for name, value in run.items():
         variables[name] = ((), value.value, {"u": value.u, "units": value.unit or "1"})
     return found.assign_coords(coordinates).assign(variables).assign_attrs(name=run.name)
+
+
+MOST_ROWS = 1_000_000
+
+
+def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
+    """Return the smoothed motion, or the reason in words why there is none."""
+    if not isinstance(analysis.motion, Oscillation):
+        return "nothing oscillates"
+    try:
+        return analysis.smoothed()
+    except AnalysisError as error:
+        return str(error)

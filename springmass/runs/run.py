@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from springmass.report.tables import TableRow
+    from springmass.runs.rows import TableRow
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,7 +149,7 @@ class Run(Mapping[str, Value]):
     @property
     def rows(self) -> tuple[TableRow, ...]:
         """The lines of Table 1."""
-        from springmass.report.tables import table_rows
+        from springmass.runs.rows import table_rows
 
         return table_rows([self.analysis])
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from acquisition.errors import visible
 from pipeline.analyse import Oscillation
-from springmass.report.laws import laws_of
-from springmass.report.tables import law_status, pretty, pretty_number
+from springmass.runs.laws import laws_of
+from springmass.typeset import law_status, pretty, pretty_number
 
 if TYPE_CHECKING:
     from springmass.runs.run import Run

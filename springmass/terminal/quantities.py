@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_value, in_brackets
-from springmass.report.tables import page_unit, prefixed, pretty
-from springmass.report.words import typeset
 from springmass.terminal.style import TerminalStyle
+from springmass.typeset import page_unit, prefixed, pretty, typeset
 
 
 def shown(estimate: Estimate | None, style: TerminalStyle) -> str:

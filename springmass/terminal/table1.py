@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate
-from springmass.report.tables import TableKey, table_rows
+from springmass.runs.rows import TableKey, table_rows
 from springmass.terminal.quantities import concise, shown
 from springmass.terminal.style import PLAIN, TerminalStyle
 

@@ -13,12 +13,11 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import CYCLES, classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import F8
-from springmass.charts.chart import Chart, Panel, Series, decoded, to_json
+from springmass.charts.chart import Chart, Note, Panel, Series, decoded, to_json
 from springmass.charts.drag_map import DragRun, drag_map
 from springmass.charts.draw import render
 from springmass.charts.run import charts_of
 from springmass.charts.several import comparison, course, overlay
-from springmass.report.recorded import Note
 
 DATA = sm.sample_data()
 

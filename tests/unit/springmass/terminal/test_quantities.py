@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from pipeline.numerics.estimate import Estimate
-from springmass.report.tables import prefixed
 from springmass.terminal.quantities import concise, shown
 from springmass.terminal.style import PLAIN, TerminalStyle
+from springmass.typeset import prefixed
 
 
 @pytest.mark.parametrize(

@@ -46,9 +46,9 @@ def write_folder(
     kinds: Sequence[Kind] = (),
 ) -> Path:
     """Write run file, page of charts, tables, JSON and the kinds of figures into NAME.simulated; return the folder."""
-    from springmass.charts import simulation as charted
     from springmass.charts.draw import save
     from springmass.report.html import Figures, drawn_by_script, template
+    from springmass.runs.simulating import charts as charted
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 

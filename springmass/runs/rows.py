@@ -1,27 +1,19 @@
-"""Tables of a report: Table 1, and every number as CSV."""
+"""The lines of Table 1, and every number of a run."""
 
 from __future__ import annotations
 
 import csv
 import io
-import math
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.laws import LAWS
-from pipeline.damping.select import Damping
 from pipeline.findings.finding import kinds
-from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
+from pipeline.numerics.estimate import Estimate
 from pipeline.registry.quantities import QUANTITIES
-
-_PAGE_UNITS = {"1": "", "degC": "°C", "m/s^2": "m/s²", "1/s": "s⁻¹", "1/(m s)": "m⁻¹ s⁻¹"}
-_SUPERSCRIPT = str.maketrans("-0123456789n", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
-_POWER = re.compile(r"\^(?:\(([\dn-]+)\)|([\dn-]+))")
-NOTHING = "-"
+from springmass.typeset import NOTHING, cell
 
 
 class TableKey(NamedTuple):
@@ -165,133 +157,3 @@ def results_csv(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Est
         for quantity, x in (every_number(run) if isinstance(run, Analysis) else run).items():
             writer.writerow([cell(name), quantity, repr(float(x.value)), repr(float(x.u)), x.unit])
     return out.getvalue()
-
-
-def cell(text: str) -> str:
-    """Return a text of foreign origin as a safe cell of a CSV file.
-
-    A spreadsheet evaluates a cell that begins with ``=``, ``+``, ``-`` or ``@`` as a formula; a leading apostrophe
-    makes it text. Numbers remain numbers.
-
-    Examples
-    --------
-    >>> cell("=1+1"), cell("-3.5")
-    ("'=1+1", '-3.5')
-    """
-    shown = visible(text)
-    try:
-        float(shown)
-    except ValueError:
-        return f"'{shown}" if shown.strip()[:1] in _FORMULA else shown
-    return shown
-
-
-_FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
-"""Characters with which a formula begins in a spreadsheet."""
-
-
-def pretty(estimate: Estimate | None) -> str:
-    """Return an estimate for the page: the digits of :func:`pipeline.numerics.estimate.format_value`, typeset.
-
-    Examples
-    --------
-    >>> pretty(Estimate(-8.36e-5, 9.6e-7, "m"))
-    '(−8.360 ± 0.096) × 10⁻⁵ m'
-    """
-    if estimate is None:
-        return "–"
-    if isinstance(estimate, UpperLimit):
-        return f"< {_typeset(format_limit(estimate.limit))} {page_unit(estimate.unit)}".rstrip() + " (95 %)"
-    number = format_value(estimate.value, estimate.u)
-    return f"{_typeset(number)} {page_unit(estimate.unit)}".rstrip()
-
-
-def cells(estimate: Estimate | None) -> str:
-    """Return an estimate as value, u and unit for three cells of a spreadsheet, with the digits of u, divided by |.
-
-    Examples
-    --------
-    >>> cells(Estimate(0.7525961, 4.96e-5, "s")), cells(Estimate(101325.0, 1490.0, "Pa"))
-    ('0.752596|0.000050|s', '1.013e+05|0.015e+05|Pa')
-    """
-    if estimate is None:
-        return "||"
-    if isinstance(estimate, UpperLimit):
-        return f"< {format_limit(estimate.limit)}||{page_unit(estimate.unit)}"
-    value, _, u = format_value(estimate.value, estimate.u).partition(" +- ")
-    u, _, power = u.partition(")")
-    return f"{value.lstrip('(')}{power}|{u}{power}|{page_unit(estimate.unit)}"
-
-
-def pretty_number(value: float | None, digits: int = 2) -> str:
-    """Typeset a number without an uncertainty to a few digits; return a dash for None or NaN.
-
-    Examples
-    --------
-    >>> pretty_number(498765.0, 3)
-    '4.99 × 10⁵'
-    """
-    if value is None or value != value:
-        return "–"
-    return _typeset(f"{value:#.{digits}g}".rstrip("."))
-
-
-# For each unit: (upper limit of the value, factor, unit with its prefix), the smallest limit first. Periods stay in
-# seconds down to 0.1 s.
-_PREFIXES = {
-    "m": ((1e-3, 1e6, "µm"), (1.0, 1e3, "mm")),
-    "kg": ((1e-3, 1e6, "mg"), (1.0, 1e3, "g")),
-    "s": ((1e-3, 1e6, "µs"), (0.1, 1e3, "ms")),
-    "m/s": ((1e-4, 1e6, "µm/s"), (0.1, 1e3, "mm/s")),
-}
-
-
-def prefixed(estimate: Estimate) -> Estimate:
-    """Return an estimate with an SI prefix that gives a value of about 1 to 1000; most units have no prefixes.
-
-    Examples
-    --------
-    >>> prefixed(Estimate(0.05145, 2e-5, "m"))
-    51.450(20) mm
-    """
-    size = max(abs(estimate.value), estimate.u if math.isfinite(estimate.u) else 0.0)
-    for below, factor, unit in _PREFIXES.get(estimate.unit, ()):
-        if 0.0 < size < below:
-            value, u = (float(f"{x * factor:.15g}") for x in (estimate.value, estimate.u))
-            return replace(estimate, value=value, u=u, unit=unit, variable=None)
-    return estimate
-
-
-def page_unit(unit: str) -> str:
-    """Return a unit as the page writes it.
-
-    Examples
-    --------
-    >>> page_unit("1/(m s)"), page_unit("rad/s^2"), page_unit("m^(1-n)/s"), page_unit("(m/s^2)^(1-n)/s")
-    ('m⁻¹ s⁻¹', 'rad/s²', 'm¹⁻ⁿ/s', '(m/s²)¹⁻ⁿ/s')
-    """
-    if unit in _PAGE_UNITS:
-        return _PAGE_UNITS[unit]
-    return _POWER.sub(lambda power: (power[1] or power[2]).translate(_SUPERSCRIPT), unit)
-
-
-def law_status(damping: Damping, name: str) -> str:
-    """Return the status of a law in a few words."""
-    if name == damping.selected:
-        if damping.by_statement:
-            return "stated, and rejected" if damping.fits[name].rejected else "stated"
-        return "rejected, yet the least bad" if damping.fits[name].rejected else "selected"
-    if damping.fits[name].rejected:
-        return "rejected"
-    return "admissible" if name in damping.admissible else "unlikely"
-
-
-def _typeset(number: str) -> str:
-    mantissa, mark, power = number.replace("+-", "±").partition("e")
-    mantissa = mantissa.replace("-", "−")
-    return f"{mantissa} × 10{raised(int(power))}" if mark else mantissa
-
-
-def raised(power: int) -> str:
-    """Return an exponent in superscript digits."""
-    return str(power).translate(_SUPERSCRIPT)

@@ -10,8 +10,7 @@ from pipeline.analyse import Oscillation
 from pipeline.damping.joint import JointDamping
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
-from springmass.report.tables import law_status, pretty_number
-from springmass.report.words import equation, typeset
+from springmass.typeset import equation, law_status, pretty_number, typeset
 
 
 def laws_of(motion: Oscillation) -> dict[str, Any]:
