@@ -110,7 +110,7 @@ def recording(folder: Path, *, page: bool = True, seconds: float | None = None) 
     """Record a simulated bench, with or without its page."""
     scene = folder / "bench.toml"
     scene.write_text(SCENE)
-    command = ["record", "--simulate", str(scene), "-o", str(folder / "run.h5")]
+    command = ["record", "--simulate", "--scene", str(scene), "-o", str(folder / "run.h5")]
     command += ["--page", "--no-browser"] if page else []
     command += [] if seconds is None else ["--seconds", str(seconds)]
     with subprocess.Popen(

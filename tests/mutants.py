@@ -149,7 +149,7 @@ def _executed() -> dict[str, set[int]]:
         recording, scene = ROOT / "sample_data/damped_simulated_position.txt", ROOT / "sample_data/damped.scene.toml"
         log, bench = ROOT / "tests/golden/base.wire", ROOT / "tests/golden/scenes/mixed.toml"
         commands = [
-            ["record", "--simulate", bench, "--seconds", "2", "-o", "run.h5"],
+            ["record", "--simulate", "--scene", bench, "--seconds", "2", "-o", "run.h5"],
             ["recover", log, "-o", "out.h5"],
             ["analyse", recording, "--scene", scene, "--output", "."],
             ["compare", recording, recording, "--scene", scene],

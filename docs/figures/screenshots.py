@@ -45,7 +45,7 @@ def springmass(*arguments: str | Path) -> list[str]:
 def live(folder: Path) -> Iterator[str]:
     """Record a simulated bench with its page, and give the page's address."""
     (folder / "bench.toml").write_text(SCENE)
-    command = springmass("record", "--simulate", "bench.toml", "-o", "run.h5", "--page", "--no-browser")
+    command = springmass("record", "--simulate", "--scene", "bench.toml", "-o", "run.h5", "--page", "--no-browser")
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     with subprocess.Popen(
         command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True

@@ -33,7 +33,6 @@ from springmass.runs.outputs import made_now
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.session.operator import Closed, Operator
 from springmass.session.output import default_name, demand_new
-from springmass.session.progress import load_analysis
 from springmass.session.sensors import Sensor
 from springmass.session.session import BYTES_PER_READ, Ended, RunLimits, RunListeners, Session
 from springmass.session.simulated_bench import EXAMPLE, REST_M, Release, bench_position
@@ -121,7 +120,6 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
     if options.scene is not None:
         scene = read_scene(options.scene)
         ask_about(scene, options.scene)
-    load_analysis()
     log, clock = out.with_suffix(".wire"), SystemClock()
     release = Release(clock)
     with _sensors(options, scene, release) as sensors, contextlib.ExitStack() as beside:

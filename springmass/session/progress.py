@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+import mmap
 import shutil
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -27,6 +28,8 @@ USELESS_S = 0.8
 """Time in s after which a lack of targets or of changes is a trouble; the display's first turn can report it."""
 MOTION_EVERY_NS = 1_900_000_000
 """Interval between analyses of the motion, about two progress lines or one swing; each takes a few milliseconds."""
+ROOM_BYTES = 512 << 20
+"""Address space for the analysis: 230 MiB was measured on two cores, and each further core takes about 40 MiB."""
 
 
 class TroubleKind(enum.Enum):
@@ -122,6 +125,7 @@ class LiveState:
     def __init__(self, rate_hz: float) -> None:
         self.samples = self.missing = 0
         self._rate_hz = rate_hz
+        self._has_room = False
         self.useful: dict[int, Usefulness] = {}
         self.origin = Origin()
         self._begin(0)
@@ -161,6 +165,9 @@ class LiveState:
 
     def motion(self, now_ns: int) -> LiveMotion | NotYet:
         """Return the first sensor's motion, calculated again if the last result is old enough."""
+        if not self._has_room:
+            demand_room()
+            self._has_room = True
         if isinstance(self._found, NotYet) or now_ns - self._found_ns >= MOTION_EVERY_NS:
             self._found, self._found_ns = self._motion.value(), now_ns
         return self._found
@@ -177,15 +184,17 @@ class LiveState:
         return sum(int(np.count_nonzero(stamps >= since)) for stamps in self._stamps)
 
 
-def load_analysis() -> None:
-    """Analyse a motion before the recording, which loads the libraries of linear algebra and their memory.
+def demand_room() -> None:
+    """Raise MemoryError if the libraries of the analysis would not find memory, which would block or end the process.
 
-    Where memory has run out they block or end the process, which must not happen during a recording.
+    The memory is requested as one private block, because a limit on a program's data ignores shared memory, and
+    released untouched.
     """
-    t = np.arange(500) / 100
-    motion = MotionAccumulator(100.0, options=options_for("fast"))
-    motion.push(t, 0.2 + 0.05 * np.cos(8.0 * t), np.zeros(500, np.uint8))
-    motion.value()
+    private = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {}
+    try:
+        mmap.mmap(-1, ROOM_BYTES, **private).close()
+    except OSError as error:
+        raise MemoryError(f"{ROOM_BYTES >> 20} MiB are not available") from error
 
 
 def progress_of(

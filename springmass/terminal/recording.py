@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.streaming import LiveMotion
+from pipeline.streaming import LiveMotion, NotYet
 from springmass.session.progress import Progress, TroubleKind
 from springmass.terminal.console import Console
 from springmass.terminal.quantities import concise, shown
@@ -11,6 +11,7 @@ from springmass.terminal.style import PLAIN, TerminalStyle
 # Without a terminal, one of this many lines is printed: the motion for each would add a tenth to the recording's cost.
 UNWATCHED_LINES = 30
 PATIENCE_S = 0.5  # output not written within this time has no reader, which is noted in the run
+FIRST_MOTION_S = 1.5
 SILENT_S = 1.5  # silence of a sensor that the progress line reports
 GOOD, FAIR = (1.0, 0.05), (10.0, 1 / 3)
 """Limits of the relative uncertainty, in 1/1000 of the period and 1/50 of the amplitude, and of the missing share."""
@@ -59,7 +60,10 @@ class ProgressLine:
 
 def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
     """Return time, motion and its reliability, rate, missing values, gaps, and bytes safe on disk."""
-    parts, found = ["waiting for the bob" if progress.waiting else f"{progress.seconds:.0f} s"], progress.motion()
+    parts = ["waiting for the bob" if progress.waiting else f"{progress.seconds:.0f} s"]
+    # On a terminal the first analysis, which loads its libraries, must not delay troubles and keys.
+    listening = style.terminal and progress.seconds < FIRST_MOTION_S
+    found = NotYet("listening") if listening else progress.motion()
     if isinstance(found, LiveMotion):
         form = concise if style.terminal else shown
         parts += [f"T {form(found.period, style)}", f"A {form(found.amplitude, style)}"]

@@ -12,7 +12,7 @@ from springmass.runs.rows import TableKey, table_rows
 from springmass.terminal.quantities import concise, shown
 from springmass.terminal.style import PLAIN, TerminalStyle
 
-NARROWEST = 24  # minimum width of the column for the names of quantities, which wrap
+NARROW, NARROWEST = 24, 12  # width of the column for the names of quantities, which wrap, for several runs and for one
 
 
 def text_table(
@@ -37,19 +37,16 @@ def text_table(
     symbols = [row.page_symbol.replace(" ", "") if style.unicode else row.symbol for row in rows]
     left = max([len("quantity"), *(len(row.quantity) for row in rows)])
     room = style.width - max([len("symbol"), *map(len, symbols)]) - 4
-    for form in (shown, concise):
+    for form in (shown, concise) if len(names) > 1 else (shown,):
         cells = [tuple(form(x, style) for x in row.estimates) for row in rows]
         widest = max([8, *(len(cell) for row in cells for cell in row)])
         if len(names) == 1:
             widest = max([widest, *(len(row.note) for row in rows if len(row.note) <= room - left)])
-        together = max(1, (room - left + 3) // (widest + 3))
-        if together >= len(names):
+        if room + 3 - len(names) * (widest + 3) >= left:
             break
-    else:
-        # Long names of quantities wrap if all runs then fit side by side.
-        wrapped = room + 3 - len(names) * (widest + 3)
-        if wrapped >= NARROWEST:
-            left, together = wrapped, len(names)
+    # Otherwise the names of quantities wrap, and if that does not suffice, further blocks follow.
+    together = min(len(names), max(1, (room + 3 - min(left, NARROW)) // (widest + 3)))
+    left = min(left, max(NARROWEST, room + 3 - together * (widest + 3)))
     for i, row in enumerate(rows):
         if row.note:
             cells[i] = (row.note if len(row.note) <= widest else "no mass",) * len(names)

@@ -72,7 +72,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("recorded")
     (folder / "bench.toml").write_text(SCENE)
     run = folder / "run.h5"
-    assert main(["record", "--simulate", str(folder / "bench.toml"), "--seconds", "2", "-o", str(run)]) == 0
+    assert main(["record", "--simulate", "--scene", str(folder / "bench.toml"), "--seconds", "2", "-o", str(run)]) == 0
     return run
 
 
@@ -115,7 +115,7 @@ def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Callable, tmp
 def test_nothing_is_ever_recorded_over(cli: Callable, tmp_path: Path, scene: Path, name: str) -> None:
     """Where a run file or its log exists the command ends before it opens anything."""
     (tmp_path / name).write_bytes(b"precious")
-    done = cli("record", "--simulate", scene, "--seconds", "1", "-o", tmp_path / "run.h5")
+    done = cli("record", "--simulate", "--scene", scene, "--seconds", "1", "-o", tmp_path / "run.h5")
     assert done.code == 2
     assert name in done.complaint
     assert (tmp_path / name).read_bytes() == b"precious"
@@ -127,7 +127,7 @@ def test_a_place_that_cannot_hold_the_run_is_refused_before_the_recording(
     """A link to nothing, and a name too long for the log's suffix: one line, exit code 2, nothing recorded."""
     (tmp_path / "run.h5").symlink_to(tmp_path / "nowhere" / "run.h5")
     for out in (tmp_path / "run.h5", tmp_path / ("x" * 252 + ".h5")):
-        done = cli("record", "--simulate", scene, "--seconds", "1", "-o", out)
+        done = cli("record", "--simulate", "--scene", scene, "--seconds", "1", "-o", out)
         assert (done.code, len(done.err.splitlines())) == (2, 1)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.toml", "run.h5"]
 
@@ -178,7 +178,9 @@ def test_options_that_would_do_nothing_are_refused(
     cli: Callable, tmp_path: Path, scene: Path, options: tuple[str, str], message: str
 ) -> None:
     """An option that no sensor takes, or that needs another: one line, exit code 2, nothing recorded."""
-    done = cli("record", "--simulate", scene, "--sensor", "line-protocol", *options, "-o", tmp_path / "run.h5")
+    done = cli(
+        "record", "--simulate", "--scene", scene, "--sensor", "line-protocol", *options, "-o", tmp_path / "run.h5"
+    )
     assert done.code == 2
     assert message in done.complaint
     assert not (tmp_path / "run.h5").exists()
@@ -189,14 +191,24 @@ def test_a_disk_nearly_full_is_told_before_a_run_starts(
 ) -> None:
     """Less room than the run needs: one line, exit code 4, no port opened, no log."""
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1000))
-    done = cli("record", "--simulate", scene, "--seconds", "60", "-o", tmp_path / "run.h5")
+    done = cli("record", "--simulate", "--scene", scene, "--seconds", "60", "-o", tmp_path / "run.h5")
     assert done.code == 4
     assert not (tmp_path / "run.wire").exists()
 
 
 def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """After kill -9 the log gives a run file with the first second whole."""
-    command = [sys.executable, "-m", "springmass", "record", "--simulate", str(scene), "-o", str(tmp_path / "run.h5")]
+    command = [
+        sys.executable,
+        "-m",
+        "springmass",
+        "record",
+        "--simulate",
+        "--scene",
+        str(scene),
+        "-o",
+        str(tmp_path / "run.h5"),
+    ]
     child = subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
     assert child.stderr is not None
     assert any(" s | " in line for line in child.stderr)  # it has kept its first second
@@ -280,7 +292,20 @@ def test_several_distances_need_somebody_who_presses_enter(
 def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """--still, --ruler and --trigger work without hardware: the ruler's distance is the rest, the run its motion."""
     done = cli(
-        *("record", "--simulate", scene, "--still", "0.5", "--ruler", "0.26", "--trigger", "0.01", "--pre", "0.2"),
+        *(
+            "record",
+            "--simulate",
+            "--scene",
+            scene,
+            "--still",
+            "0.5",
+            "--ruler",
+            "0.26",
+            "--trigger",
+            "0.01",
+            "--pre",
+            "0.2",
+        ),
         *("--seconds", "1", "-o", tmp_path / "run.h5"),
     )
     assert done.code == 0, done.err

@@ -62,7 +62,7 @@ displacement_m = 0.05
 def test_a_recording_stays_in_its_lines_and_takes_marks(tmp_path: Path, columns: int) -> None:
     """Progress and keys are rewritten in place; space marks immediately, a word with Enter, Ctrl-C stops."""
     (tmp_path / "bench.toml").write_text(SCENE)
-    with OnTerminal(["record", "--simulate", "bench.toml", "-o", "run.h5"], tmp_path, columns) as terminal:
+    with OnTerminal(["record", "--simulate", "--scene", "bench.toml", "-o", "run.h5"], tmp_path, columns) as terminal:
         terminal.until("space marks, Ctrl-C stops")
         terminal.type(" ")
         terminal.until("mark 1 at")

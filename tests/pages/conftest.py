@@ -105,7 +105,9 @@ def record(start: Callable[..., Program], tmp_path: Path) -> Callable[..., Progr
     def recording(*arguments: str) -> Program:
         scene = tmp_path / "bench.toml"
         scene.write_text(SCENE)
-        return start("record", "--simulate", str(scene), "-o", str(tmp_path / "run.h5"), "--page", *arguments)
+        return start(
+            "record", "--simulate", "--scene", str(scene), "-o", str(tmp_path / "run.h5"), "--page", *arguments
+        )
 
     return recording
 

@@ -98,7 +98,7 @@ def test_from_a_file_to_a_figure(typed: Callable[..., str], clipped: Callable[..
 @pytest.mark.trials
 def test_at_the_bench(typed: Callable[..., str], bench: Path) -> None:
     """Recorded by a key, marked, stopped; noted beside it; analysed with what was noted; read in Python."""
-    with OnTerminal(["record", "--simulate", "bench.toml", "-o", "bob.h5"], bench) as terminal:
+    with OnTerminal(["record", "--simulate", "--scene", "bench.toml", "-o", "bob.h5"], bench) as terminal:
         terminal.until("space marks, Ctrl-C stops")
         terminal.type(" ")
         terminal.until("mark 1 at")
