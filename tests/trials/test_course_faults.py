@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from springmass.cli import main
 from springmass.course.benches import compare_rows
 from springmass.course.rows import COURSE, read_rows
-from springmass.cli import main
 from tests.courses import write_recording
 
 WHOLE = bool(os.environ.get("SPRINGMASS_TRIALS"))
