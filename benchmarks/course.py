@@ -11,8 +11,7 @@ recordings are available, variations of them (another clock, another scale, adde
 - time of a second pass over unchanged inputs relative to the first pass;
 - speed of one pass by two processes relative to two simultaneous passes by one process each over half of the runs, so
   that both sides keep both cores busy. Only the used and idle time of these processes counts, not other load;
-- maximum resident memory of a worker, MB;
-- processor time of a search of many rows, including their loading into memory, s.
+- maximum resident memory of a worker, MB.
 """
 
 from __future__ import annotations
@@ -38,7 +37,6 @@ import pandas
 from threadpoolctl import threadpool_limits
 
 from springmass import load
-from springmass.course.rows import DETAILS, columns_of
 from springmass.cli import main
 
 SAMPLES = 12_000
@@ -50,15 +48,15 @@ REAL = (
 )
 RECORDINGS = Path(__file__).resolve().parents[2] / "shared" / "recordings"
 HEAD = "Motion Sensor Data File Mar 12, 2024 2:05 PM\r\nTime (s)\tDistance (cm)\tDist Error (cm)\r\n"
-WHERE = "section = 'A' and period_u < 1e-5"
 WORKER = """
 import json, sys
 from springmass.course.plan import plan
-from springmass.course.worker import analyse_many
-jobs = plan([sys.argv[1]], accuracy="standard").jobs
+from springmass.course.worker import analyse_one
+jobs = plan([sys.argv[1]]).jobs
 peaks = []
 for part in (jobs[: len(jobs) // 2], jobs[len(jobs) // 2 :]):
-    analyse_many(part)
+    for job in part:
+        analyse_one(job)
     # getrusage would give the memory of the parent process where that is larger.
     line = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
     peaks.append(int(line.split()[1]) / 1024)
@@ -323,33 +321,11 @@ def _guess(t: np.ndarray, y: np.ndarray) -> dict[str, float]:
     return {"amplitude": float(np.ptp(y) / 2), "frequency": frequency, "phase": -0.7, "offset": float(y.mean())}
 
 
-def search_s(rows: int) -> tuple[float, int]:
-    """Return the processor time of loading and searching ``rows`` rows, s, and the number of matching rows."""
-    rng = np.random.default_rng(1)
-    columns = columns_of(("section",))
-    numbers = [name for name in columns if name.endswith("_u") or f"{name}_u" in columns][:60]
-
-    def made() -> Iterator[dict[str, object]]:
-        for i in range(rows):
-            values = dict(zip(numbers, rng.random(len(numbers)).tolist(), strict=True))
-            long = dict.fromkeys(DETAILS, "x" * 400)
-            text = {"run": f"run{i}", "status": "ok", "section": "ABCDEFGH"[i % 8], "input_sha256": f"{i:064d}"}
-            yield {**values, **long, **text, "period_u": 1e-4 * float(rng.random())}
-
-    columns_shown = ("run", "period", "spring_constant")
-    before = time.process_time()
-    matching, _ = search_rows(columns, made(), where=WHERE, shown=columns_shown)
-    return time.process_time() - before, len(matching)
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--searched", type=int, default=10_000)
     options = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with tempfile.TemporaryDirectory() as name:
         for what, value in asdict(measure(options.runs, Path(name))).items():
             print(f"{what:12} {value:.4g}")
-        seconds, count = search_s(options.searched)
-        print(f"search of {options.searched} rows: {seconds:.2f} s of processor, {count} match")

@@ -63,7 +63,7 @@ def faulty_course(folder: Path) -> list[str]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Return every file of a course by name, but its data, which depend on the order of work, and its lock."""
+    """Return every file of a course's results by name, except its data, whose order varies, and its lock."""
     files = [path for path in sorted(folder.rglob("*")) if path.is_file() and not path.match("course.*")]
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 from failure import Error
 from springmass.api.sources import Analysing, analyse
 from springmass.course.rows import NUMBERS, UNITS, WHOLE, columns_of, read_rows
-from springmass.course.worker import fill
+from springmass.course.worker import row_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,7 +63,7 @@ def _row(source: Any, *, scene: Any, how: Any) -> dict[str, Any]:
     path = os.fspath(source) if isinstance(source, str | os.PathLike) else getattr(source, "name", "")
     row: dict[str, Any] = {"run": os.path.basename(path), "path": path, "status": "failed", "error": ""}
     try:
-        fill(row, analyse(source, scene, **how))
+        row |= row_of(analyse(source, scene, **how), path)
     except (Error, OSError, MemoryError) as error:
         row["error"] = " ".join(str(error).split())
     return row

@@ -72,9 +72,7 @@ def batch(
             inputs,
             runs_csv=None if options.runs is None else str(options.runs),
             scene=None if options.scene is None else str(options.scene),
-            accuracy=how.accuracy,
-            law=how.law,
-            answers={name: value for name, value in how.given().items() if name not in ("accuracy", "law")},
+            how=how,
             known=[json.loads(key)[0] for key in store.made_of()],
             output=str(folder),
         )

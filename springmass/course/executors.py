@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -16,21 +16,20 @@ from springmass.runs.processes import cores, pool
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-BATCH = 25  # tasks per batch: what is lost if the program is killed, per process
-AHEAD = 2  # batches handed out per worker, so that no worker waits for its next batch
+AHEAD = 2  # tasks handed out per worker, so that no worker waits for its next one
+MANY = 500  # tasks handed out if the number of workers is not known
 FEW = 3  # up to this many tasks, starting a second process takes longer than it saves
 
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """Who does the tasks: ``start`` makes an executor, again after a worker has died.
+    """Who does the tasks: ``start`` makes an executor, again after a worker has died, and it is given ``ahead`` tasks.
 
-    ``count`` tasks are done at the same time; None if workers come and go. ``died`` is what a future raises if its
-    worker died. The address of a scheduler is empty if all work is done on this machine.
+    ``died`` is what a future raises if its worker died. The address of a scheduler is empty on this machine.
     """
 
     start: Callable[[], AbstractContextManager[Executor]]
-    count: int | None
+    ahead: int
     died: type[BaseException] = BrokenExecutor
     address: str = ""
 
@@ -54,12 +53,12 @@ def workers(tasks: int, processes: int | None = None, dask: str | None = None) -
     elif number <= 1 or tasks <= FEW:
         yield Workers(_ThisProcess, 1)
     else:
-        yield Workers(lambda: _pool(number), number)
+        yield Workers(lambda: _pool(number), AHEAD * number)
 
 
 @contextlib.contextmanager
 def _pool(processes: int) -> Iterator[Executor]:
-    """Yield a pool whose processes are terminated on an error or Ctrl-C, because a batch may take minutes."""
+    """Yield a pool whose processes are terminated on an error or Ctrl-C, because a run may take minutes."""
     others = set(active_children())
     with pool(processes) as executor:
         try:
@@ -93,58 +92,54 @@ def _dask(address: str) -> Iterator[Workers]:
             executor.shutdown(wait=False)
 
     with client:
-        yield Workers(start, None, KilledWorker, address)
+        yield Workers(start, MANY, KilledWorker, address)
 
 
 def outcomes(
-    work: Callable[[Sequence[Task]], Result], tasks: Sequence[Task], by: Workers, size: int = BATCH
-) -> Iterator[tuple[Sequence[Task], Result | None]]:
-    """Yield batches of tasks with their results, as they are finished; ``work`` is picklable.
+    work: Callable[[Task], Result], tasks: Iterable[Task], by: Workers
+) -> Iterator[list[tuple[Task, Result | None]]]:
+    """Yield tasks with their results, those together that are finished at the same time; ``work`` is picklable.
 
-    If a worker dies, the tasks of the batches that were handed out are repeated one by one. If a worker dies again
-    during such a task, its result is None. Each worker gets at least four batches, so that none waits long for the
-    last one; :data:`AHEAD` batches per worker are handed out at a time, or all of them if workers come and go.
+    If a worker dies, the tasks that were handed out are repeated one by one. If a worker dies again during one of them,
+    its result is None.
     """
-    if by.count is not None:
-        size = max(1, min(size, len(tasks) // (4 * by.count)))
-    waiting = deque(tasks[at : at + size] for at in range(0, len(tasks), size))
+    waiting = deque(tasks)
     while waiting:
-        lost = yield from _until_one_dies(work, waiting, by, AHEAD * by.count if by.count else len(waiting))
-        alone: deque[Sequence[Task]] = deque([task] for batch in lost for task in batch)
-        while alone:
-            twice = yield from _until_one_dies(work, alone, by, 1)
-            yield from ((batch, None) for batch in twice)
+        lost = yield from _until_one_dies(work, waiting, by, by.ahead)
+        for task in lost:
+            if (yield from _until_one_dies(work, deque([task]), by, 1)):
+                yield [(task, None)]
 
 
 def _until_one_dies(
-    work: Callable[[Sequence[Task]], Result], waiting: deque[Sequence[Task]], by: Workers, ahead: int
-) -> Generator[tuple[Sequence[Task], Result], None, list[Sequence[Task]]]:
-    """Yield batches and results of one executor until a worker dies; return the batches that were lost with it."""
-    running: dict[Future[Result], Sequence[Task]] = {}
-    lost: list[Sequence[Task]] = []
+    work: Callable[[Task], Result], waiting: deque[Task], by: Workers, ahead: int
+) -> Generator[list[tuple[Task, Result | None]], None, list[Task]]:
+    """Yield tasks and results of one executor until a worker dies; return the tasks that were lost with it."""
+    running: dict[Future[Result], Task] = {}
+    lost: list[Task] = []
     with by.start() as executor:
         try:
             while running or (waiting and not lost):
                 while waiting and not lost and len(running) < ahead:
-                    batch = waiting.popleft()
+                    task = waiting.popleft()
                     try:
-                        running[executor.submit(work, batch)] = batch
+                        running[executor.submit(work, task)] = task
                     except by.died:
-                        lost.append(batch)
+                        lost.append(task)
+                done: list[tuple[Task, Result | None]] = []
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    batch = running.pop(future)
+                    task = running.pop(future)
                     try:
-                        result = future.result()
+                        done.append((task, future.result()))
                     except by.died:
-                        lost.append(batch)
+                        lost.append(task)
                     except (CancelledError, Exception) as error:
                         if not by.address:
                             raise
                         reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-                        message = f"{by.address}: a batch of runs failed ({reason}); run springmass batch again"
+                        message = f"{by.address}: a run failed ({reason}); run springmass batch again"
                         raise ProgramError(message, SOME_FAILED) from error
-                    else:
-                        yield batch, result
+                yield done
         finally:
             for future in running:
                 future.cancel()

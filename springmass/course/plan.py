@@ -8,7 +8,7 @@ import hashlib
 import json
 import os
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,13 @@ from acquisition.recordings.base import dialect_folder
 from acquisition.regular_file import open_regular, open_regular_text, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import SceneError
-from springmass.course.runs_csv import ANSWERS, LAW, POSITION, Values, join, read_table
+from springmass.course.runs_csv import ANSWERS, POSITION, Values, join, read_table
 from springmass.errors import UNREADABLE, USAGE, ProgramError
 from springmass.layout import PACKAGES, part
 from springmass.runs.about import about_path
+from springmass.runs.analysing import Task
 from springmass.runs.inputs import InputFile, files_of
+from springmass.runs.options import HOW, How
 from springmass.runs.outputs import numbered
 from springmass.runs.scenes import read_scene
 
@@ -31,40 +33,39 @@ _CODE = (".py", ".toml", ".j2", ".css", ".js")
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One run to analyse: its path as the inputs name it, and what is known of it.
+    """One run to analyse: its path as the inputs name it, the given options by name, the given scene, and its tags.
 
-    Relative paths start from ``folder``. ``answers`` are reading options, and ``scene`` is the given one by table and
-    key, or None for the one that the recording carries.
+    Relative paths start from ``folder``.
     """
 
     path: str
     folder: str
-    answers: Mapping[str, Any]
-    scene: Mapping[str, Any] | None
+    how: Mapping[str, Any]
+    scene: Scene | None
     tags: Mapping[str, str]
-    accuracy: str
-    law: str | None
 
     @property
     def key(self) -> str:
         """What distinguishes this run from others: its path, and the run and channel within the file."""
-        return json.dumps([self.path, self.answers.get("run"), self.answers.get("channel")])
+        return json.dumps([self.path, self.how.get("run"), self.how.get("channel")])
 
-    @property
-    def scene_sha256(self) -> str:
-        """Digest of the given scene; empty if none was given."""
-        return "" if self.scene is None else _digest(self.scene)
-
-    @property
-    def parameters_sha256(self) -> str:
-        """Digest of accuracy, answers and stated law."""
-        return _digest({"accuracy": self.accuracy, "answers": self.answers, "law": self.law})
+    def digests(self) -> dict[str, str]:
+        """Return the digests of the given scene, empty if there is none, and of the options."""
+        scene = "" if self.scene is None else _digest(self.scene.to_mapping())
+        return {"scene_sha256": scene, "parameters_sha256": _digest(self.how)}
 
     def made_of(self) -> str:
         """Return a digest of all on which the run's row and report depend; this reads the files."""
-        files = (self.path, self.answers.get("velocity"), str(about_path(Path(self.path))))
+        files = (self.path, self.how.get("velocity"), str(about_path(Path(self.path))))
         read = [digest_of(self.whole(path)) if path else "" for path in files]
-        return _digest([*read, self.scene_sha256, self.parameters_sha256, code_sha256()])
+        return _digest([*read, self.digests(), code_sha256()])
+
+    def task(self) -> Task:
+        """Return what every process can analyse."""
+        how = How.of(self.how)
+        if how.velocity is not None:
+            how = replace(how, velocity=self.whole(str(how.velocity)))
+        return Task(self.whole(self.path), self.path, self.scene, how)
 
     def whole(self, path: str) -> str:
         """Return a path that every process can find."""
@@ -85,16 +86,14 @@ def plan(
     *,
     runs_csv: str | None = None,
     scene: str | None = None,
-    accuracy: str = "standard",
-    law: str | None = None,
-    answers: Mapping[str, Any] | None = None,
+    how: How = HOW,
     known: Collection[str] = (),
     output: str | None = None,
 ) -> Plan:
     """Find the runs of a course and the known values of each.
 
     Inputs are files, folders with all their contents, patterns, and lists: ``@FILE`` names a file with one path per
-    line; without inputs, the files that the table of runs names. Scene, law and answers are for all runs, and the table
+    line; without inputs, the files that the table of runs names. Scene and options are for all runs, and the table
     takes precedence. ``known`` are paths that an earlier pass identified as recordings, ``output`` is left out.
     """
     table = None if runs_csv is None else read_table(runs_csv)
@@ -114,16 +113,15 @@ def plan(
         tags = table.tags
         notes += [*said, *([f"{table.path}: tags: {', '.join(tags)}"] if tags else [])]
     shared = None if scene is None else read_scene(scene)
-    if shared is not None and shared.damping_law is not None and law is None:
+    if shared is not None and shared.damping_law is not None and how.law is None:
         notes.insert(0, f"damping law {shared.damping_law}: stated in {scene}")
-    given = {name: value for name, value in (answers or {}).items() if value not in (None, False)}
     jobs = []
     for file, line, values in joined:
-        read = given | ({} if file.velocity is None else {"velocity": file.velocity})
-        read |= {name: values[name] for name in ANSWERS if name in values}
-        stated = _scene(values, shared, f"{runs_csv}, line {line}")
+        velocity = {} if file.velocity is None else {"velocity": file.velocity}
+        stated = how.stated() | velocity | {name: values[name] for name in ANSWERS if name in values}
+        of_run = _scene(values, shared, f"{runs_csv}, line {line}")
         of_tags = {name: values[name] for name in tags if name in values}
-        jobs.append(Job(file.path, os.getcwd(), read, stated, of_tags, accuracy, values.get(LAW, law)))
+        jobs.append(Job(file.path, os.getcwd(), stated, of_run, of_tags))
     return Plan(tuple(jobs), tags, tuple(notes))
 
 
@@ -151,7 +149,7 @@ def _listed(path: Path) -> list[str]:
     return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
 
 
-def _scene(values: Values, shared: Scene | None, where: str) -> dict[str, Any] | None:
+def _scene(values: Values, shared: Scene | None, where: str) -> Scene | None:
     """Return the scene that a run is given, with the values of the table in place of those of a file."""
     given = read_scene(values["scene"]) if "scene" in values else shared
     tables = {} if given is None else given.to_mapping()
@@ -161,7 +159,7 @@ def _scene(values: Values, shared: Scene | None, where: str) -> dict[str, Any] |
         (table, key), (value, u) = PLACES[name], values[name]
         tables.setdefault(table, {})[key] = {"value": value, "u": u} if u else value
     try:
-        return Scene.from_mapping(tables, where=where).to_mapping() if tables else None
+        return Scene.from_mapping(tables, where=where) if tables else None
     except SceneError as error:
         raise ProgramError(str(error), USAGE) from error
 

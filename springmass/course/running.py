@@ -16,7 +16,7 @@ from springmass.course.page import line_of, mark, write_groups, write_page
 from springmass.course.plan import Job, Plan, code_sha256, names_of
 from springmass.course.rows import COURSE, write_rows
 from springmass.course.store import Store
-from springmass.course.worker import analyse_many, blank_row, write_reports
+from springmass.course.worker import analyse_one, blank_row, write_report_of
 from springmass.errors import USAGE, ProgramError
 from springmass.report.script import SHARED, report_script
 from storage.atomic import write_whole, writing
@@ -76,17 +76,16 @@ def _table(course: Plan, store: Store, done: set[str]) -> list[Row]:
 
 
 def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterator[list[tuple[Job, Row]]]:
-    """Yield jobs with their rows in batches; a run during which worker processes die gets a row stating this."""
+    """Yield jobs with their rows; a run during which worker processes die gets a row stating this."""
     if not todo:
         return
     with workers(len(todo), jobs, dask) as by:
-        for batch, rows in outcomes(analyse_many, todo, by):
-            if rows is None:
-                rows = [blank_row(job, "ended", f"{job.path}: {_DIED}") for job in batch]
-            if any(row["code_sha256"] != code_sha256() for row in rows):
+        for done in outcomes(analyse_one, todo, by):
+            rows = [(job, row or blank_row(job, "ended", f"{job.path}: {_DIED}")) for job, row in done]
+            if any(row["code_sha256"] != code_sha256() for _, row in rows):
                 wrong = "a worker has another version of springmass or of its libraries; install the same everywhere"
                 raise ProgramError(f"{dask}: {wrong}", USAGE)
-            yield list(zip(batch, rows, strict=True))
+            yield rows
 
 
 def _write_pages(
@@ -108,10 +107,12 @@ def _write_pages(
     named = [(line["name"], job, folder / report_of(line["name"])) for line, job in worst]
     tasks = [(name, job, page.parent) for name, job, page in named if not page.exists()]
     unwritten: list[str] = []
+    finished = 0
     with workers(len(tasks), jobs) as by:
-        for done, (batch, reasons) in enumerate(outcomes(write_reports, tasks, by, 1), 1):
-            unwritten += [f"{job.path}: {_DIED}" for _, job, _ in batch] if reasons is None else filter(None, reasons)
-            reported(done, len(tasks))
+        for written in outcomes(write_report_of, tasks, by):
+            unwritten += [f"{job.path}: {_DIED}" if why is None else why for (_, job, _), why in written if why != ""]
+            finished += len(written)
+            reported(finished, len(tasks))
     for line in lines:
         line["link"] = link if (folder / (link := report_of(line["name"]))).exists() else ""
     write_page(folder, table, lines, course.tags)

@@ -23,11 +23,11 @@ from springmass.runs.inputs import InputFile
 from springmass.values import ANY_LAW
 
 NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
-ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", *NUMBERS)
-POSITION = "sensor_position"
 LAW = "law"
+ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", LAW, *NUMBERS)
+POSITION = "sensor_position"
 _U = tuple(f"{name}_u" for name in PLACES)
-KNOWN = ("path", "scene", POSITION, LAW, *ANSWERS, *PLACES, *_U)
+KNOWN = ("path", "scene", POSITION, *ANSWERS, *PLACES, *_U)
 TEMPLATE = (
     "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
     "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",

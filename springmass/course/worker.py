@@ -4,30 +4,28 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from acquisition.errors import AcquisitionError, NeedsAnswer, visible
-from pipeline.analyse import Analysis, Oscillation, Overdamped
+from acquisition.errors import visible
+from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import PLACES
-from pipeline.errors import AnalysisError, PipelineError
+from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.numerics.threads import one_thread
 from pipeline.results.compare import SpringRun
 from springmass.charts.drag_map import drag_points
 from springmass.charts.outline import outline
 from springmass.course.plan import Job, code_sha256, digest_of
 from springmass.course.rows import ESTIMATES
-from springmass.errors import NO_MEMORY, ProgramError, internal_error, quietly
+from springmass.errors import internal_error, quietly
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.script import SHARED
-from springmass.runs.options import How
+from springmass.runs.analysing import Failed, analyse_all
 from springmass.runs.questions import for_course
 from springmass.runs.run import Run
-from storage.errors import StorageError
+from storage.errors import WriteFailed
 
 LARGEST = 1e100
 """Maximum magnitude of numbers in a row, whose square is still finite. Larger estimates are left out."""
@@ -35,33 +33,32 @@ DIGITS = 6  # decimal places of a correlation
 TIME = "by springmass batch"  # in place of a time, so that a pass at any time gives the same bytes
 
 
-def analyse_job(job: Job) -> Run:
-    """Read a run of a course and analyse it with the scene and options of its job."""
-    how = How.of({**job.answers, "accuracy": job.accuracy, "law": job.law})
-    if how.velocity is not None:
-        how = replace(how, velocity=job.whole(str(how.velocity)))
-    return Run.of(job.whole(job.path), job.scene, how)
-
-
-def write_reports(tasks: Sequence[tuple[str, Job, Path]]) -> list[str]:
-    """Write the reports of runs, given by name, job and folder; return a reason for each that cannot be written."""
-    return [_attempt(task[1], partial(_write_report, *task)) for task in tasks]
-
-
-def _write_report(name: str, job: Job, folder: Path) -> None:
+def write_report_of(task: tuple[str, Job, Path]) -> str:
+    """Write the report of a run, given by name, job and folder; return why it cannot be written, or nothing."""
     from springmass.report.write import write_report
 
+    name, job, folder = task
     with quietly():
-        run = analyse_job(job)
-        run = replace(run, loaded=replace(run.loaded, path=Path(job.path)), name=name, time_utc=TIME)
-        write_report(folder, [run], script=f"../../{SHARED}")
+        (run,) = analyse_all([job.task()])
+        if isinstance(run, Failed):
+            return _line(job, run)
+        try:
+            run = replace(run, loaded=replace(run.loaded, path=Path(job.path)), name=name, time_utc=TIME)
+            write_report(folder, [run], script=f"../../{SHARED}")
+        except WriteFailed as error:
+            return str(error)
+        except Exception as error:  # a defect in the program must not stop the reports of other runs
+            return f"{job.path}: {internal_error(error)}"
+    return ""
 
 
-def analyse_many(jobs: Sequence[Job]) -> list[dict[str, Any]]:
-    """Return the rows of runs, identical on every machine and at every time; a run that fails has one as well."""
-    # Messages about a recording go into its row. Threads are limited once instead of in every analysis.
-    with quietly(), one_thread:
-        return [_analyse_one(job) for job in jobs]
+def analyse_one(job: Job) -> dict[str, Any]:
+    """Return the row of a run, identical on every machine and at every time; a run that fails has one as well."""
+    row = blank_row(job)
+    row["input_sha256"] = digest_of(job.whole(job.path)) or None
+    with quietly():  # messages about a recording go into its row
+        (run,) = analyse_all([job.task()])
+    return row | ({"error": _line(job, run)} if isinstance(run, Failed) else row_of(run, job.path))
 
 
 def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, Any]:
@@ -72,45 +69,34 @@ def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, An
         "error": error,
         "errors": 0,
         "warnings": 0,
-        "scene_sha256": job.scene_sha256,
-        "parameters_sha256": job.parameters_sha256,
+        **job.digests(),
         "code_sha256": code_sha256(),
         "tell": [],  # what the group should know: each harmful finding with its advice, the worst first
         "thumbnail": "",
     }
 
 
-def _analyse_one(job: Job) -> dict[str, Any]:
-    row = blank_row(job)
-    row["input_sha256"] = digest_of(job.whole(job.path)) or None
-    failure = _attempt(job, lambda: fill(row, analyse_job(job)))
-    return row | {"error": failure} if failure else row
-
-
-def _attempt(job: Job, do: Callable[[], None]) -> str:
-    """Return why something could not be done, in one line that names the run as the inputs do; empty if it could."""
-    try:
-        do()
-        return ""
-    except NeedsAnswer as error:
-        message = str(error.with_remedy(for_course(error.question)))
-    except (ProgramError, AcquisitionError, PipelineError, StorageError, OSError) as error:
-        message = str(error)
-    except MemoryError:
-        message = NO_MEMORY
-    except Exception as error:  # a defect in the program must not stop the other runs
-        message = internal_error(error)
+def _line(job: Job, failed: Failed) -> str:
+    """Return why there is no run, in one line that names it as the inputs do."""
+    asked = failed.question
+    message = failed.message if asked is None else str(asked.with_remedy(for_course(asked.question)))
     line = " ".join(message.replace(job.whole(job.path), job.path).split())
     return line if job.path in line else f"{job.path}: {line}"
 
 
-def fill(row: dict[str, Any], run: Run) -> None:
-    """Fill the row of a run with its results."""
-    loaded, analysis = run.loaded, run.analysis
-    track, motion, findings = analysis.track, analysis.motion, analysis.findings
-    moves = isinstance(motion, (Oscillation, Overdamped))
+def row_of(run: Run, path: str) -> dict[str, Any]:
+    """Return the columns of an analysed run; errors name its path as the inputs do."""
+    loaded, analysis, findings = run.loaded, run.analysis, run.findings
+    track, scene = analysis.track, analysis.scene
     by_harm = sorted(((harm_of(f.code, f.severity), f) for f in findings), key=lambda pair: pair[0])
-    row |= {
+    return {
+        **_damping(analysis),
+        **_numbers(analysis.estimates),
+        **_numbers({name: x for name in PLACES if (x := getattr(scene, name)) is not None}),
+        **analysis.quality,
+        "malformed_rows": loaded.malformed_rows,
+        "status": "ok" if run.ok else "no_oscillation",
+        "error": "" if run.ok else f"{path}: no oscillation: {run.why}",
         "format": loaded.format,
         "kind": loaded.info.kind,
         "channel": loaded.channel or None,
@@ -120,29 +106,22 @@ def fill(row: dict[str, Any], run: Run) -> None:
         "samples": len(track),
         "rate_hz": _number(track.rate_hz),
         "duration_s": _number(track.t[-1] - track.t[0]) if len(track) else 0.0,
-        **_numbers(analysis.estimates),
-        **{f"{name}{end}": value for name in PLACES if (x := getattr(analysis.scene, name)) is not None
-           for end, value in (("", x.value), ("_u", x.u))},
-        **analysis.quality,
-        "malformed_rows": loaded.malformed_rows,
         "errors": sum(f.severity == "error" for f in findings),
         "warnings": sum(f.severity == "warning" for f in findings),
         "findings": _json([f.code for f in findings]),
         "messages": _json([[f.severity, visible(f.message)] for f in findings if f.severity != "info"]),
         "tell": [f"{sentence(f.message)} {f.advice}".rstrip() for harm, f in by_harm if harm <= Harm.PART],
         "thumbnail": outline(analysis),
-    }  # fmt: skip
-    if isinstance(motion, Oscillation):
-        _fill_damping(row, analysis, motion)
-    row["status"] = "ok" if moves else "no_oscillation"
-    row["error"] = "" if moves else f"{row['path']}: no oscillation: {run.why}"
+    }
 
 
-def _fill_damping(row: dict[str, Any], analysis: Analysis, motion: Oscillation) -> None:
-    damping, derived = motion.damping, motion.derived
+def _damping(analysis: Analysis) -> dict[str, Any]:
+    if not isinstance(analysis.motion, Oscillation):
+        return {}
+    damping, derived = analysis.motion.damping, analysis.motion.derived
     undetermined = [name for name, x in derived.coefficients.items() if isinstance(x, UpperLimit)]
     matrix = [[_number(x) for x in line] for line in derived.joint.correlation.round(DIGITS).tolist()]
-    row |= _numbers({name: x for name, x in derived.coefficients.items() if name not in row}) | {
+    found = _numbers(derived.coefficients) | {
         "law": damping.selected,
         "admissible": " ".join(damping.admissible),
         "stated_law": damping.stated or None,
@@ -155,13 +134,13 @@ def _fill_damping(row: dict[str, Any], analysis: Analysis, motion: Oscillation) 
     try:
         spring = SpringRun.of("", derived, clock=analysis.track.clock)
     except AnalysisError:
-        return  # without a mass, no spring constant can be compared
-    row["u_clock"] = _number(spring.u_clock)
-    row |= _numbers({"natural_angular_frequency": spring.angular_frequency, "own_mass_kg": spring.mass_kg})
+        return found  # without a mass, no spring constant can be compared
+    own = {"natural_angular_frequency": spring.angular_frequency, "own_mass_kg": spring.mass_kg}
+    return found | {"u_clock": _number(spring.u_clock)} | _numbers(own)
 
 
 def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, float | None]:
-    shown = {name: x for name, x in estimates.items() if name in ESTIMATES}
+    shown = {name: x for name, x in estimates.items() if name in (*ESTIMATES, *PLACES)}
     return {f"{name}{end}": _number(y) for name, x in shown.items() for end, y in (("", x.value), ("_u", x.u))}
 
 
