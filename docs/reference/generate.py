@@ -1,4 +1,4 @@
-"""Write the tables of options in command-line.md, findings.md and glossary.md from the declarations in the program.
+"""Write the tables of options in command-line.md, and findings.md, from the declarations in the program.
 
 ``python docs/reference/generate.py`` brings the pages up to date; ``tests/docs/test_docs.py`` checks that they are.
 """
@@ -15,12 +15,10 @@ from cyclopts.argument import Argument
 from pipeline.findings.finding import RANK, Kind, kinds, usual_advice
 from springmass.commands import COMMANDS, app
 from springmass.commands.options import THE_PAGE
-from springmass.glossary import TERMS
 from springmass.runs.options import HOW_READ
 
 PAGE = Path(__file__).with_name("command-line.md")
 FINDINGS_PAGE = Path(__file__).with_name("findings.md")
-GLOSSARY_PAGE = Path(__file__).with_name("glossary.md")
 SHOWN = {"error": "error", "warning": "warning", "info": "note"}
 TABLE = re.compile(r"<!-- options of (?P<what>[\w ]+) -->\n.*?<!-- end -->\n", re.DOTALL)
 LIST = re.compile(r"<!-- commands -->\n.*?<!-- end -->\n", re.DOTALL)
@@ -60,13 +58,6 @@ Version 0.2.0 replaced these codes. They named causes that no recording showed, 
 - `contact`: `touched`, or `model_misfit`.
 - `wave_slips`: `false_echoes`.
 - `locked_echoes`: `clipped`.
-"""
-
-
-GLOSSARY_HEAD = """\
-# Glossary
-
-This page is for everyone who meets an unknown word in a report, a message or these pages.
 """
 
 
@@ -147,14 +138,7 @@ def findings_page() -> str:
     return "\n".join([*parts, GONE])
 
 
-def glossary_page() -> str:
-    """Return the page of terms."""
-    rows = [f"| {each.name} | {each.symbol or ''} | {each.meaning} |" for each in TERMS]
-    return "\n".join([GLOSSARY_HEAD, "| term | symbol | meaning |", "| --- | --- | --- |", *rows, ""])
-
-
 if __name__ == "__main__":
     PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     FINDINGS_PAGE.write_text(findings_page(), encoding="utf-8")
-    GLOSSARY_PAGE.write_text(glossary_page(), encoding="utf-8")
-    print(f"{len(COMMANDS)} commands, {len(kinds())} finding codes, {len(TERMS)} terms")
+    print(f"{len(COMMANDS)} commands, {len(kinds())} finding codes")
