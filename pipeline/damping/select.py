@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.damping.evidence import choose, least_chi2, weigh
+from pipeline.damping.evidence import NEGATIVE, choose, least_chi2, weigh
 from pipeline.damping.law_fit import LawFit, fit_law, mean_squared_rate
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
@@ -60,6 +60,12 @@ class Damping:
     def considered(self) -> Mapping[str, LawFit]:
         """The fits of the selected law and of the admissible laws."""
         return {name: self.fits[name] for name in dict.fromkeys((self.selected, *self.admissible))}
+
+    @property
+    def growth_rate(self) -> float:
+        """The rate of an exponential growth that was admitted, 1/s; 0 for a decay."""
+        gamma = self.best.joint["gamma"] if self.settled and self.best is self.of_powers(1) else None
+        return -gamma.value if gamma is not None and gamma.value < -NEGATIVE * gamma.u else 0.0
 
     @property
     def settled(self) -> bool:
@@ -175,9 +181,19 @@ def _fit_laws(points: _Points, t0: float, wanted: Sequence[str | Law], known: La
         fits, unfitted = _weighed(laws, points, unit)
     if not fits:
         raise AnalysisError("no damping law could be fitted to the amplitudes; see the counts of flagged samples")
+    fits = _with_growth(fits)
     stated = "" if known is None else known.name
     selected, admissible = select_law(fits, stated, float(points.t[-1]))
     return Damping(t0, fits, selected, admissible, points.spread, unfitted, stated)
+
+
+def _with_growth(fits: dict[str, LawFit]) -> dict[str, LawFit]:
+    """Admit exponential growth, as of forward Euler, if chi-square allows it and every law is rejected."""
+    for name, fit in fits.items():
+        exponential = isinstance(fit.law, Drag) and fit.law.powers == (1,)
+        if exponential and fit.rejection == "negative" and all(other.rejected for other in fits.values()):
+            return {**fits, name: replace(fit, rejection="")}
+    return fits
 
 
 def _weighed(laws: Mapping[str, Law], points: _Points, unit: str) -> tuple[dict[str, LawFit], dict[str, str]]:

@@ -21,6 +21,8 @@ def damping_findings(damping: Damping) -> Iterator[Found]:
     if damping.fits and len(rejected) == len(damping.fits):
         nearest = min(damping.fits.values(), key=lambda fit: fit.reduced_chi2) if damping.by_statement else damping.best
         yield Found("no_law_fits", {"reduced_chi2": nearest.reduced_chi2, "nearest": words_of(nearest.law)})
+    elif damping.growth_rate:
+        yield Found("growing", {"growth_rate": damping.growth_rate})
     elif damping.stated:
         yield from _stated_law(damping)
     if rejected or damping.unfitted:

@@ -146,7 +146,7 @@ def draw(panel: Panel, ax: Axes) -> Axes:
     others = count()
     numbers = {one.label: next(others) for one in {s.label: s for s in panel.series if s.role == "other"}.values()}
     named: set[str] = set()
-    for i, series in enumerate(thinned(each, MOST_OF_LINE) for each in panel.series):
+    for i, series in enumerate(each if panel.equal else thinned(each, MOST_OF_LINE) for each in panel.series):
         label = "_" if series.label in named else series.label.replace("$", r"\$")
         named.add(series.label)
         _draw(ax, series, label, numbers.get(series.label, 0), (low, high), 1.5 + 0.01 * i)

@@ -36,7 +36,7 @@ DETAIL_PERIODS = 8
 PER_PERIOD = 26  # points of a drawn period: a polygon that looks round
 MOST_PERIODS = 460  # of more periods the envelope is drawn, which a screen cannot tell from the motion
 MOST_STRETCHES, LEAST_WINDOWS = 24, 6
-LEAST_TURNS, MOST_TURNS = 4, 24
+MOST_TURNS = 230  # of the phase plot: 6000 points, of which none may be left out
 MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 MOST_MEANS = 120  # of kinetic and potential energy; of more periods, one mean covers several
 
@@ -359,14 +359,12 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
 
 
 def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
-    """Velocity against displacement: turns of the fitted motion, and the values of samples."""
+    """Velocity against displacement: the fitted motion, of very many turns every n-th, and the values of samples."""
     if not isinstance(a.motion, Oscillation):
         return None
     motion, track, unit = a.motion, a.track, a.track.unit
     factor, period = SHOWN[unit].factor, 2.0 * np.pi / a.motion.phase.angular_frequency.value
-    size = motion.demodulated.amplitude
-    wanted = 32.0 * float(np.ptp(size) / np.max(size))
-    step = max(1, int(np.ceil(motion.cycles.count / min(max(wanted, LEAST_TURNS), MOST_TURNS))))
+    step = int(np.ceil(motion.cycles.count / MOST_TURNS))
     inside = (a.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
     recorded = track.velocity is not None and np.isfinite(track.velocity).any()
@@ -378,9 +376,9 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     seen = np.flatnonzero(np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, step) == 0))
     turns = []
     for start in np.arange(first, end, period * step).tolist():
-        t = np.linspace(start, min(start + period, end), 49)
+        t = np.linspace(start, min(start + period, end), PER_PERIOD)
         turns.append(np.column_stack(model_motion(motion, t)))
-        turns.append(np.full((1, 2), np.nan))  # lifts the pen
+        turns.append(np.full((int(step > 1), 2), np.nan))  # lifts the pen
     line = np.concatenate(turns)
     fastest = 1.1 * float(np.nanmax(np.abs(line[:, 1])))
     series = (

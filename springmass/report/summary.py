@@ -45,7 +45,7 @@ def _values(analysis: Analysis, motion: Oscillation) -> str:
         f"its amplitude by the fit at t\u00a0=\u00a0{start} is A₀\u00a0=\u00a0{kept(prefixed(x['amplitude']))}"
     )
     if "damping_rate" in x:
-        parts.append(f"it falls at first at the rate λ\u00a0=\u00a0{kept(x['damping_rate'])}")
+        parts.append(f"its damping rate at the start is λ\u00a0=\u00a0{kept(x['damping_rate'])}")
     return f"{sentence('; '.join(parts))} {damping_sentence(analysis)}"
 
 

@@ -72,7 +72,9 @@ def damping_sentence(analysis: Analysis) -> str:
             "damping rate or the amplitude against time, not their coefficients."
         )
     possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
-    if len(damping.best.law.parameters) == 1:
+    if damping.growth_rate:
+        text = "The amplitude grows exponentially"
+    elif len(damping.best.law.parameters) == 1:
         text = f"The amplitude does not fall measurably in {span}"
     elif possible and not damping.by_statement:
         text = f"{chosen[0].upper()}{chosen[1:]} fits best"

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import springmass
@@ -60,6 +61,26 @@ def test_table_1_has_the_coefficients_of_one_law_that_is_known(cli: Callable[...
     assert [name in free for name in names] == [False, False, False]
     assert [name in stated for name in names] == [True, False, False]
     assert "damping rate at the start" in free
+
+
+def test_the_growth_of_forward_euler_is_measured(cli: Callable[..., Done], tmp_path: Path) -> None:
+    """Its amplitude grows by sqrt(1 + w^2 h^2) a step; no sentence says that no law fits."""
+    omega, h, noise = 8.3, 0.002, 1e-4
+    x, v, rows = 0.05, 0.0, []
+    rng = np.random.default_rng(1)
+    for i in range(5000):
+        if i % 5 == 0:
+            rows.append(f"{i * h:.2f},{0.25 + x + noise * rng.standard_normal():.6f}\n")
+        x, v = x + h * v, v - h * omega**2 * x
+    table = tmp_path / "euler.csv"
+    table.write_text("time (s),distance (m)\n" + "".join(rows))
+    (result,) = cli("analyse", table, "--json").results
+    rate = result["estimates"]["damping_rate"]
+    assert rate["value"] == pytest.approx(-0.5 * np.log1p((omega * h) ** 2) / h, abs=4.0 * rate["u"])
+    assert rate["u"] < 1e-3 * abs(rate["value"])
+    codes = {each["code"] for each in result["findings"]}
+    assert "growing" in codes
+    assert "no_law_fits" not in codes
 
 
 def test_numbers_are_called_sound_uncertain_or_not_to_be_quoted(cli: Callable[..., Done], run: Path) -> None:

@@ -46,11 +46,12 @@ def test_a_short_record_names_all_that_it_cannot_distinguish() -> None:
     assert found.admissible[0] == found.selected
 
 
-def test_a_growing_amplitude_is_no_damping() -> None:
-    """A driven oscillation rejects every law of damping."""
+def test_an_exponential_growth_is_the_only_one_that_is_admitted() -> None:
+    """A driven oscillation rejects every law of damping; its growth is stated as such."""
     found = damping_of(Truth(amplitude=0.01, gamma=-0.02), 60.0, 1e-4)
-    assert all(fit.rejected for fit in found.fits.values())
-    assert found.admissible == ()
+    assert found.admissible == ("linear",)
+    assert found.growth_rate == pytest.approx(0.02, rel=0.01)
+    assert damping_of(Truth(amplitude=0.05, gamma=0.02), 60.0, 1e-4).growth_rate == 0.0
 
 
 def test_a_true_exponential_is_hardly_ever_rejected() -> None:

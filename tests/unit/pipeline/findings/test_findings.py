@@ -86,7 +86,7 @@ MAKERS: dict[str, tuple[str, str, dict[str, float], Callable[[], Track]]] = {
         *("sideways_mode", "warning", {"frequency_hz": 0.8, "amplitude_m": 1e-3, "beat_s": 1.92}),
         lambda: with_(lambda t: 1e-3 * np.cos(2 * np.pi * 0.8 * t)),
     ),
-    "growing": ("no_law_fits", "warning", {}, lambda: record(amplitude=0.01, gamma=-0.02)),
+    "growing": ("growing", "warning", {"growth_rate": 0.02}, lambda: record(amplitude=0.01, gamma=-0.02)),
 }
 
 
