@@ -18,6 +18,7 @@ from cyclopts import Parameter
 
 from pipeline.numerics.estimate import Estimate
 from springmass.commands.options import (
+    FURTHER,
     BenchOptions,
     Figures,
     File,
@@ -78,18 +79,24 @@ class AnalyseOptions:
     """The options of ``springmass analyse``."""
 
     scene: Scenes = ()
-    save_scene: Annotated[bool, flag("note the stated scene next to the recording, for later commands")] = False
+    save_scene: Annotated[bool, flag("note the stated scene next to the recording, for later commands"), FURTHER] = (
+        False
+    )
     method: Annotated[
-        Literal["classic"] | None, option("NAME", "also apply the lab report's classic method, for comparison")
+        Literal["classic"] | None,
+        option("NAME", "also apply the lab report's classic method, for comparison"),
+        FURTHER,
     ] = None
     output: Annotated[File | None, output("DIR", "output folder (default: here; with --json: none)")] = None
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
     full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
-    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex")] = None
-    figures: Figures = ()
-    si: Annotated[bool, flag("print SI units without prefixes")] = False
+    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex"), FURTHER] = (
+        None
+    )
+    figures: Annotated[Figures, FURTHER] = ()
+    si: Annotated[bool, flag("print SI units without prefixes"), FURTHER] = False
     json: Json = False
-    strict: Strict = False
+    strict: Annotated[Strict, FURTHER] = False
 
 
 def analyse(

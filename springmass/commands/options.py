@@ -18,6 +18,8 @@ from springmass.values import LawName, Positive, TcpPort
 File = str | Path
 """The name of a file; a shell completes it."""
 THE_PAGE = Group("The page", sort_key=4)
+FURTHER = Parameter(group=Group("Further options", sort_key=4))
+"""Marks an option that few people use, which the help shows below the others."""
 Accuracy = Literal["fast", "standard", "best"]
 
 
@@ -119,7 +121,7 @@ def _setting(text: str) -> tuple[tuple[str, str], Any]:
         return (table, key), value.strip()
 
 
-@Parameter(name="*", group=Group("The bench, instead of the values in the scene", sort_key=3))
+@Parameter(name="*", group=Group("The bench, instead of the values in the scene", sort_key=1.5))
 @dataclass(frozen=True, kw_only=True)
 class BenchOptions:
     """Values of the bench, each with its standard uncertainty."""
