@@ -16,10 +16,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from acquisition.decoders.family import Family as Sensor
+    from acquisition.recordings.base import Format
     from pipeline.bench.scene import Scene
     from pipeline.damping.laws import LAWS
     from pipeline.damping.laws.of_function import make_law
     from springmass.api.courses import batch, results
+    from springmass.api.simulation import simulate
+    from springmass.api.source import source
     from springmass.api.sources import analyse, compare, load
     from springmass.api.stream import Stream
     from springmass.errors import Error
@@ -29,9 +33,11 @@ else:
     # Imported on first use, so that `springmass --help` need not wait for numpy; a type checker sees the imports above.
     _WHERE = {
         "Error": "springmass.errors",
+        "Format": "acquisition.recordings.base",
         "LAWS": "pipeline.damping.laws",
         "Run": "springmass.runs.run",
         "Scene": "pipeline.bench.scene",
+        "Sensor": "acquisition.decoders.family:Family",
         "Stream": "springmass.api.stream",
         "analyse": "springmass.api.sources",
         "batch": "springmass.api.courses",
@@ -40,6 +46,8 @@ else:
         "make_law": "pipeline.damping.laws.of_function",
         "results": "springmass.api.courses",
         "sample_data": "springmass.runs.loading",
+        "simulate": "springmass.api.simulation",
+        "source": "springmass.api.source",
     }
 
     def __getattr__(name):
@@ -47,7 +55,8 @@ else:
 
         if name not in _WHERE:
             raise AttributeError(f"module 'springmass' has no attribute {name!r}; it has {', '.join(__all__)}")
-        return getattr(importlib.import_module(_WHERE[name]), name)
+        module, _, known_as = _WHERE[name].partition(":")
+        return getattr(importlib.import_module(module), known_as or name)
 
     def __dir__():
         return sorted(__all__)
@@ -58,8 +67,10 @@ __version__ = "0.2.0"
 __all__ = [
     "LAWS",
     "Error",
+    "Format",
     "Run",
     "Scene",
+    "Sensor",
     "Stream",
     "__version__",
     "analyse",
@@ -69,4 +80,6 @@ __all__ = [
     "make_law",
     "results",
     "sample_data",
+    "simulate",
+    "source",
 ]

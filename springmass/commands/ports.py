@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import shlex
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any
 
-from acquisition.clock import SystemClock
-from acquisition.decoders.registry import describe_bytes, families, probe
-from acquisition.errors import PortError, visible
-from acquisition.live.serial_port import SerialPort, list_ports
+from acquisition.decoders.registry import families
+from acquisition.errors import visible
+from acquisition.live.serial_port import list_ports
 from springmass.commands.options import Json, flag, option
-from springmass.errors import OK, SENSOR, ProgramError, suggest, tell
+from springmass.errors import OK, suggest
+from springmass.session.finding import listen
 from springmass.terminal.printing import wrapped
-
-PROBE_S = 1.0
-BAUDS = (115200, 9600)
 
 
 def ports(
@@ -49,69 +43,6 @@ def ports(
     return OK
 
 
-@dataclass(frozen=True, slots=True)
-class Named:
-    """Ports of a recording, with the family of the sensor on each, and their speed if it was measured."""
-
-    ports: tuple[str, ...]
-    sensors: tuple[str, ...]
-    baud: int | None
-
-
-def name_sensors(ports: tuple[str, ...], sensors: tuple[str, ...], baud: int | None) -> Named:
-    """Return ports and sensors of a recording; those that were not named are known by what speaks on the ports.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 4 where no port, or more than one, has a sensor that is known; the line names them.
-    """
-    if ports and sensors:
-        return Named(ports, sensors, baud)
-    addresses = ports or [port.device for port in list_ports()]
-    descriptions, known = [], []
-    for address in addresses:
-        heard, families, speed = _listen(address, BAUDS if baud is None else (baud,))
-        wanted = [name for name in families if not sensors or name in sensors]
-        descriptions.append(f"{address}: {heard}")
-        if wanted:
-            known.append((address, wanted[0], speed))
-    if len(known) != max(len(ports), 1):
-        if known:
-            demand = "name one with --port and --sensor; several speak"
-        else:
-            demand = "no rangefinder that is known speaks; name it with --port and --sensor, or take --simulate"
-        listed = "; ".join(descriptions) or "this machine has no serial port"
-        raise ProgramError(f"record looked for a rangefinder: {demand}: {listed}", SENSOR)
-    for address, name, speed in known:
-        tell(f"{address}: a {name} sensor at {speed} baud")
-    measured = known[0][2] if len(known) == 1 else None
-    return Named(tuple(each[0] for each in known), tuple(each[1] for each in known), baud or measured)
-
-
-def _row(device: str, description: str, listen: bool) -> dict[str, Any]:
-    heard, families, _ = _listen(device) if listen else (None, [], 0)
+def _row(device: str, description: str, probed: bool) -> dict[str, Any]:
+    heard, families, _ = listen(device) if probed else (None, [], 0)
     return {"device": device, "description": description, "heard": heard, "families": families}
-
-
-def _listen(device: str, bauds: Sequence[int] = BAUDS) -> tuple[str, list[str], int]:
-    """What a port sends at the usual speeds, which families recognise it, and at which speed."""
-    heard = b""
-    for baud in bauds:
-        try:
-            heard = _bytes_of(device, baud)
-        except PortError as error:
-            return str(error), [], baud
-        found = probe(heard) if heard else []
-        if found:
-            return f"{describe_bytes(heard)} at {baud} baud", found, baud
-    return describe_bytes(heard), [], bauds[-1]
-
-
-def _bytes_of(device: str, baud: int) -> bytes:
-    clock, heard = SystemClock(), b""
-    with contextlib.closing(SerialPort(device, baud)) as port:
-        end_ns = clock.now_ns() + int(PROBE_S * 1e9)
-        while (left_ns := end_ns - clock.now_ns()) > 0:
-            heard += port.read(left_ns * 1e-9)
-    return heard

@@ -26,11 +26,11 @@ from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted, flag, option, output
-from springmass.commands.ports import name_sensors
 from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
 from springmass.page.process import PageProcess
 from springmass.runs.outputs import made_now
 from springmass.runs.scenes import ask_about, read_scene
+from springmass.session.finding import name_sensors
 from springmass.session.operator import Closed, Operator
 from springmass.session.output import default_name, demand_new
 from springmass.session.sensors import Sensor

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from acquisition.errors import visible
-from pipeline.dynamics.band import Band, spread
+from pipeline.dynamics.band import Band
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
@@ -24,8 +24,8 @@ from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.simulation import (
-    Prepared,
     Simulation,
+    band_of,
     count_of,
     default_tolerance,
     demand_stable,
@@ -78,7 +78,7 @@ def simulate(
     ready = prepare(stated, longest_s, analysis=analysis, where=where)
     if ready.from_run:
         tell(f"from {against}: {', '.join(ready.from_run)}")
-    band, of_band = _band(ready, longest_s)
+    band, of_band = band_of(ready, longest_s)
     wanted = default_tolerance(band) if tolerance is None and method == "auto" else tolerance
     if not force:
         demand_stable(ready.problem, method, dt if tolerance is None else None, where=where)
@@ -118,17 +118,6 @@ def simulate(
     if as_json:
         print(json.dumps(results))
     return OK
-
-
-def _band(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
-    """Return the band from the uncertain inputs and how it was computed, or the reason why there is none."""
-    if not ready.values():
-        return None, "none: the scene states no uncertainties"
-    try:
-        band = spread(ready.solved, seconds, ready.measured)
-    except DynamicsError as error:
-        return None, f"none: {error}"
-    return band, f"{band.members} motions drawn from the uncertainties of {', '.join(band.quantities)}"
 
 
 def _tolerance(tolerance: float | None, band: Band | None, *, given: bool) -> str:

@@ -184,6 +184,11 @@ class Session:
         """The calibration of the first sensor."""
         return self.sensors[0].calibration
 
+    @property
+    def lost(self) -> bool:
+        """Whether every port is gone."""
+        return len(self._tee.gone) == len(self.sensors)
+
     def now_ns(self) -> int:
         """Return the time of the clock in ns."""
         return self._clock.now_ns()

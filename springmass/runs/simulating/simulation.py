@@ -12,8 +12,8 @@ import numpy as np
 
 from pipeline.bench.derived_drag import DerivedDrag, derive_drag, needs_drag
 from pipeline.bench.scene import Scene
-from pipeline.dynamics import Problem, Trajectory, get_integrator
-from pipeline.dynamics.band import Band, uncertain
+from pipeline.dynamics import Integrator, Problem, Trajectory, get_integrator
+from pipeline.dynamics.band import Band, spread, uncertain
 from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
 from pipeline.dynamics.solve_ivp import DOP853
 from pipeline.dynamics.strang import STRANG
@@ -124,7 +124,9 @@ def count_of(seconds: float, spacing_s: float) -> int:
     return count
 
 
-def solve(problem: Problem, method: str, spacing_s: float, count: int, tolerance: float | None) -> Solution:
+def solve(
+    problem: Problem, method: str | Integrator, spacing_s: float, count: int, tolerance: float | None
+) -> Solution:
     """Solve a motion with ``auto`` or with a named method; ``DynamicsError`` if that cannot keep the tolerance.
 
     Without a tolerance a method with a step takes the spacing as its step, and the others keep 1e-6.
@@ -132,12 +134,23 @@ def solve(problem: Problem, method: str, spacing_s: float, count: int, tolerance
     wanted = DEFAULT_TOLERANCE if tolerance is None else tolerance
     if method == "auto":
         return auto(problem, spacing_s, count, wanted, time.perf_counter)
-    integrator = get_integrator(method)
+    integrator = get_integrator(method) if isinstance(method, str) else method
     if tolerance is None and integrator.order:
         return solved_once(problem, integrator, spacing_s, count, time.perf_counter)
     if tolerance is not None:
         demand_tolerance(problem, spacing_s, count, tolerance)
     return halved(problem, integrator, spacing_s, count, wanted, time.perf_counter)
+
+
+def band_of(ready: Prepared, seconds: float) -> tuple[Band | None, str]:
+    """Return the band from the uncertain inputs and how it was computed, or the reason why there is none."""
+    if not ready.values():
+        return None, "none: the scene states no uncertainties"
+    try:
+        band = spread(ready.solved, seconds, ready.measured)
+    except DynamicsError as error:
+        return None, f"none: {error}"
+    return band, f"{band.members} motions drawn from the uncertainties of {', '.join(band.quantities)}"
 
 
 def default_tolerance(band: Band | None) -> float:

@@ -1,0 +1,205 @@
+"""Samples block by block, from a port, a recording or a simulated bench, through one interface."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, Self, Unpack
+
+import numpy as np
+
+from acquisition.block import Block, concatenate
+from acquisition.clock import Clock, SystemClock, VirtualClock
+from acquisition.decoders.registry import get_family
+from acquisition.live.serial_port import SerialPort
+from acquisition.replay import Replay
+from acquisition.source import SourceInfo
+from pipeline.bench.scene import Scene
+from springmass.errors import USAGE, ProgramError
+from springmass.runs.loading import Loaded, load
+from springmass.runs.options import ReadOptions
+from springmass.runs.outputs import made_now, save_run
+from springmass.runs.scenes import scene_from
+from springmass.runs.tracks import to_track
+from springmass.session.finding import name_sensors
+from springmass.session.output import demand_new
+from springmass.session.sensors import Sensor
+from springmass.session.session import Session
+from springmass.session.simulated_bench import bench_position
+from storage.recorder import Recorder
+from storage.recovery.recover import recover
+
+if TYPE_CHECKING:
+    from springmass.api.sources import AnyScene, Reading
+
+RATE_HZ, BLOCK = 100.0, 16
+SIGMA_M = 8e-5  # noise of a simulated rangefinder if its scene states none
+POLL_S = 0.05
+
+
+class Source(Protocol):
+    """What :func:`springmass.source` returns: a ``with`` block that iterates blocks of samples.
+
+    A block has ``t`` (s), ``distance`` (m, NaN if not measured) and ``flags``.
+    """
+
+    @property
+    def info(self) -> SourceInfo:
+        """Kind, name and rate of the source."""
+        ...
+
+    def record(self, path: str | os.PathLike[str]) -> None:
+        """Keep what is delivered from now on, losslessly, in a run file that is complete after the ``with`` block."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *error: object) -> None: ...
+
+    def __iter__(self) -> Iterator[Block]: ...
+
+
+def source(
+    what: str | os.PathLike[str] | Scene | Mapping[str, Any],
+    *,
+    speed: float = 1.0,
+    scene: AnyScene | None = None,
+    sensor: str | None = None,
+    baud: int | None = None,
+    **how: Unpack[Reading],
+) -> Source:
+    """Open a port, a recording or a simulated bench as a source of samples.
+
+    Parameters
+    ----------
+    what : path, port or Scene
+        A recording, run file or wire log, which is replayed; the port of a sensor, such as ``"/dev/ttyUSB0"``,
+        ``"COM3"`` or ``"socket://HOST:PORT"``; or a scene, whose bob swings over a simulated rangefinder without end.
+    speed : float
+        Seconds of a recording or of a simulation per second; ``math.inf`` never waits.
+    scene : Scene, path or mapping, optional
+        The scene to store with what is recorded.
+    sensor : str, optional
+        Family of the sensor on the port; default: the one that speaks.
+    baud : int, optional
+        Baud rate of the port.
+    **how
+        Options of reading a recording, as for :func:`springmass.load`.
+
+    Examples
+    --------
+    >>> from springmass import Stream, sample_data
+    >>> stream = Stream()
+    >>> with source(sample_data() / "undamped_simulated_position.txt", speed=math.inf) as bench:
+    ...     for block in bench:
+    ...         run = stream.push(block.t, block.distance)
+    >>> stream.finish()["T"]
+    0.758516(22) s
+    """
+    if isinstance(what, Scene | Mapping):
+        return _Played(_simulated(what if isinstance(what, Scene) else Scene.from_mapping(what)), speed)
+    if os.path.isfile(what):
+        stated = scene_from(scene)
+        loaded = load(Path(what), ReadOptions.of(how))
+        return _Played(loaded if stated is None else replace(loaded, scene=stated.to_mapping()), speed)
+    return _Live(os.fspath(what), sensor, baud, scene_from(scene))
+
+
+def _simulated(scene: Scene) -> Loaded:
+    """Return a recording without samples of a simulated bench, whose samples are made as they are wanted."""
+    sigma_m = SIGMA_M if scene.sensor_sigma_m is None else scene.sensor_sigma_m.value
+    info, nothing = SourceInfo("simulated", "scene", RATE_HZ, sigma_m), concatenate(())
+    track = to_track(nothing, info)
+    return Loaded(Path("scene"), "memory", info, "distance", "", nothing, track, scene=scene.to_mapping())
+
+
+def _swing(scene: Scene, sigma_m: float, clock: Clock, speed: float) -> Iterator[Block]:
+    """Yield the samples of a simulated rangefinder without end, each block when its last sample is due."""
+    position, rng, began_ns = bench_position(scene), np.random.default_rng(0), clock.now_ns()
+    for first in count(0, BLOCK):
+        t = np.arange(first, first + BLOCK) / RATE_HZ
+        distance = np.array([position(each) for each in t]) + sigma_m * rng.standard_normal(BLOCK)
+        if math.isfinite(speed):
+            clock.sleep_until_ns(began_ns + int(1e9 * t[-1] / speed))
+        yield Block(first, t, distance, np.zeros(BLOCK, np.uint8))
+
+
+class _Played:
+    """A recording or a simulated bench, at any speed."""
+
+    def __init__(self, loaded: Loaded, speed: float) -> None:
+        clock: Clock = SystemClock() if math.isfinite(speed) else VirtualClock()
+        self._loaded, self._path, self._kept = loaded, Path(), list[Block]()
+        if len(loaded.samples):
+            pace = speed if math.isfinite(speed) else None
+            replay = Replay(loaded.samples_in_blocks(), clock, info=loaded.info, speed=pace)
+            self.info, self._blocks = replay.info, iter(replay)
+        else:
+            self.info = loaded.info
+            scene = Scene.from_mapping(loaded.scene or {})
+            self._blocks = _swing(scene, loaded.info.sigma_m or 0.0, clock, speed)
+
+    def record(self, path: str | os.PathLike[str]) -> None:
+        demand_new(Path(path), 1)
+        self._path = Path(path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._path != Path():
+            save_run(self._path, replace(self._loaded, info=self.info), blocks=self._kept)
+
+    def __iter__(self) -> Iterator[Block]:
+        for block in self._blocks:
+            if self._path != Path():
+                self._kept.append(block)
+            yield block
+
+
+class _Live:
+    """A sensor on a port."""
+
+    def __init__(self, address: str, sensor: str | None, baud: int | None, scene: Scene | None) -> None:
+        named = name_sensors((address,), () if sensor is None else (sensor,), baud)
+        family = get_family(named.sensors[0])
+        baud = named.baud or family.baud
+        self._port = SerialPort(address, baud)
+        tables = None if scene is None else scene.to_mapping()
+        self._session = Session([Sensor(family, self._port, baud=baud)], SystemClock(), scene=tables)
+        self._recorder: Recorder | None = None
+        self._path = Path()
+
+    @property
+    def info(self) -> SourceInfo:
+        sensor = self._session.sensors[0]
+        return sensor.chain().info(sensor.port.name)
+
+    def record(self, path: str | os.PathLike[str]) -> None:
+        demand_new(Path(path), 1)
+        self._path = Path(path)
+        self._recorder = self._session.preview(self._path.with_suffix(".wire"))
+        if self._recorder is None:
+            why = "; ".join(self._session.failures.describe())
+            raise ProgramError(f"{path}: the recording cannot begin ({why}); choose another folder", USAGE)
+
+    def __enter__(self) -> Self:
+        self._session.listen()
+        self._session.meet()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._session.stop()
+        self._port.close()
+        if self._recorder is not None:
+            self._recorder.close()
+            recover(self._recorder.contents(), self._path, remove_log=True, provenance=made_now())
+
+    def __iter__(self) -> Iterator[Block]:
+        while not self._session.lost:
+            for _, block in self._session.poll(POLL_S):
+                yield block
