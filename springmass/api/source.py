@@ -24,12 +24,12 @@ from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import made_now, save_run
 from springmass.runs.scenes import scene_from
+from springmass.runs.simulating.bench import bench_position
 from springmass.runs.tracks import to_track
 from springmass.session.finding import name_sensors
 from springmass.session.output import demand_new
 from springmass.session.sensors import Sensor
 from springmass.session.session import Session
-from springmass.session.simulated_bench import bench_position
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
 
@@ -189,7 +189,6 @@ class _Live:
 
     def __enter__(self) -> Self:
         self._session.listen()
-        self._session.meet()
         return self
 
     def __exit__(self, *error: object) -> None:

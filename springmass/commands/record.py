@@ -30,12 +30,12 @@ from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, Progra
 from springmass.page.process import PageProcess
 from springmass.runs.outputs import made_now
 from springmass.runs.scenes import ask_about, read_scene
+from springmass.runs.simulating.bench import EXAMPLE, REST_M, Release, bench_position
 from springmass.session.finding import name_sensors
 from springmass.session.operator import Closed, Operator
 from springmass.session.output import default_name, demand_new
 from springmass.session.sensors import Sensor
 from springmass.session.session import BYTES_PER_READ, Ended, RunLimits, RunListeners, Session
-from springmass.session.simulated_bench import EXAMPLE, REST_M, Release, bench_position
 from springmass.session.trigger import Disarmed, Trigger
 from springmass.stops import STOPS, EndReason
 from springmass.terminal.console import Console
@@ -276,8 +276,6 @@ class _Bench:
     def record(self) -> Ended:
         """Run the session, with a page from before its beginning to its end."""
         self.session.listen(self.console.line)
-        for line in self.session.meet():
-            self.console.line(line)
         operator = None if self.page is None else Operator(self.session, self.page, self.log)
         try:
             if operator is not None:
@@ -351,7 +349,7 @@ class _Bench:
             self._ask(f"bring the target to {known:g} m by the ruler, then press Enter")
             points.append(self._still(seconds, "keep it still"))
         self.session.calibrate(points, ruler, U_RULER_M)
-        found = self.session.calibration
+        found = self.session.sensors[0].calibration
         scale = format_value(found.scale, found.u_scale)
         self.console.line(f"scale {scale}, offset {format_value(found.offset_m, found.u_offset_m, 'm')}")
         self._ask("hang the bob over the sensor, then press Enter")

@@ -21,8 +21,8 @@ from pipeline.dynamics.band import LEVELS, Band
 from pipeline.track import F8
 from springmass.runs.outputs import in_a_name, made_now, make_folder
 from springmass.runs.simulating.against import Against
+from springmass.runs.simulating.bench import REST_M
 from springmass.runs.simulating.simulation import FINE, Prepared, Simulation, count_of, solve
-from springmass.session.simulated_bench import REST_M
 
 if TYPE_CHECKING:
     from springmass.charts.draw import Kind

@@ -58,7 +58,6 @@ class Progress:
     """The state of a recording for one line of progress."""
 
     seconds: float
-    samples: int
     missing: int  # of all sensors, as are the gaps
     gaps: int
     rate_hz: float  # samples from the first sensor in the last second
@@ -123,7 +122,7 @@ class LiveState:
     """The state derived from the samples so far; ``origin`` is the host time at the run's t = 0."""
 
     def __init__(self, rate_hz: float) -> None:
-        self.samples = self.missing = 0
+        self.missing = 0
         self._rate_hz = rate_hz
         self._has_room = False
         self.useful: dict[int, Usefulness] = {}
@@ -149,7 +148,6 @@ class LiveState:
     def push(self, blocks: Iterable[tuple[int, Block]]) -> None:
         """Take blocks of samples by channel."""
         for channel, block in blocks:
-            self.samples += len(block)
             missing = int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
             self.missing += missing
             self.useful.setdefault(channel, Usefulness()).push(block)
@@ -223,7 +221,6 @@ def progress_of(
     zero_ns = start_ns if shown.origin.ns is None else shown.origin.ns
     return Progress(
         seconds=(now_ns - start_ns) * 1e-9,
-        samples=shown.samples,
         missing=shown.missing,
         gaps=sum(len(chain.timebase.gaps) + int(chain.timebase.gaps_left_out["count"]) for chain in chains),
         rate_hz=shown.rate_hz(now_ns),

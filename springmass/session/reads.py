@@ -198,15 +198,10 @@ class Tee:
         with self._lock:
             return bytes(self._heard[port])
 
-    def keep(self) -> None:
-        """Keep all reads from now on, because a run may include data from before its trigger."""
+    def keep(self, wanted: bool) -> None:
+        """Keep all reads from now on, because a run may include data from before its trigger; or keep none."""
         with self._lock:
-            self._kept = deque()
-
-    def let_go(self) -> None:
-        """Stop keeping reads, and discard those kept."""
-        with self._lock:
-            self._kept = None
+            self._kept = deque() if wanted else None
 
     def forget(self, before_ns: int) -> None:
         """Discard kept reads that are older than a given time."""

@@ -35,7 +35,6 @@ class Sensor:
     calibration: Calibration = field(default_factory=Calibration)
     baud: int = 0
     clock_ppm: float | None = None
-    identity: Identity | None = None
 
     def chain(self) -> SensorChain:
         """Return a new chain."""

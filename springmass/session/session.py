@@ -21,7 +21,7 @@ import numpy as np
 
 from acquisition.block import Block
 from acquisition.clock import Clock
-from acquisition.live.calibration import Calibration, StillPoint, against_ruler, from_still
+from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortReader
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
@@ -104,15 +104,15 @@ class Session:
         self._marks: list[tuple[int, str]] = []
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
-        """Start reading, and wait until every sensor has been heard; ``say`` gets a line if that takes long.
+        """Start reading, and wait until every sensor has been heard; ``say`` gets lines about silence and identities.
 
         A sensor that is not heard after 3 s, or after five periods of a slow sensor, raises a ProgramError that
         describes what was received instead.
         """
         lines = [sensor.line(port) for port, sensor in enumerate(self.sensors)]
-        for line in lines:
-            if line.greeting:
-                line.port.write(line.greeting)
+        for each in lines:
+            if each.greeting:
+                each.port.write(each.greeting)
         self._reader = PortReader(lines, self._tee, self._clock)
         self._reader.start()
         # A slow sensor can be distinguished from silence only after several of its periods.
@@ -132,6 +132,11 @@ class Session:
         for channel, chain in enumerate(self._chains):
             if getattr(chain.decoder, "counts", False):
                 self._end_unheard(channel)
+            if (identity := chain.status.identity) is not None:
+                sensor = self.sensors[channel]
+                for line in meeting(sensor, identity):
+                    say(line)
+                self.sensors[channel] = replace(sensor, rate_hz=sensor.rate_hz or identity.settings.get("rate_hz"))
 
     def _waits_for_word(self) -> bool:
         """Return whether a sensor has not been heard yet, or may still report its identity."""
@@ -145,18 +150,6 @@ class Session:
         if channel in self._tee.gone:
             raise ProgramError(f"{self._tee.gone[channel]}; is a sensor connected, and is this its port?", SENSOR)
         raise ProgramError(self.sensors[channel].not_heard(self._tee.heard(channel)), SENSOR)
-
-    def meet(self) -> list[str]:
-        """Store the identities and rates that sensors reported, and return lines about them."""
-        messages: list[str] = []
-        for channel, sensor in enumerate(self.sensors):
-            identity = self._chains[channel].status.identity
-            if identity is None or sensor.identity is not None:
-                continue
-            messages += meeting(sensor, identity)
-            rate_hz = sensor.rate_hz or identity.settings.get("rate_hz")
-            self.sensors[channel] = replace(sensor, identity=identity, rate_hz=rate_hz)
-        return messages
 
     def still(self, seconds: float = 3.0) -> StillPoint:
         """Return rest position and noise from the first sensor's next seconds, during which the bob must hang still."""
@@ -178,11 +171,6 @@ class Session:
         self._chains[0].calibration = calibration
         self.poll(0.0)  # discard samples decoded with the earlier calibration
         return calibration.restated(points[-1], before)
-
-    @property
-    def calibration(self) -> Calibration:
-        """The calibration of the first sensor."""
-        return self.sensors[0].calibration
 
     @property
     def lost(self) -> bool:
@@ -304,7 +292,7 @@ class Session:
         """Wait until the bob moves, and return the host time of the first sample that shows the motion."""
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
-        self._tee.keep()
+        self._tee.keep(True)
         display, tick_ns = self._display(listeners.progress), start_ns + SECOND_NS
         seen: deque[tuple[int, Block]] = deque(maxlen=HELD_BLOCKS)
         try:
@@ -315,7 +303,7 @@ class Session:
                     if moment_ns is not None:
                         return moment_ns
                 if listeners.changed():
-                    self._tee.let_go()
+                    self._tee.keep(False)
                     raise Disarmed
                 # One second more than needed, because samples may wait for a moment before they are examined.
                 self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)

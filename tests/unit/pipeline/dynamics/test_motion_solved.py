@@ -13,7 +13,7 @@ from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator
 from pipeline.dynamics.terms import required
 from pipeline.errors import SceneError
-from springmass.session.simulated_bench import REST_M, bench_position
+from springmass.runs.simulating.bench import REST_M, bench_position
 
 BENCH = {
     "bob": {"mass_kg": 0.2176},

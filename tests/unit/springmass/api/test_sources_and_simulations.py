@@ -15,7 +15,7 @@ from acquisition.decoders.registry import get_family
 from acquisition.simulated.pseudo_terminal import VirtualPort
 from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from springmass.cli import main
-from springmass.session.simulated_bench import bench_position
+from springmass.runs.simulating.bench import bench_position
 
 DATA = sm.sample_data()
 BENCH = {

@@ -144,7 +144,7 @@ def test_a_run_begins_with_the_reads_kept_from_before() -> None:
     """From the moment asked for on, each once, whether or not it was decoded before; breaks are no bytes."""
     tee = Tee([chain()])
     tee.reads([(0, 0, frame(0))])
-    tee.keep()
+    tee.keep(True)
     for i in range(1, 20):
         tee.reads([(0, i * STEP_NS, frame(i))])
         if i == 10:

@@ -12,6 +12,7 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory
 from pipeline.dynamics.problem import Problem
 from pipeline.dynamics.strang import STRANG
+from springmass.runs.simulating.simulation import prepare
 
 REST_M = 0.25  # height of the bob's rest position above the sensor, m
 STEPS_A_RADIAN = 24  # steps per radian; interpolation between them has an error of 1e-8 of the amplitude
@@ -59,8 +60,6 @@ def bench_position(
     >>> f"{bench_position(scene)(0.1 * np.pi):.6f}"
     '0.200000'
     """
-    from springmass.runs.simulating.simulation import prepare
-
     problem = prepare(scene, seconds, where=where).problem
     step_s = 1.0 / (STEPS_A_RADIAN * problem.equation.angular_frequency_per_s)
     solved: list[Trajectory] = []
