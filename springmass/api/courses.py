@@ -9,8 +9,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from failure import Error
+from pipeline.registry.quantities import QUANTITIES
 from springmass.api.sources import Analysing, analyse
-from springmass.course.rows import NUMBERS, UNITS, WHOLE, columns_of, read_rows
+from springmass.course.rows import NUMBERS, WHOLE, columns_of, read_rows
 from springmass.course.worker import row_of
 
 if TYPE_CHECKING:
@@ -18,6 +19,20 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from springmass.api.sources import AnyScene, AnySource
+
+UNITS = {
+    **{name: x.unit for name, x in QUANTITIES.items() if isinstance(x.unit, str) and x.unit and name != "velocity_rms"},
+    "rate_hz": "Hz",
+    "duration_s": "s",
+    "natural_angular_frequency": "rad/s",
+    "own_mass_kg": "kg",
+    "bob_mass_kg": "kg",
+    "spring_mass_kg": "kg",
+    "disc_diameter_m": "m",
+    "air_temperature_c": "degC",
+    "air_pressure_pa": "Pa",
+}
+"""Units of columns whose unit is the same in every run; for the others it follows from the column ``unit``."""
 
 
 def batch(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -33,6 +34,9 @@ from springmass.runs.outputs import distinct_names, make_folder, now_utc
 from springmass.runs.run import Run
 from springmass.runs.scenes import read_scenes
 from springmass.values import Share
+
+if TYPE_CHECKING:
+    from springmass.course.benches import CourseComparison
 
 
 @Parameter(name="*")
@@ -100,7 +104,7 @@ def compare(
 
 
 def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
-    from springmass.course.benches import compare_rows, compared_text
+    from springmass.course.benches import compare_rows
     from springmass.terminal.printing import visible_lines
 
     if options.output is not None or options.scene:
@@ -110,7 +114,7 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     print(
         json.dumps({"schema": SCHEMA, **plain(found)}, allow_nan=False)
         if options.json
-        else visible_lines(compared_text(found))
+        else visible_lines(_course_text(found))
     )
     wrong = {one.name for one in found.suspects}.union(*(one.names for one in found.disagreements))
     if options.strict and wrong:
@@ -133,3 +137,31 @@ def _print_text(compared: Compared, runs: list[Run]) -> None:
         if grave:
             print(f"\n{visible(run.name)}:")
             print(findings_text(grave))
+
+
+def _course_text(comparison: CourseComparison) -> str:
+    from pipeline.numerics.estimate import format_value
+
+    lines = [f"{comparison.runs} runs; benches distinguished by {comparison.bench}", ""]
+    for group in comparison.agreements:
+        of = f" of {group.group}" if group.group else ""
+        if group.mean is None:
+            lines.append(f"{group.quantity}{of}: no mean; {group.why}")
+            continue
+        lines.append(f"{group.quantity}{of}: {format_value(group.mean.value, group.mean.u, group.mean.unit)}")
+        within = "one run a bench" if math.isnan(group.within) else f"{group.within:.2g} within a bench"
+        benches = f"{group.between:.2g} between {group.benches} benches"
+        between = "one bench" if math.isnan(group.between) else benches
+        runs = f"{group.runs} run{'s' if group.runs > 1 else ''}"
+        lines.append(f"  {runs}; scatter {within} (stated {group.stated:.2g}), {between}")
+    if any(group.quantity == "drag_coefficient" for group in comparison.agreements):
+        lines.append("a drag coefficient counts all damping as drag of the disc, that of spring and hook too")
+    laws = ", ".join(f"{law} {count}" for law, count in comparison.laws.items())
+    lines += ["", f"damping laws selected: {laws}"] if laws else []
+    differing = comparison.suspects
+    lines += ["", f"runs that differ from their course: {len(differing)}"] if differing else []
+    lines += [f"  {suspect.name}: {suspect.message}" for suspect in differing]
+    apart = comparison.disagreements
+    lines += ["", f"benches whose runs disagree: {len(apart)}"] if apart else []
+    lines += [f"  {one.bench or ', '.join(one.names)}: {one.message}" for one in apart]
+    return "\n".join(lines)

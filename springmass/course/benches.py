@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.bench.scene import Scene
-from pipeline.numerics.estimate import Estimate, format_value
+from pipeline.numerics.estimate import Estimate
 from pipeline.results.compare import SpringRun
 from pipeline.results.course import Agreement, CourseRun, Disagreement, Suspect, agreement, judged
 from springmass.course.rows import COURSE
@@ -119,30 +119,3 @@ def _label(row: Mapping[str, Any], tag: str, scene: str) -> str:
 def _estimate(row: Mapping[str, Any], name: str) -> Estimate | None:
     value, u = row.get(name), row.get(f"{name}_u")
     return None if value is None or u is None else Estimate(value, u)
-
-
-def compared_text(comparison: CourseComparison) -> str:
-    """Return a comparison as lines of text."""
-    lines = [f"{comparison.runs} runs; benches distinguished by {comparison.bench}", ""]
-    for group in comparison.agreements:
-        of = f" of {group.group}" if group.group else ""
-        if group.mean is None:
-            lines.append(f"{group.quantity}{of}: no mean; {group.why}")
-            continue
-        lines.append(f"{group.quantity}{of}: {format_value(group.mean.value, group.mean.u, group.mean.unit)}")
-        within = "one run a bench" if math.isnan(group.within) else f"{group.within:.2g} within a bench"
-        benches = f"{group.between:.2g} between {group.benches} benches"
-        between = "one bench" if math.isnan(group.between) else benches
-        runs = f"{group.runs} run{'s' if group.runs > 1 else ''}"
-        lines.append(f"  {runs}; scatter {within} (stated {group.stated:.2g}), {between}")
-    if any(group.quantity == "drag_coefficient" for group in comparison.agreements):
-        lines.append("a drag coefficient counts all damping as drag of the disc, that of spring and hook too")
-    laws = ", ".join(f"{law} {count}" for law, count in comparison.laws.items())
-    lines += ["", f"damping laws selected: {laws}"] if laws else []
-    differing = comparison.suspects
-    lines += ["", f"runs that differ from their course: {len(differing)}"] if differing else []
-    lines += [f"  {suspect.name}: {suspect.message}" for suspect in differing]
-    apart = comparison.disagreements
-    lines += ["", f"benches whose runs disagree: {len(apart)}"] if apart else []
-    lines += [f"  {one.bench or ', '.join(one.names)}: {one.message}" for one in apart]
-    return "\n".join(lines)

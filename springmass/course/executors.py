@@ -8,7 +8,6 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from multiprocessing import active_children
 from typing import Any, TypeVar
 
 from springmass.errors import SOME_FAILED, USAGE, ProgramError
@@ -53,20 +52,7 @@ def workers(tasks: int, processes: int | None = None, dask: str | None = None) -
     elif number <= 1 or tasks <= FEW:
         yield Workers(_ThisProcess, 1)
     else:
-        yield Workers(lambda: _pool(number), AHEAD * number)
-
-
-@contextlib.contextmanager
-def _pool(processes: int) -> Iterator[Executor]:
-    """Yield a pool whose processes are terminated on an error or Ctrl-C, because a run may take minutes."""
-    others = set(active_children())
-    with pool(processes) as executor:
-        try:
-            yield executor
-        except BaseException:
-            for process in set(active_children()) - others:
-                process.terminate()
-            raise
+        yield Workers(lambda: pool(number), AHEAD * number)
 
 
 @contextlib.contextmanager

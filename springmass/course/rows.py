@@ -27,19 +27,6 @@ NUMBERS = (
     "rate_hz", "duration_s", "u_clock", "reduced_chi2",
     *(name for pair in ((x, f"{x}_u") for x in (*ESTIMATES, *PLACES)) for name in pair),
 )  # fmt: skip
-UNITS = {
-    **{name: x.unit for name, x in QUANTITIES.items() if isinstance(x.unit, str) and x.unit and name != "velocity_rms"},
-    "rate_hz": "Hz",
-    "duration_s": "s",
-    "natural_angular_frequency": "rad/s",
-    "own_mass_kg": "kg",
-    "bob_mass_kg": "kg",
-    "spring_mass_kg": "kg",
-    "disc_diameter_m": "m",
-    "air_temperature_c": "degC",
-    "air_pressure_pa": "Pa",
-}
-"""Units of columns whose unit is the same in every run; for the others it follows from the column ``unit``."""
 DETAILS = ("findings", "messages", "correlations", "drag_points")
 """Columns that contain JSON."""
 _FIRST = ("run", "path", "status", "error")

@@ -6,7 +6,7 @@ import hashlib
 import heapq
 import re
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -102,9 +102,11 @@ def _write_pages(
     if sum(row["status"] == "ok" for row in table) > 1:
         mark(lines, compare_rows(table))
     write_groups(folder, lines, course.tags)
+    for line, job in zip(lines, course.jobs, strict=True):
+        line["link"] = _report_of(line, job)
     drawn = [(line, job) for line, job in zip(lines, course.jobs, strict=True) if line["need"][0] < 2]
     worst = heapq.nlargest(reports, drawn, key=lambda pair: (pair[0]["need"], pair[0]["name"]))
-    named = [(line["name"], job, folder / report_of(line["name"])) for line, job in worst]
+    named = [(line["name"], job, folder / line["link"]) for line, job in worst]
     tasks = [(name, job, page.parent) for name, job, page in named if not page.exists()]
     unwritten: list[str] = []
     finished = 0
@@ -114,14 +116,12 @@ def _write_pages(
             finished += len(written)
             reported(finished, len(tasks))
     for line in lines:
-        line["link"] = link if (folder / (link := report_of(line["name"]))).exists() else ""
+        line["link"] = line["link"] if (folder / line["link"]).exists() else ""
     write_page(folder, table, lines, course.tags)
     return sorted(unwritten)
 
 
-def report_of(run: str) -> str:
-    """Return the path of a run's report in the folder, with a digest if the name is long or has unsafe characters."""
-    safe = re.sub(r"[^A-Za-z0-9.+_-]+", "_", run).strip("._")
-    if safe != run or len(safe) > 100:
-        safe = f"{safe[:100]}-{hashlib.sha256(run.encode('utf-8', 'backslashreplace')).hexdigest()[:8]}"
-    return f"{REPORTS}/{safe}.results/report.html"
+def _report_of(line: Mapping[str, Any], job: Job) -> str:
+    """Return the path of a run's report in the folder; names are numbered anew if a run is removed, keys are not."""
+    safe = re.sub(r"[^A-Za-z0-9.+_-]+", "_", line["name"]).strip("._")[:100]
+    return f"{REPORTS}/{safe}-{hashlib.sha256(job.key.encode()).hexdigest()[:8]}.results/report.html"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 
 from springmass.errors import adopt, manner
 
@@ -16,10 +18,21 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def pool(processes: int) -> ProcessPoolExecutor:
-    """Return a pool of new processes that share this one's output settings, leave Ctrl-C to it and end with it."""
+@contextlib.contextmanager
+def pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of new processes that share this one's output settings, leave Ctrl-C to it and end with it.
+
+    After an error or Ctrl-C they are terminated, because a task may take minutes.
+    """
+    others = set(active_children())
     # New processes are spawned, because a fork of a process with linear-algebra threads may hang.
-    return ProcessPoolExecutor(processes, get_context("spawn"), _begin, manner())
+    with ProcessPoolExecutor(processes, get_context("spawn"), _begin, manner()) as executor:
+        try:
+            yield executor
+        except BaseException:
+            for process in set(active_children()) - others:
+                process.terminate()
+            raise
 
 
 def _begin(quiet: bool, verbose: bool) -> None:
