@@ -44,6 +44,7 @@ _QUANTITIES: dict[tuple[str, str], _Quantity] = {
     ("spring", "mass_kg"): _Quantity("spring_mass_kg", "kg", 0.0, 1e6),
     ("spring", "constant_n_per_m"): _Quantity("spring_constant_n_per_m", "N/m", 1e-12, 1e12),
     ("spring", "cubic_n_per_m3"): _Quantity("spring_cubic_n_per_m3", "N/m3", -1e18, 1e18),
+    ("pendulum", "length_m"): _Quantity("pendulum_length_m", "m", 1e-4, 1e4),
     ("disc", "diameter_m"): _Quantity("disc_diameter_m", "m", 1e-6, 1e3),
     ("air", "temperature_c"): _Quantity("air_temperature_c", "degC", -100.0, 200.0),
     ("air", "pressure_pa"): _Quantity("air_pressure_pa", "Pa", 1e-3, 1e7),
@@ -76,6 +77,7 @@ class Scene:
     spring_mass_kg: Estimate | None = None
     spring_constant_n_per_m: Estimate | None = None
     spring_cubic_n_per_m3: Estimate | None = None
+    pendulum_length_m: Estimate | None = None
     disc_diameter_m: Estimate | None = None
     air_temperature_c: Estimate | None = None
     air_pressure_pa: Estimate | None = None

@@ -21,6 +21,7 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...]) -> Iterator[Found]
     used = {
         "[bob] mass_kg": scene.bob_mass_kg,
         "[spring] mass_kg": scene.spring_mass_kg if springs else None,
+        "[pendulum] length_m": scene.pendulum_length_m,
         "[disc] diameter_m": scene.disc_diameter_m,
     }
     exact = [name for name, estimate in used.items() if estimate is not None and estimate.u == 0]

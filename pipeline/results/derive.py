@@ -184,6 +184,7 @@ def derive(
     - spring constant: :math:`k = (\\omega^2 + \\overline{\\lambda^2}) m_s/x^2` with
       :math:`x \\tan x = m_s/(m + m_a)`;
     - amplitude and quadratic drag: :math:`A_0 = s a_0` and :math:`\\beta = r b/s`;
+    - gravity of a pendulum of the length l: :math:`g = l\\omega_0^2`, at the frequency of very small swings;
     - quality factor: :math:`Q = \\omega_0/2\\lambda` with :math:`\\lambda = -\\dot A/A` at the start and
       :math:`\\omega_0^2 = \\omega^2 + \\overline{\\lambda^2}`. It is exact for linear drag. For other laws it is
       :math:`2\\pi` times the energy over the loss in a period, at the start and to first order in the damping;
@@ -278,6 +279,7 @@ _FORMULAS = (
         lambda omega, lengths, root_mean_square, per_value: omega * lengths * root_mean_square * per_value,
         {"rad": "rad/s", "rad/s": "rad/s"},
     ),
+    _Formula("gravity", lambda omega_rest, length: length * omega_rest**2),
     _Formula("quality_factor", lambda natural, decay: 0.5 * natural**0.5 / decay),
     _Formula("displacement", lambda displacement: displacement, {"m": "", "m/s": "s", "m/s^2": "s^2"}),
     _Formula(
@@ -340,6 +342,7 @@ def _terms(
     rates = rate * amiss.over("damping_rate", laws.values[1])
     start = laws.start * lengths * _crest(phase, laws, unit, inputs)
     small = _small_swings(phase, laws, demodulated)
+    slow = None if small is None else inputs.add("small_swings", small, "A", free) * rate
     lam = laws.rate_at_start * rates
     squared_rate = laws.squared_rate if phase.squared_rate is None else phase.squared_rate
     natural = omega**2 + squared_rate * rate**2
@@ -349,6 +352,11 @@ def _terms(
     offset = inputs.add("rest_position", rest.mean, "A", free) * scale
     noise = inputs.add("noise", _noise(demodulated, unit), "A", demodulated.residual.size - 3.0 * windows)
     coefficients = _coefficients(laws, rates, lengths, lam, start)
+    length, per_angle = scene.pendulum_length_m, {"rad": 1.0, "rad/s": natural**-0.5}.get(unit)
+    rest_rate = slow
+    if slow is None and per_angle is not None:
+        # The recording shows no change with the amplitude: that of a pendulum, A^2/16, is below its u.
+        rest_rate = omega * (1.0 + (laws.root_mean_square * per_angle) ** 2 / 8.0)
     diameter: Any = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
@@ -364,7 +372,9 @@ def _terms(
     quadratic = damping.settled and damping.best.drag_term("beta") is not None
     terms = {
         "omega": omega,
-        "omega_small": None if small is None else inputs.add("small_swings", small, "A", free) * rate,
+        "omega_small": slow,
+        "omega_rest": rest_rate,
+        "length": None if length is None or per_angle is None else inputs.add("pendulum_length", length, "B"),
         "natural": natural,
         "rate": rate,
         "scale": scale,
@@ -379,7 +389,7 @@ def _terms(
         "decay": lam if laws.values[1] > 0 else None,
         "root_mean_square": laws.root_mean_square,
         "displacement": displacement,
-        "per_value": {"rad": 1.0, "rad/s": natural**-0.5}.get(unit, displacement),
+        "per_value": displacement if per_angle is None else per_angle,
         "length_order": length_order,
         "angle_order": angle_order,
         # For a length, the amplitude itself is used, so that it is not stated twice.

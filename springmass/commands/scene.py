@@ -21,6 +21,9 @@ mass_kg = { value = 0.2000, u = 0.0001 }    # all that hangs on the spring, disc
 mass_kg = { value = 0.0100, u = 0.0005 }    # a third of it swings along
 # constant_n_per_m = 14.0                   # for springmass simulate; an analysis measures it
 
+# [pendulum]
+# length_m = { value = 1.000, u = 0.001 }   # from the pivot to the middle of the bob: its angle gives g
+
 # [disc]
 # diameter_m = { value = 0.102, u = 0.0005 }
 

@@ -15,6 +15,7 @@ from springmass.typeset import pretty
 _ON_THE_BENCH = (
     ("bob", "bob_mass_kg"),
     ("spring", "spring_mass_kg"),
+    ("pendulum", "pendulum_length_m"),
     ("disc", "disc_diameter_m"),
     ("air", "air_temperature_c"),
     ("pressure", "air_pressure_pa"),

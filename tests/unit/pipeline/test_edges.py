@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.analyse import analyse
 from pipeline.analysis import Analysis, Oscillation
+from pipeline.bench.scene import Scene
 from pipeline.track import Quality, Track
 from tests.sampling import sampled
 
@@ -127,10 +128,28 @@ def test_a_wide_pendulum(degrees: int, quadratic: float) -> None:
     angle = solve_ivp(moves, (0.0, 120.0), [start, 0.0], t_eval=t, rtol=1e-10, atol=1e-12).y[0]
     angle += math.radians(0.1) * np.random.default_rng(degrees).standard_normal(t.size)
     step = math.radians(0.25)
-    analysis = analyse(Track.from_arrays(t, step * np.round(angle / step), unit="rad", quantity="angle"))
+    scene = Scene(pendulum_length_m=(9.81 / square, 1e-6))
+    analysis = analyse(Track.from_arrays(t, step * np.round(angle / step), unit="rad", quantity="angle"), scene)
     assert not codes(analysis) & {"touched", "phase_jump", "restarted", "handled"}
     assert degrees > 75 or "rest_drift" not in codes(analysis)
     amplitude, small = analysis.estimates["amplitude"], analysis.estimates["period_small_swings"]
     assert amplitude.value == pytest.approx(start, rel=0.01)
     assert abs(amplitude.value - start) < 4.0 * amplitude.u
     assert abs(small.value - 1.2) < 4.0 * small.u
+    gravity = analysis.estimates["gravity"]
+    assert gravity.value == pytest.approx(9.81, rel=0.01)
+    assert abs(gravity.value - 9.81) < 4.0 * gravity.u
+
+
+@pytest.mark.parametrize("degrees", [2, 5, 8])
+def test_the_amplitude_of_a_small_pendulum_is_corrected_for(degrees: int) -> None:
+    """T = 4 sqrt(l/g) K(sin A/2), whose change from the amplitude is below u of a short recording, gives g."""
+    from scipy.special import ellipk
+
+    t, start = np.arange(1000) / 50, math.radians(degrees)
+    period = 4.0 * math.sqrt(1.0 / 9.81) * float(ellipk(math.sin(0.5 * start) ** 2))
+    angle = start * np.cos(2.0 * math.pi * t / period) + 1e-4 * np.random.default_rng(degrees).standard_normal(t.size)
+    analysis = analyse(Track.from_arrays(t, angle, unit="rad", quantity="angle"), Scene(pendulum_length_m=(1.0, 1e-6)))
+    gravity = analysis.estimates["gravity"]
+    assert abs(gravity.value - 9.81) < 3.0 * gravity.u
+    assert gravity.u < 2e-3
