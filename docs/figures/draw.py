@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.dynamics import Equation, Integrator, Problem, get_integrator
 from pipeline.errors import DynamicsError
-from springmass import analyse, load, read_scene, sample_data
+from springmass import analyse, sample_data
 from springmass.charts.draw import legend, render, style, written
 from springmass.charts.run import amplitude
 
@@ -24,10 +24,10 @@ HERE = Path(__file__).resolve().parent
 def main(folder: Path = HERE) -> list[Path]:
     """Draw every figure into a folder and return the files."""
     data = sample_data()
-    loaded = load(data / "damped_simulated_position.txt", velocity=data / "damped_simulated_velocity.txt")
-    analysis = analyse(loaded.track, read_scene(data / "damped.scene.toml"))
+    velocity = data / "damped_simulated_velocity.txt"
+    run = analyse(data / "damped_simulated_position.txt", data / "damped.scene.toml", velocity=velocity)
     target = folder / "amplitude.svg"
-    chart = amplitude(analysis)
+    chart = amplitude(run.analysis)
     assert chart is not None
     target.write_bytes(render(chart, ("svg",))["svg"])
     stability = folder / "stability.svg"

@@ -76,7 +76,7 @@ def take_report(page: Page, folder: Path) -> None:
     command = springmass("-q", "analyse", run, "--scene", scene, "-o", folder)
     subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
     page.set_viewport_size({"width": 1280, "height": 900})
-    page.goto((folder / "damped_simulated_position.results" / "report.html").as_uri())
+    page.goto((folder / "damped_simulated_position.txt.results" / "report.html").as_uri())
     page.screenshot(path=HERE / "report.png")
 
 

@@ -1,0 +1,82 @@
+"""Errors have one root and say what to do; messages go to ``logging``."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import springmass as sm
+
+T = np.arange(1000) / 100
+RUN = (T, 0.2 + 0.05 * np.cos(8.3 * T))
+WRONG: dict[str, Callable[[Path], Any]] = {
+    "a file that is not there": lambda folder: sm.load(folder / "nothing.txt"),
+    "a unit that nobody stated": lambda folder: sm.load(folder / "plain.csv"),
+    "a damaged run file": lambda folder: sm.load(folder / "damaged.h5"),
+    "a file that exists": lambda folder: sm.load(RUN).save(folder / "plain.csv"),
+    "a folder without a course": sm.results,
+    "an unknown key of a scene": lambda _: sm.analyse(RUN, {"bob": {"mass_g": 200}}),
+    "a scene that is not there": lambda folder: sm.analyse(RUN, folder / "nothing.toml"),
+    "too few samples": lambda _: sm.analyse((T[:3], T[:3])),
+    "times that run backwards": lambda _: sm.analyse((T[::-1], RUN[1])),
+    "no array": lambda _: sm.analyse(3),  # type: ignore[arg-type]
+    "a range without samples": lambda _: sm.analyse(RUN, from_s=99.0),
+    "an unknown law": lambda _: sm.analyse(RUN, law="cubic"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_every_error_has_one_root_and_a_remedy(name: str, tmp_path: Path) -> None:
+    """One line, whose remedy stands in it."""
+    (tmp_path / "plain.csv").write_text("time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True)))
+    content = bytearray(sm.load(RUN).save(tmp_path / "damaged.h5").read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    (tmp_path / "damaged.h5").write_bytes(content)
+    with pytest.raises(sm.Error) as caught:
+        WRONG[name](tmp_path)
+    assert isinstance(caught.value, ValueError)
+    assert caught.value.remedy
+    assert str(caught.value).endswith(caught.value.remedy)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_question_is_answered_by_its_remedy(tmp_path: Path) -> None:
+    """It is the call to make."""
+    path = tmp_path / "plain.csv"
+    path.write_text("time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True)))
+    with pytest.raises(sm.Error) as caught:
+        sm.analyse(path)
+    run = eval(caught.value.remedy, {"springmass": sm})
+    assert run["T"].value == pytest.approx(2.0 * np.pi / 8.3, rel=1e-4)
+
+
+def test_the_remedy_for_times_that_run_backwards_helps() -> None:
+    """In the order of their times, the samples are analysed."""
+    order = np.argsort(T[::-1])
+    run = sm.analyse((T[::-1][order], RUN[1][::-1][order]))
+    assert run["T"].value == pytest.approx(2.0 * np.pi / 8.3, rel=1e-4)
+
+
+def test_an_unknown_option_names_the_known_ones() -> None:
+    """Among them the one that was mistyped."""
+    with pytest.raises(TypeError, match=r"'lwa'.*\blaw\b"):
+        sm.analyse(RUN, lwa="linear")  # type: ignore[call-arg]
+
+
+def test_messages_go_to_logging(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    """A library prints nothing."""
+    path = tmp_path / "run.txt"
+    shutil.copy(sm.sample_data() / "undamped_simulated_position.txt", path)
+    (tmp_path / "run.txt.about.toml").write_text('notes = ["windy"]\n')
+    with caplog.at_level(logging.INFO, "springmass"):
+        sm.load(path)
+    assert "run.txt.about.toml" in caplog.text
+    assert capsys.readouterr() == ("", "")

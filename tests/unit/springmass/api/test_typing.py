@@ -1,0 +1,40 @@
+"""A type checker finds what a user mistypes."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mypy")
+
+ROOT = Path(__file__).resolve().parents[4]
+SCRIPT = """\
+import springmass as sm
+
+path = sm.sample_data() / "undamped_simulated_position.txt"
+run = sm.analyse(path, scene={"bob": {"mass_kg": 0.2}}, accuracy="best", laws=["none", ...], from_s=1.0)
+print(run.law, run["T"].value, 2 * run["k"], run.get("gamma"), run.to_dataframe(), sm.compare([run, path]).runs)
+sm.analyse(([0.0, 1.0], [0.0, 1.0]), unit="cm")
+sm.analize(3)  # wrong
+sm.analyse(3)  # wrong
+sm.analyse(path, accuracy="hgh")  # wrong
+sm.analyse(path, lwa="linear")  # wrong
+sm.load(path, acuracy="best")  # wrong
+run.lwa  # wrong
+"""
+
+
+def test_mypy_finds_every_mistake_and_no_other(tmp_path: Path) -> None:
+    """Names, arguments, options and choices, under ``mypy --strict``."""
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", str(script)], cwd=ROOT, capture_output=True, text=True, timeout=600
+    )
+    found = {int(line) for line in re.findall(r"script\.py:(\d+): error", done.stdout)}
+    wrong = {number for number, line in enumerate(SCRIPT.splitlines(), 1) if line.endswith("# wrong")}
+    assert found == wrong, done.stdout + done.stderr
