@@ -206,7 +206,9 @@ class Track:
             steps = np.diff(t_s)
             steps = steps[np.isfinite(steps) & (steps > 0)]
             if not steps.size:
-                raise TrackError("time never increases, so the rate is unknown; give the samples in the order of their times")
+                raise TrackError(
+                    "time never increases, so the rate is unknown; give the samples in the order of their times"
+                )
             rate_hz = float(np.round(1.0 / np.median(steps), 6))
         # An infinite time is as unknown as NaN, but only NaN passes through a cosine without a warning.
         t_s[~np.isfinite(t_s)] = np.nan

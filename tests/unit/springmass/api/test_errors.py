@@ -34,7 +34,9 @@ WRONG: dict[str, Callable[[Path], Any]] = {
 @pytest.mark.parametrize("name", WRONG)
 def test_every_error_has_one_root_and_a_remedy(name: str, tmp_path: Path) -> None:
     """One line, whose remedy stands in it."""
-    (tmp_path / "plain.csv").write_text("time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True)))
+    (tmp_path / "plain.csv").write_text(
+        "time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True))
+    )
     content = bytearray(sm.load(RUN).save(tmp_path / "damaged.h5").read_bytes())
     content[len(content) // 2] ^= 0xFF
     (tmp_path / "damaged.h5").write_bytes(content)
