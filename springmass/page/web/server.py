@@ -26,7 +26,7 @@ from springmass.page.web.sharing import code_svg
 from springmass.session.failures import raised_at
 from storage.errors import one_line
 
-LOG = logging.getLogger("springmass.page")
+LOG = logging.getLogger("page")  # not below "springmass", whose messages are all printed
 STATIC = Path(__file__).parents[1] / "static"
 TURN_S = 0.0225
 """Time between two reads of the log: little longer than a screen frame; samples reach the screen within 40 ms."""
