@@ -23,8 +23,8 @@ Item = TypeVar("Item")
 class TaskProgress:
     """Shows how many items, named by a plural noun, are done, and the time left; used as a context manager.
 
-    Where no terminal shows the bar, ``lines`` writes ``reports 12/300, 0:00:40 left`` every ten seconds. The time left is
-    estimated from the average time per finished item.
+    Where no terminal shows the bar, ``lines`` writes ``reports 12/300, 0:00:40 left`` every ten seconds, by the average
+    time per finished item.
     """
 
     def __init__(self, what: str, total: int | None = None, *, lines: bool = False, quiet: bool = False) -> None:
