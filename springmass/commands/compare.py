@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shlex
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,8 +129,9 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
 
 def _print_text(compared: Compared, runs: list[Run]) -> None:
     from springmass.terminal.printing import comparison_text, findings_text, wrapped
+    from springmass.terminal.style import style_of
 
-    print(comparison_text(compared.comparison, [run.analysis for run in runs]))
+    print(comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout)))
     for joint in compared.joint:
         print(f"\n{wrapped(joint.message)}")
     for run in runs:

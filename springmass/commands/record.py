@@ -134,7 +134,8 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
             stops=STOPS,
         )
         STOPS.last_words = lambda: _stopped(session, log)
-        console = beside.enter_context(Console(lambda error: session.failures.note("stderr", error)))
+        console = Console(lambda error: session.failures.note("stderr", error))
+        beside.callback(console.close)
         try:
             page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
             ended = _Bench(session, options, log, console, release, page).record()

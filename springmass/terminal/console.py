@@ -12,7 +12,7 @@ import queue
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Self, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from acquisition.errors import visible
 
@@ -24,7 +24,7 @@ PATIENCE_S = 1.0
 
 
 class Console:
-    """Writes to stderr without blocking its callers; used as a context manager.
+    """Writes to stderr without blocking its callers; close it at the end.
 
     ``failed`` gets, on any thread, the exception of a write, or a TimeoutError if a write does not end.
     """
@@ -41,12 +41,6 @@ class Console:
             self._thread.start()
         except RuntimeError as error:  # no memory for a thread
             failed(error)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     @property
     def terminal(self) -> bool:

@@ -9,9 +9,12 @@ from typing import Any
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
+from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
-from springmass.terminal.table1 import aligned
+from springmass.terminal.quantities import concise
+from springmass.terminal.style import PLAIN, TerminalStyle
+from springmass.terminal.table1 import aligned, readable, shortened
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 NAMED = 5  # maximum number of runs that a line names
@@ -88,17 +91,26 @@ def classic_text(classic: Classic) -> str:
     return "\n".join([*lines, f"  {'chi-square of its fit':<22} {classic.chi2:.4g}"])
 
 
-def comparison_text(comparison: Comparison, analyses: Sequence[Analysis]) -> str:
-    """Return a comparison as an aligned ASCII table, followed by its message."""
-    rows = [("run", "period", "mass that swings", "spring constant", "residual / u")]
-    for name, analysis, k, pull in zip(comparison.names, analyses, comparison.each, comparison.pulls, strict=True):
+def comparison_text(comparison: Comparison, analyses: Sequence[Analysis], style: TerminalStyle = PLAIN) -> str:
+    """Return a comparison as an aligned table, followed by its message; on a terminal with digits in parentheses."""
+
+    def form(estimate: Estimate | None) -> str:
+        return concise(estimate, style) if style.terminal else str(estimate)
+
+    rows = [("period", "mass that swings", "spring constant", "residual / u")]
+    for analysis, k, pull in zip(analyses, comparison.each, comparison.pulls, strict=True):
         mass = analysis.motion.derived.effective_mass_kg if isinstance(analysis.motion, Oscillation) else None
-        period = str(analysis.estimates["period"])
-        rows.append((visible(name).encode("ascii", "replace").decode(), period, str(mass), str(k), f"{pull:+.1f}"))
+        rows.append((form(analysis.estimates["period"]), form(mass), form(k), f"{pull:+.1f}"))
     # Constants that disagree have no meaningful mean.
-    mean = str(comparison.spring_constant) if comparison.agree else "none"
-    rows.append(("together", "", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))
-    return f"{aligned(rows)}\n\n{wrapped(comparison.message)}"
+    mean = form(comparison.spring_constant) if comparison.agree else "none"
+    rows.append(("", "", mean, f"chi2 {comparison.chi2:.3g} / {comparison.dof}"))
+    names, close = [readable(name, style) for name in comparison.names], 0
+    if style.terminal:
+        close = len(rows[0]) + 1
+        room = style.width - len(aligned(rows, close=close).splitlines()[1]) - 2
+        names = [shortened(name, max(room, 8)) for name in names]
+    table = aligned([(name, *row) for name, row in zip(("run", *names, "together"), rows, strict=True)], close=close)
+    return f"{table}\n\n{wrapped(comparison.message)}"
 
 
 def wrapped(text: str, indent: str = "", columns: int = 100) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterable, Iterator
+from datetime import timedelta
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from springmass.errors import tell
@@ -22,8 +23,8 @@ Item = TypeVar("Item")
 class TaskProgress:
     """Shows how many items, named by a plural noun, are done, and the time left; used as a context manager.
 
-    Where no terminal shows the bar, ``lines`` writes ``reports 12/300, 40 s left`` every ten seconds. The time left is
-    estimated from the average time per finished item.
+    Where no terminal shows the bar, ``lines`` writes ``reports 12/300, 0:00:40 left`` every ten seconds, by the average
+    time per finished item.
     """
 
     def __init__(self, what: str, total: int | None = None, *, lines: bool = False, quiet: bool = False) -> None:
@@ -58,7 +59,7 @@ class TaskProgress:
             return
         self._shown_s = now_s
         left_s = (now_s - self._began_s) * (self._total - done) / done
-        tell(f"{self._what} {done}/{self._total}, {_duration(left_s)} left")
+        tell(f"{self._what} {done}/{self._total}, {timedelta(seconds=round(left_s))} left")
 
 
 def counted(items: Iterable[Item], total: int, what: str, *, quiet: bool = False) -> Iterator[Item]:
@@ -67,9 +68,3 @@ def counted(items: Iterable[Item], total: int, what: str, *, quiet: bool = False
         for done, item in enumerate(items, 1):
             yield item
             progress.update(done)
-
-
-def _duration(seconds: float) -> str:
-    minutes, rest_s = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest_s} s" if minutes else f"{rest_s} s"

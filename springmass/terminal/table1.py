@@ -50,7 +50,7 @@ def text_table(
     for i, row in enumerate(rows):
         if row.note:
             cells[i] = (row.note if len(row.note) <= widest else "no mass",) * len(names)
-    heads = [_shortened(_readable(name, style), widest) for name in names]
+    heads = [shortened(readable(name, style), widest) for name in names]
     blocks = []
     for first in range(0, len(names), together):
         part = slice(first, first + together)
@@ -79,10 +79,11 @@ def aligned(rows: Sequence[Sequence[str]], least: Sequence[int] = (), close: int
     return "\n".join([lines[0], "-" * (sum(widths) + sum(gaps[:-1])), *lines[1:]])
 
 
-def _shortened(name: str, width: int) -> str:
-    # Names of one experiment differ at the end as often as at the beginning, so both are kept.
+def shortened(name: str, width: int) -> str:
+    """Return a name without its middle: those of one experiment differ at the end as often as at the beginning."""
     return name if len(name) <= width else f"{name[: width // 2 - 1]}..{name[len(name) - (width - width // 2 - 1) :]}"
 
 
-def _readable(text: str, style: TerminalStyle) -> str:
+def readable(text: str, style: TerminalStyle) -> str:
+    """Return foreign text in the characters of a stream."""
     return visible(text) if style.unicode else visible(text).encode("ascii", "replace").decode()

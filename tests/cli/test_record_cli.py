@@ -89,6 +89,15 @@ def test_a_simulated_run_becomes_a_run_file_with_its_truth(recorded: Path) -> No
     assert not recorded.with_suffix(".wire").exists()
 
 
+def test_without_a_scene_an_example_bench_is_simulated(cli: Callable, tmp_path: Path) -> None:
+    """The run has the scene of that bench, so that its analysis gives the constant of its spring."""
+    done = cli("record", "--simulate", "--seconds", "3", "-o", tmp_path / "run.h5")
+    assert done.code == 0, done.err
+    assert load(tmp_path / "run.h5").loaded.info.kind == "simulated"
+    k = analyse(tmp_path / "run.h5")["spring_constant"]
+    assert abs(k.value - 14.0) < 5.0 * k.u
+
+
 def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Callable, tmp_path: Path, recorded: Path) -> None:
     """The log that travels inside a run gives the same samples through the same decoders."""
     with open_run(recorded) as run:
@@ -172,6 +181,7 @@ def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
         (("--option", "colour=red"), "colour"),
         (("--ruler", "0.4"), "--still"),
         (("--pre", "1"), "--trigger"),
+        (("--port", "/dev/ttyUSB0"), "--simulate"),
     ],
 )
 def test_options_that_would_do_nothing_are_refused(
