@@ -6,6 +6,7 @@ import csv
 import fcntl
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -220,3 +221,24 @@ def test_a_file_with_brackets_in_its_name_is_a_file_and_no_pattern(runs, cli):
     (row,) = rows("out")
     assert row["path"].endswith("run [1].txt")
     assert row["bob_mass_kg"] == "0.2"
+
+
+def test_a_name_like_a_formula_is_text_in_a_spreadsheet(runs, cli):
+    """It is quoted in the table, behind blanks too, and whole in Python."""
+    (runs / "run000.txt").rename(runs / " =1+1.txt")
+    assert cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK).code == 0
+    assert "' =1+1" in [row["run"] for row in rows("out")]
+    assert " =1+1" in list(springmass.results("out")["run"])
+
+
+def test_a_report_stays_that_of_its_recording(runs, cli):
+    """Two recordings have one stem; without the first, its name is that of the second, and its report is not."""
+    for name in ("run001.txt", "run002.txt", "run003.txt", "run004.txt", "run005.txt"):
+        (runs / name).unlink()
+    shutil.copy(runs / "run000.txt", runs / "run000.csv")
+    command = ("batch", runs, "-o", "out", "--jobs", "1", "--accuracy", "fast")
+    assert cli(*command).code == 0
+    (runs / "run000.csv").unlink()
+    assert "1 unchanged, 0 analysed" in cli(*command).err
+    (link,) = re.findall(r'href="(reports/[^"]*)"', Path("out/index.html").read_text())
+    assert json.loads((Path("out") / link).with_name("results.json").read_text())["input"]["path"] == "runs/run000.txt"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import fcntl
 import resource
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from springmass.cli import main
-from springmass.errors import OK, SOME_FAILED, USAGE
+from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE
 from tests.courses import contents, short_course
 from tests.sampling import sampled
 
@@ -115,3 +117,32 @@ def test_a_report_that_cannot_be_written_costs_that_report(
     obstacle.unlink()
     assert passed(runs, tmp_path / "out", *options) == OK
     assert contents(tmp_path / "out") == clean
+
+
+def test_damaged_data_are_named_with_what_to_do(
+    runs: Path, clean: dict[str, bytes], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A line names the file; without it the next pass makes everything anew."""
+    options = ("--jobs", "1", "--reports", "1")
+    assert passed(runs, tmp_path / "out", *options) == OK
+    data = tmp_path / "out" / "course.db"
+    data.write_bytes(b"no database" * 1000)
+    assert passed(runs, tmp_path / "out", *options) == UNREADABLE
+    (line,) = errors_of(capsys)
+    assert str(data) in line
+    data.unlink()
+    assert passed(runs, tmp_path / "out", *options) == OK
+    assert contents(tmp_path / "out") == clean
+
+
+def test_a_disk_without_locks_costs_one_line(
+    runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The course is analysed, and a line says that nothing keeps a second pass out."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "no locks available")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    assert main(["batch", str(runs), "-o", str(tmp_path / "out"), "--accuracy", "fast", "--jobs", "1"]) == OK
+    assert [line for line in capsys.readouterr().err.splitlines() if "no locks" in line]
