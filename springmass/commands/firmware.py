@@ -113,13 +113,7 @@ def _flash(port: str) -> None:
 
 
 def _converse(address: str, commands: list[str]) -> Identity:
-    """Send commands, and return the identity that the device then reports.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 4 if nothing answers, or if the device does not accept a command.
-    """
+    """Send commands, and return the identity that the device then reports."""
     clock, decoder = SystemClock(), LineProtocolDecoder()
     with contextlib.closing(SerialPort(address, FAMILY.baud)) as port:
         end_ns = clock.now_ns() + int(ANSWER_S * 1e9)
