@@ -189,8 +189,8 @@ class Scene:
 
     @property
     def tells_of_sensor(self) -> bool:
-        """Whether the scene has a table [sensor]: the distances come from a rangefinder."""
-        given = (self.sensor_sigma_m, self.sensor_position, self.sensor_mean_samples, self.sensor_lag_s)
+        """Whether the scene describes a rangefinder under [sensor], and not only a noise, which all distances have."""
+        given = (self.sensor_position, self.sensor_mean_samples, self.sensor_lag_s)
         return any(x is not None for x in given)
 
 

@@ -36,6 +36,7 @@ DETAIL_PERIODS = 8
 PER_PERIOD = 26  # points of a drawn period: a polygon that looks round
 MOST_PERIODS = 460  # of more periods the envelope is drawn, which a screen cannot tell from the motion
 MOST_STRETCHES, LEAST_WINDOWS = 24, 6
+TURNS_OF_SAMPLES = 24  # more would cover each other
 MOST_TURNS = 230  # of the phase plot: 6000 points, of which none may be left out
 MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 MOST_MEANS = 120  # of kinetic and potential energy; of more periods, one mean covers several
@@ -373,7 +374,8 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     velocity = np.where(_used(a), np.asarray(moving, np.float64), np.nan)
     words = "samples, velocity as recorded" if recorded else "samples, velocity by the fit"
     displacement, turn = track.y - motion.rest.at(track.t), np.floor((track.t - first) / period)
-    seen = np.flatnonzero(np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, step) == 0))
+    few = int(np.ceil(motion.cycles.count / TURNS_OF_SAMPLES))
+    seen = np.flatnonzero(np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, few) == 0))
     turns = []
     for start in np.arange(first, end, period * step).tolist():
         t = np.linspace(start, min(start + period, end), PER_PERIOD)

@@ -134,7 +134,7 @@ def test_motion_and_phase(charts: dict[str, Drawn], damped: Analysis) -> None:
     x, v = charts["phase"].xy("fitted motion")
     assert np.nanmax(np.abs(v)) / np.nanmax(np.abs(x)) == pytest.approx(1e-3 * omega, rel=0.02)
     turns = np.ptp(np.unwrap(np.arctan2(1e3 * v, omega * x))) / (2 * np.pi)
-    assert turns == pytest.approx(np.ptp(damped.track.t) / damped["period"].value, abs=1.0)
+    assert turns == pytest.approx(np.ptp(damped.track.t) / damped.estimates["period"].value, abs=1.0)
 
 
 def test_classic_method(charts: dict[str, Drawn], damped: Analysis) -> None:
