@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import Any, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
-from acquisition.extensions import entry_points_of, load_entry
+from failure.extensions import entry_points_of, load_entry
 from acquisition.recordings.base import Format, Survey, SurveyFormat, dialect_folder, read_bytes
 from acquisition.recordings.foreign import unknown_format
 from acquisition.recordings.recording import Recording
