@@ -1,7 +1,8 @@
 """Everything that your own package needs to add a sensor, a format, a damping law or an integrator.
 
 These names are public: they keep their meaning until a changelog says otherwise, in a checkout and in an installed
-wheel alike. Import them from here; the modules that define them may move. :mod:`springmass.testing` checks what you add.
+wheel alike. Import them from here; the modules that define them may move. :mod:`springmass.testing` checks what you
+add.
 """
 
 from __future__ import annotations

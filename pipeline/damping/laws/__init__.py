@@ -2,7 +2,7 @@
 
 :mod:`pipeline.damping.laws.law` defines the interface of a law. :mod:`pipeline.damping.laws.drag` contains the eight
 laws of :math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, and :mod:`pipeline.damping.laws.power` contains the law
-:math:`dA/dt = -c A^n`. A law is one small class and one entry in :data:`LAWS`, or in another package an entry point of the
+:math:`dA/dt = -c A^n`. A law is one small class and one entry in :data:`LAWS`, or an entry point of another package in the
 group ``springmass.laws``; :func:`springmass.testing.check` tests it. :mod:`pipeline.damping.laws.of_function` makes a
 law from a function.
 """
@@ -55,8 +55,8 @@ def find_law(law: str | Law) -> Law:
     return cast(Law, found)
 
 
-def _named(name: str, loaded: Any) -> Any:
+def _named(name: str, loaded: Any) -> Law:
     """Return what an entry point gives, if it is a law of that name."""
-    if getattr(loaded, "name", None) != name:
+    if not isinstance(loaded, Law) or loaded.name != name:
         raise AnalysisError(f"expected a law named {name!r}, got {loaded!r:.80}")
     return loaded
