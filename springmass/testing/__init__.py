@@ -1,21 +1,8 @@
-"""The conformance suite for what another package adds: a sensor, a format, a damping law or an integrator.
-
-Examples
---------
->>> import numpy as np
->>> from springmass.extend import make_law
->>> from springmass.testing import check
->>> def amplitude(t, A0, d):
-...     return A0 / (1 + d * np.sqrt(A0) * t / 2) ** 2
->>> def guess(t, amplitude):
-...     slope, level = np.polyfit(t, 1 / np.sqrt(amplitude), 1)
-...     return level**-2, 2 * slope
->>> check(make_law("three-halves", amplitude, {"d": (-1 / 2, -1)}, guess), {"A0": 0.05, "d": 0.2})
-"""
+"""The conformance suite for what another package adds: a sensor, a format, a damping law or an integrator."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 from acquisition.decoders.family import Family
@@ -49,7 +36,7 @@ def check(extension: Family | Format | Law | Integrator, *examples: Any, checksu
     TypeError
         If the extension is of no kind, or if a format or a law has no example.
     """
-    rules: tuple[Callable[..., None], ...]
+    rules: tuple[Any, ...]
     cases: list[tuple[Any, ...]]
     if isinstance(extension, Family):
         kind, rules, cases = "sensor", sensors.RULES, [(sensors.Sensor(extension, examples, checksum),)]
@@ -58,17 +45,22 @@ def check(extension: Family | Format | Law | Integrator, *examples: Any, checksu
     elif isinstance(extension, Law):
         kind, rules, cases = "law", laws.RULES, [laws.case_of(extension, each) for each in examples]
     elif isinstance(extension, Format):
-        kind, rules, cases = "format", formats.RULES, [(formats.Case(extension, each),) for each in examples]
+        kind, rules, cases = (
+            "format",
+            formats.RULES,
+            [(formats.Case(extension, each if isinstance(each, File) else File(each)),) for each in examples],
+        )
     else:
         raise TypeError(f"expected a Family, Format, Law or Integrator, got {extension!r:.80}")
     if not cases:
         raise TypeError(f"{kind} {extension.name}: give an example to check(), as its docstring says")
     failures = {}
-    for run, case in [(run, case) for run in rules for case in cases]:
+    for rule, case in product(rules, cases):
         try:
-            run(*case)
+            rule(*case)
         except Exception as error:
-            raised = "" if isinstance(error, AssertionError) else f"{run.__name__} met {type(error).__name__}: "
+            kind_of = type(error).__name__
+            raised = "" if isinstance(error, AssertionError) else f"handle what raises {kind_of} in {rule.__name__}: "
             failures[f"{kind} {extension.name}: {raised}{' '.join(str(error).split())}"] = error
     if failures:
         raise AssertionError("\n".join(failures)) from next(iter(failures.values()))

@@ -86,3 +86,9 @@ def test_its_law_and_its_integrator_are_found_by_their_names(installed: Path, tm
     assert "midpoint" in json.dumps(simulated)
     results = program(installed, "analyse", RECORDING, "--law", "three-halves", "--no-report")
     assert results["damping"]["selected"] == "three-halves"
+
+
+def test_its_own_tests_pass(installed: Path) -> None:
+    """``springmass.testing`` holds everything that it adds to the rules."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(installed), str(PLUGIN)])}
+    subprocess.run([sys.executable, "-m", "check_extras"], check=True, env=environment)

@@ -40,6 +40,15 @@ def test_it_keeps_the_rules_for_integrators(integrator: Integrator) -> None:
     check(integrator)
 
 
+def test_bad_steps_are_one_line() -> None:
+    """A step or a number of steps that cannot be is refused, whatever the integrator."""
+    problem = Problem(Equation(angular_frequency_per_s=8.66), 0.05)
+    invalid = ((0.0, 10, 1), (-0.01, 10, 1), (math.nan, 10, 1), (0.01, 0, 1), (0.01, 10, 3), (0.01, 10, 0))
+    for step, steps, every in invalid:
+        with pytest.raises(DynamicsError, match=r"^[^\n]+$"):
+            get_integrator("rk4").run(problem, step, steps, every=every)
+
+
 def problem_of(case: dict[str, Any]) -> Problem:
     """Return the problem of a stored case."""
     return Problem(Equation(**case["equation"]), case["displacement_m"], case["velocity_m_per_s"])

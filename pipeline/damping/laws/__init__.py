@@ -2,9 +2,9 @@
 
 :mod:`pipeline.damping.laws.law` defines the interface of a law. :mod:`pipeline.damping.laws.drag` contains the eight
 laws of :math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, and :mod:`pipeline.damping.laws.power` contains the law
-:math:`dA/dt = -c A^n`. A law is one small class and one entry in :data:`LAWS`, or an entry point of another package in the
-group ``springmass.laws``; :func:`springmass.testing.check` tests it. :mod:`pipeline.damping.laws.of_function` makes a
-law from a function.
+:math:`dA/dt = -c A^n`. A law is one small class and one entry in :data:`LAWS`, or an entry point of another package in
+the group ``springmass.laws``; :func:`springmass.testing.check` tests it. :mod:`pipeline.damping.laws.of_function` makes
+a law from a function.
 """
 
 from __future__ import annotations
