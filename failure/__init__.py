@@ -1,4 +1,4 @@
-"""The root of every error that is written for the user; all packages import it, and it imports nothing."""
+"""The root of every error that is written for the user; all packages import it, and it imports none of them."""
 
 from __future__ import annotations
 

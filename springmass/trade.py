@@ -18,7 +18,7 @@ import numpy as np
 from pipeline.analyse import Analysis, analyse
 from pipeline.analysis import Oscillation
 from pipeline.damping.laws import Law, find_law
-from pipeline.dynamics import INTEGRATORS, Equation, Problem
+from pipeline.dynamics import Equation, Problem, integrators
 from pipeline.dynamics.halving import auto
 from pipeline.dynamics.solve_ivp import SolveIvp
 from pipeline.errors import DynamicsError, PipelineError
@@ -209,7 +209,7 @@ def measure_integrators(problem: Problem, spacing_s: float, count: int) -> Itera
         error = float(np.max(np.abs(y - truth))) / problem.amplitude_m()
         return {"method": method, "setting": setting, "error": error, "steps": steps, "time_s": seconds}
 
-    for name, integrator in INTEGRATORS.items():
+    for integrator in integrators():
         if integrator.refusal(problem) or (long and isinstance(integrator, SolveIvp)):
             continue
         settings: list[tuple[str, Any, int]] = [("", integrator, 1)]
@@ -223,7 +223,7 @@ def measure_integrators(problem: Problem, spacing_s: float, count: int) -> Itera
                 solved = solver.run(problem, spacing_s / parts, count * parts, every=parts)
             except DynamicsError:
                 continue  # it diverges at this step
-            yield row(name, setting, solved.y, count * parts, time.perf_counter() - start)
+            yield row(integrator.name, setting, solved.y, count * parts, time.perf_counter() - start)
     for tolerance in TOLERANCES:
         start = time.perf_counter()
         try:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from pipeline.registry.laws import LAW_NAMES
+from pipeline.registry.laws import law_names
 
 
 def _where(holds: Callable[[float], bool], demand: str) -> Parameter:
@@ -31,8 +31,8 @@ ANY_LAW = "any"
 
 
 def _one_of_the_laws(_: object, name: str | None) -> None:
-    if name is not None and name not in (*LAW_NAMES, ANY_LAW):
-        raise ValueError(f"It must be one of {', '.join((*LAW_NAMES, ANY_LAW))}.")
+    if name is not None and name not in (*law_names(), ANY_LAW):
+        raise ValueError(f"It must be one of {', '.join((*law_names(), ANY_LAW))}.")
 
 
 LawName = Annotated[str, Parameter(validator=_one_of_the_laws)]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from acquisition.decoders.family import Family
 from acquisition.errors import SensorError
-from acquisition.extensions import entry_points_of, load_entry
+from failure.extensions import entry_points_of, load_entry
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

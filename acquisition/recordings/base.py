@@ -14,6 +14,7 @@ from acquisition.recordings.recording import Recording, Trap
 from acquisition.regular_file import open_regular
 
 
+@runtime_checkable
 class Format(Protocol):
     """A family of recordings. Files are identified by content, not by suffix."""
 

@@ -14,11 +14,11 @@ from importlib import import_module
 from typing import Any, cast
 
 from acquisition.errors import AcquisitionError, UnknownFormat
-from acquisition.extensions import entry_points_of, load_entry
 from acquisition.recordings.base import Format, Survey, SurveyFormat, dialect_folder, read_bytes
 from acquisition.recordings.foreign import unknown_format
 from acquisition.recordings.recording import Recording
 from acquisition.recordings.tables.text import HEAD_BYTES, restated
+from failure.extensions import entry_points_of, load_entry
 
 _MODULES = {
     "motion-sensor": "motion_sensor",

@@ -1,12 +1,16 @@
 """The equation of motion, the integrators that solve it, and the step halving that estimates their error.
 
 Input: a scene, or an equation with an initial state. Output: a trajectory with its stated error (``halving.py``). To
-add an integrator, add one entry to ``methods.py`` and one to ``INTEGRATORS``; it must pass
-tests/conformance/test_integrators.py under its name.
+add an integrator, add one entry to ``methods.py`` and one to ``INTEGRATORS``, or in another package an entry point of
+the group ``springmass.integrators``; :func:`springmass.testing.check` tests it.
 """
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any, cast
+
+from failure.extensions import entry_points_of, load_entry
 from pipeline.dynamics.equation import Equation as Equation
 from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import Integrator as Integrator
@@ -20,6 +24,14 @@ from pipeline.errors import DynamicsError
 
 _EACH = (FORWARD_EULER, SYMPLECTIC_EULER, VERLET, YOSHIDA4, RK4, EXACT, STRANG, DOP853)
 INTEGRATORS: dict[str, Integrator] = {each.name: each for each in _EACH}
+"""The built-in integrators by name."""
+
+_GROUP = "springmass.integrators"
+
+
+def integrators() -> tuple[Integrator, ...]:
+    """Return the built-in integrators, then those that other packages add."""
+    return tuple(get_integrator(name) for name in _names())
 
 
 def get_integrator(name: str) -> Integrator:
@@ -35,6 +47,20 @@ def get_integrator(name: str) -> Integrator:
     DynamicsError
         For an unknown name; the message lists the allowed names.
     """
-    if name not in INTEGRATORS:
-        raise DynamicsError(f"unknown method {name!r}; allowed are auto, {', '.join(INTEGRATORS)}")
-    return INTEGRATORS[name]
+    if name in INTEGRATORS:
+        return INTEGRATORS[name]
+    if name not in _names():
+        raise DynamicsError(f"unknown method {name!r}; allowed are auto, {', '.join(_names())}")
+    found = load_entry(entry_points_of(_GROUP)[name], f"method {name!r}", DynamicsError, partial(_named, name))
+    return cast(Integrator, found)
+
+
+def _names() -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*INTEGRATORS, *entry_points_of(_GROUP))))
+
+
+def _named(name: str, loaded: Any) -> Any:
+    """Return what an entry point gives, if it is an integrator of that name."""
+    if not isinstance(loaded, Integrator) or loaded.name != name:
+        raise DynamicsError(f"expected an Integrator named {name!r}, got {loaded!r:.80}")
+    return loaded

@@ -1,6 +1,8 @@
-"""The names of the built-in damping laws, for scenes, options and tables."""
+"""The names of the damping laws, for scenes, options and tables."""
 
 from __future__ import annotations
+
+from failure.extensions import entry_points_of
 
 LAW_NAMES = (
     "none",
@@ -13,4 +15,12 @@ LAW_NAMES = (
     "linear+quadratic+friction",
     "power",
 )
-"""The names in the order in which the laws are tried; :data:`pipeline.damping.laws.LAWS` contains the laws."""
+"""The built-in names in the order in which the laws are tried; :data:`pipeline.damping.laws.LAWS` contains the laws."""
+
+GROUP = "springmass.laws"
+"""The group of the entry points with which other packages add laws."""
+
+
+def law_names() -> tuple[str, ...]:
+    """Return the names of the built-in laws, then those of the laws that other packages add."""
+    return tuple(dict.fromkeys((*LAW_NAMES, *entry_points_of(GROUP))))

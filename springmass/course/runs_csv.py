@@ -16,7 +16,7 @@ from typing import Any
 
 from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
-from pipeline.registry.laws import LAW_NAMES
+from pipeline.registry.laws import law_names
 from springmass.course.rows import RESERVED
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.inputs import InputFile
@@ -160,8 +160,8 @@ def _values(folder: Path, where: str, texts: Mapping[str, str], *, decimal_comma
             values[name] = (number(name), number(f"{name}_u") if f"{name}_u" in texts else 0.0)
         elif f"{name}_u" in texts:
             raise ProgramError(f"{where}: {name}_u is there without {name}; fill in both", USAGE)
-    if (law := texts.get(LAW)) not in (None, ANY_LAW, *LAW_NAMES):
-        laws = ", ".join((*LAW_NAMES, ANY_LAW))
+    if (law := texts.get(LAW)) not in (None, ANY_LAW, *law_names()):
+        laws = ", ".join((*law_names(), ANY_LAW))
         raise ProgramError(f"{where}: {LAW} must be one of {laws}, got {law!r}", USAGE)
     return values
 

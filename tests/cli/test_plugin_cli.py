@@ -19,6 +19,7 @@ from springmass.extend import Equation, Problem, get_integrator
 
 Cli = Callable[..., Any]
 PLUGIN = Path(__file__).resolve().parents[1] / "plugin"
+RECORDING = PLUGIN.parents[1] / "sample_data" / "damped_simulated_position.txt"
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +75,20 @@ def test_its_law_and_its_integrator_run(installed: Path, monkeypatch: pytest.Mon
     problem = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073), 0.05)
     exact = get_integrator("strang").run(problem, 0.001, 1000)
     assert 0.0 < np.max(np.abs(bench_extras.MIDPOINT.run(problem, 0.001, 1000).y - exact.y)) < 1e-5
+
+
+def test_its_law_and_its_integrator_are_found_by_their_names(installed: Path, tmp_path: Path) -> None:
+    """On the command line as those that ship; a name that none has is answered with all of them."""
+    scene = tmp_path / "scene.toml"
+    spring = "[bob]\nmass_kg = 0.2\n[spring]\nconstant_n_per_m = 15.0\n"
+    scene.write_text(f"{spring}[start]\ndisplacement_m = 0.05\n[damping]\ngamma_per_s = 0.007\n")
+    simulated = program(installed, "simulate", "--scene", scene, "--method", "midpoint", "--dt", "0.001")
+    assert "midpoint" in json.dumps(simulated)
+    results = program(installed, "analyse", RECORDING, "--law", "three-halves", "--no-report")
+    assert results["damping"]["selected"] == "three-halves"
+
+
+def test_its_own_tests_pass(installed: Path) -> None:
+    """``springmass.testing`` holds everything that it adds to the rules."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(installed), str(PLUGIN)])}
+    subprocess.run([sys.executable, "-m", "check_extras"], check=True, env=environment)

@@ -2,19 +2,24 @@
 
 :mod:`pipeline.damping.laws.law` defines the interface of a law. :mod:`pipeline.damping.laws.drag` contains the eight
 laws of :math:`dA/dt = -(\\mu + \\gamma A + \\beta A^2)`, and :mod:`pipeline.damping.laws.power` contains the law
-:math:`dA/dt = -c A^n`. A law is one small class and one entry in :data:`LAWS`; ``tests/conformance/test_laws.py`` tests
-its differential equation, its derivatives and its guess. :mod:`pipeline.damping.laws.of_function` makes a law from a
-function.
+:math:`dA/dt = -c A^n`. A law is one small class and one entry in :data:`LAWS`, or an entry point of another package in
+the group ``springmass.laws``; :func:`springmass.testing.check` tests it. :mod:`pipeline.damping.laws.of_function` makes
+a law from a function.
 """
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any, cast
+
+from failure.extensions import entry_points_of, load_entry
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.laws.law import Law, free_power, in_units, units_of, words_of
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
 from pipeline.damping.laws.power import Power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.quantity import Unit
+from pipeline.registry.laws import GROUP, law_names
 
 __all__ = [
     "LAWS",
@@ -37,12 +42,21 @@ LAWS: dict[str, Law] = {law.name: law for law in _ALL}
 
 
 def find_law(law: str | Law) -> Law:
-    """Return the law with a name; a law is returned unchanged."""
-    name = law if isinstance(law, str) else law.name
-    if isinstance(law, str):
-        if name not in LAWS:
-            raise AnalysisError(f"laws must be of {', '.join(LAWS)}, or laws of your own; got {name!r}")
-        return LAWS[name]
-    if LAWS.get(name, law) is not law:
-        raise AnalysisError(f"a law of yours needs a new name, got {name!r}, which is taken")
-    return law
+    """Return the law with a name, which another package may add; a law is returned unchanged."""
+    if not isinstance(law, str):
+        if LAWS.get(law.name, law) is not law:
+            raise AnalysisError(f"a law of yours needs a new name, got {law.name!r}, which is taken")
+        return law
+    if law in LAWS:
+        return LAWS[law]
+    if law not in law_names():
+        raise AnalysisError(f"laws must be of {', '.join(law_names())}, or laws of your own; got {law!r}")
+    found = load_entry(entry_points_of(GROUP)[law], f"law {law!r}", AnalysisError, partial(_named, law))
+    return cast(Law, found)
+
+
+def _named(name: str, loaded: Any) -> Law:
+    """Return what an entry point gives, if it is a law of that name."""
+    if not isinstance(loaded, Law) or loaded.name != name:
+        raise AnalysisError(f"expected a law named {name!r}, got {loaded!r:.80}")
+    return loaded

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
 
 
+@runtime_checkable
 class Law(Protocol):
     """A damping law; ``theta`` lists its parameters in the order of ``parameters``."""
 

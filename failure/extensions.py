@@ -1,4 +1,4 @@
-"""Load extensions of other packages through entry points: recording formats and sensor families."""
+"""Load what other packages add through entry points: formats, sensors, damping laws and integrators."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from acquisition.errors import AcquisitionError
+from failure import Error
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -21,7 +21,7 @@ def entry_points_of(group: str) -> dict[str, EntryPoint]:
 
 
 def load_entry(
-    entry: EntryPoint, what: str, refused: type[AcquisitionError], checked: Callable[[Any], Any] = lambda loaded: loaded
+    entry: EntryPoint, what: str, refused: type[Error], checked: Callable[[Any], Any] = lambda loaded: loaded
 ) -> Any:
     """Load an entry point and return what ``checked`` makes of it; any exception becomes a ``refused`` of one line."""
     try:
