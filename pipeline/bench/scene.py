@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from pipeline.bench.air import saturation_pressure
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.laws import LAW_NAMES
 
+Stated: TypeAlias = Estimate | float | tuple[float, float] | None
+"""What a scene takes for a quantity: a number, or a pair (value, u), besides an estimate."""
 POSITIONS = ("below", "above")
 _CHOICES = {("sensor", "position"): ("sensor_position", POSITIONS), ("damping", "law"): ("damping_law", LAW_NAMES)}
 """Keys of a scene file with text values: the attribute for each key, and the allowed texts."""
@@ -92,6 +94,32 @@ class Scene:
     beta_per_m_s: Estimate | None = None
     mu_m_per_s: Estimate | None = None
     damping_law: str | None = None
+
+    if TYPE_CHECKING:  # a number or a pair becomes an estimate, which a checker cannot know
+
+        def __init__(
+            self,
+            *,
+            bob_mass_kg: Stated = None,
+            spring_mass_kg: Stated = None,
+            spring_constant_n_per_m: Stated = None,
+            spring_cubic_n_per_m3: Stated = None,
+            pendulum_length_m: Stated = None,
+            disc_diameter_m: Stated = None,
+            air_temperature_c: Stated = None,
+            air_pressure_pa: Stated = None,
+            air_relative_humidity: Stated = None,
+            sensor_sigma_m: Stated = None,
+            sensor_position: str | None = None,
+            sensor_mean_samples: Stated = None,
+            sensor_lag_s: Stated = None,
+            start_displacement_m: Stated = None,
+            start_velocity_m_per_s: Stated = None,
+            gamma_per_s: Stated = None,
+            beta_per_m_s: Stated = None,
+            mu_m_per_s: Stated = None,
+            damping_law: str | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Check every value, and take a number or a pair (value, u) for the estimate that it states.

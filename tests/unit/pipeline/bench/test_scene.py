@@ -179,8 +179,8 @@ def test_any_tables_make_a_scene_or_a_scene_error(tables: dict[str, Any]) -> Non
 
 def test_a_scene_is_checked_when_it_is_built() -> None:
     """Numbers, pairs of value and u, and values with uncertainty; what a file may not hold is refused."""
-    assert Scene(bob_mass_kg=0.2) == Scene(bob_mass_kg=Estimate(0.2, 0.0, "kg"))  # type: ignore[arg-type]
-    assert Scene(bob_mass_kg=(0.2, 1e-4)) == Scene(bob_mass_kg=Estimate(0.2, 1e-4, "kg"))  # type: ignore[arg-type]
+    assert Scene(bob_mass_kg=0.2) == Scene(bob_mass_kg=Estimate(0.2, 0.0, "kg"))
+    assert Scene(bob_mass_kg=(0.2, 1e-4)) == Scene(bob_mass_kg=Estimate(0.2, 1e-4, "kg"))
     assert Scene(bob_mass_kg=ufloat(0.2, 1e-4)).bob_mass_kg == Estimate(0.2, 1e-4, "kg")
     for wrong in (
         {"bob_mass_kg": -0.2},

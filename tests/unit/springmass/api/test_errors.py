@@ -31,12 +31,15 @@ WRONG: dict[str, Callable[[Path], Any]] = {
 }
 
 
+def write_plain(path: Path) -> None:
+    """Write a table that states no unit."""
+    path.write_text("time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True)))
+
+
 @pytest.mark.parametrize("name", WRONG)
 def test_every_error_has_one_root_and_a_remedy(name: str, tmp_path: Path) -> None:
     """One line, whose remedy stands in it."""
-    (tmp_path / "plain.csv").write_text(
-        "time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True))
-    )
+    write_plain(tmp_path / "plain.csv")
     content = bytearray(sm.load(RUN).save(tmp_path / "damaged.h5").read_bytes())
     content[len(content) // 2] ^= 0xFF
     (tmp_path / "damaged.h5").write_bytes(content)
@@ -51,7 +54,7 @@ def test_every_error_has_one_root_and_a_remedy(name: str, tmp_path: Path) -> Non
 def test_a_question_is_answered_by_its_remedy(tmp_path: Path) -> None:
     """It is the call to make."""
     path = tmp_path / "plain.csv"
-    path.write_text("time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True)))
+    write_plain(path)
     with pytest.raises(sm.Error) as caught:
         sm.analyse(path)
     run = eval(caught.value.remedy, {"springmass": sm})

@@ -16,7 +16,7 @@ SCRIPT = """\
 import springmass as sm
 
 path = sm.sample_data() / "undamped_simulated_position.txt"
-run = sm.analyse(path, scene={"bob": {"mass_kg": 0.2}}, accuracy="best", laws=["none", ...], from_s=1.0)
+run = sm.analyse(path, scene=sm.Scene(bob_mass_kg=(0.2, 1e-4)), accuracy="best", laws=["none", ...], from_s=1.0)
 print(run.law, run["T"].value, 2 * run["k"], run.get("gamma"), run.to_dataframe(), sm.compare([run, path]).runs)
 sm.analyse(([0.0, 1.0], [0.0, 1.0]), unit="cm")
 sm.analize(3)  # wrong
@@ -25,6 +25,7 @@ sm.analyse(path, accuracy="hgh")  # wrong
 sm.analyse(path, lwa="linear")  # wrong
 sm.load(path, acuracy="best")  # wrong
 run.lwa  # wrong
+sm.Scene(bob_mas_kg=0.2)  # wrong
 """
 
 
