@@ -9,8 +9,7 @@ from typing import Annotated
 
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
-from springmass.commands.options import PART, File, Overwrite, argument, option, refuse
-from springmass.commands.options import output as output_option
+from springmass.commands.options import PART, File, Overwrite, argument, option, output, refuse
 from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, suggest, tell
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
@@ -28,7 +27,7 @@ def convert(
     ] = None,
     /,
     *,
-    output: Annotated[File | None, output_option("OUT", "the output, instead of a second argument")] = None,
+    output: Annotated[File | None, output("OUT", "the output, instead of a second argument")] = None,
     scene: Annotated[File | None, option("FILE", "scene file to store in the run file")] = None,
     overwrite: Overwrite = False,
     read: ReadOptions = ReadOptions(),

@@ -8,8 +8,7 @@ from typing import Annotated
 
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import File
-from springmass.commands.options import output as output_option
+from springmass.commands.options import File, output
 from springmass.errors import OK, suggest
 from springmass.report.write import write_report
 from springmass.runs.comparing import compare_runs
@@ -26,7 +25,7 @@ RUNS = ("undamped", "damped")
 
 
 def demo(
-    *, output: Annotated[File, output_option("DIR", "output folder (default: springmass-demo)")] = "springmass-demo"
+    *, output: Annotated[File, output("DIR", "output folder (default: springmass-demo)")] = "springmass-demo"
 ) -> int:
     """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
     out = make_folder(output)

@@ -20,7 +20,6 @@ File = str | Path
 THE_PAGE = Group("The page", sort_key=4)
 FURTHER = Parameter(group=Group("Further options", sort_key=4))
 """Marks an option that few people use, which the help shows below the others."""
-Accuracy = Literal["fast", "standard", "best"]
 
 
 def argument(name: str, words: str, *, required: bool | None = None) -> Parameter:
@@ -63,7 +62,6 @@ Recording = Annotated[File, argument("INPUT", "recording, run file or wire log")
 Scenes = Annotated[
     tuple[File, ...], option("FILE", "scene file: one for all inputs, or one per input in the same order")
 ]
-Tier = Annotated[Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)")]
 Figures = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],
     Parameter(
@@ -73,9 +71,6 @@ Figures = Annotated[
         converter=_formats,
         n_tokens=1,
     ),
-]
-StatedLaw = Annotated[
-    LawName | None, option("NAME", "damping law, if known: linear, quadratic ...; any: choose from the data")
 ]
 Json = Annotated[bool, Parameter(name="--json", help="print JSON on standard output")]
 Overwrite = Annotated[bool, flag("replace an existing output")]
@@ -156,7 +151,9 @@ class PageOptions:
         Positive | None, option("U", "target uncertainty of the period, us (default: 40 ppm of the period)")
     ] = None
     lan: Annotated[bool, flag("let other devices on the local network view the page")] = False
-    law: StatedLaw = None
+    law: Annotated[
+        LawName | None, option("NAME", "damping law, if known: linear, quadratic ...; any: choose from the data")
+    ] = None
 
 
 PART = ("from_s", "to_s", "clock_ppm")

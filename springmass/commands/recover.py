@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from acquisition.errors import CalibrationError
-from springmass.commands.options import File, Overwrite, argument, option
-from springmass.commands.options import output as output_option
+from springmass.commands.options import File, Overwrite, argument, option, output
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.runs.outputs import made_now
 from springmass.stops import STOPS
@@ -20,7 +19,7 @@ def recover(
     log: Annotated[File, argument("RUN.wire", "wire log")],
     /,
     *,
-    output: Annotated[File | None, output_option("RUN.h5", "run file to create (default: next to the log)")] = None,
+    output: Annotated[File | None, output("RUN.h5", "run file to create (default: next to the log)")] = None,
     overwrite: Overwrite = False,
     speed_of_sound: Annotated[
         Positive | None, option("C", "speed of sound for converting echo times, m/s (default: the log's)")

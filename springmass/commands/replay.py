@@ -14,8 +14,7 @@ from cyclopts import Parameter, Token
 
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import PART, File, Overwrite, PageOptions, Recording, flag, option, refuse
-from springmass.commands.options import output as output_option
+from springmass.commands.options import PART, File, Overwrite, PageOptions, Recording, flag, option, output, refuse
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
@@ -45,7 +44,7 @@ def replay(
     seek: Annotated[Finite | None, option("S", "start at this second of the recording")] = None,
     loop: Annotated[bool, flag("start again at the end, until Ctrl-C")] = False,
     output: Annotated[
-        File | None, output_option("RUN.h5", "write the samples to a run file instead of standard output")
+        File | None, output("RUN.h5", "write the samples to a run file instead of standard output")
     ] = None,
     overwrite: Overwrite = False,
     of_page: PageOptions = PageOptions(),

@@ -17,8 +17,7 @@ from pipeline.dynamics.band import Band
 from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
-from springmass.commands.options import Figures, File, Json, Overwrite, flag, option
-from springmass.commands.options import output as output_option
+from springmass.commands.options import Figures, File, Json, Overwrite, flag, option, output
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
@@ -51,7 +50,7 @@ def simulate(
     check: Annotated[bool, flag("also measure the error; this takes longer than the simulation")] = False,
     force: Annotated[bool, flag("simulate even if the step is unstable")] = False,
     against: Annotated[File | None, option("RUN", "measured run to compare with the prediction")] = None,
-    output: Annotated[File | None, output_option("RUN.h5", "write the readings of a sensor to a run file")] = None,
+    output: Annotated[File | None, output("RUN.h5", "write the readings of a sensor to a run file")] = None,
     overwrite: Overwrite = False,
     sensor: Annotated[Literal["ideal", "rangefinder"], option("NAME", "sensor of RUN.h5 (default: rangefinder)")] = (
         "rangefinder"

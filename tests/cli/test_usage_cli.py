@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -22,6 +26,26 @@ def test_every_command_explains_itself(cli: Cli, monkeypatch: pytest.MonkeyPatch
     for command in COMMANDS:
         done = cli(command, "--help")
         assert (done.code, done.err, command in whole.out) == (0, "", True), command
+
+
+def test_the_first_help_is_short_and_quick() -> None:
+    """First what a student, a course and a bench need, a line each; no command is imported for it, and no numpy."""
+    code = "import sys; from springmass.cli import main; main(['--help']); print('numpy' in sys.modules)"
+    environment = {**os.environ, "COLUMNS": "80"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    *lines, heavy = done.stdout.splitlines()
+    assert heavy == "False"
+    first = [line.split()[0] for line in lines[:24] if line[:1] == " " and line.split()]
+    assert set(first) >= {"demo", "analyse", "explain", "scene", "compare", "batch", "ports", "record", "page"}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_help_fits_a_screen_or_is_grouped(cli: Cli, monkeypatch: pytest.MonkeyPatch, command: str) -> None:
+    """At most 24 lines at 80 columns, or groups of at most 30."""
+    monkeypatch.setenv("COLUMNS", "80")
+    text = cli(command, "--help").out
+    groups = re.split(r"^   [A-Z].*$", text, flags=re.MULTILINE)
+    assert text.count("\n") <= 24 or max(group.count("\n") for group in groups) <= 30
 
 
 @pytest.mark.parametrize(
