@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from pipeline.bench.air import saturation_pressure
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.laws import LAW_NAMES
+from pipeline.registry.laws import law_names
 
 Stated: TypeAlias = Estimate | float | tuple[float, float] | None
 """What a scene takes for a quantity: a number, or a pair (value, u), besides an estimate."""
 POSITIONS = ("below", "above")
-_CHOICES = {("sensor", "position"): ("sensor_position", POSITIONS), ("damping", "law"): ("damping_law", LAW_NAMES)}
-"""Keys of a scene file with text values: the attribute for each key, and the allowed texts."""
+_CHOICES: dict[tuple[str, str], tuple[str, Callable[[], tuple[str, ...]]]] = {
+    ("sensor", "position"): ("sensor_position", lambda: POSITIONS),
+    ("damping", "law"): ("damping_law", law_names),
+}
+"""Keys of a scene file with text values: the attribute for each key, and what returns the allowed texts."""
 
 
 class _Quantity(NamedTuple):
@@ -136,7 +139,7 @@ class Scene:
                     object.__setattr__(self, quantity.attribute, found)
         for (table, key), (attribute, texts) in _CHOICES.items():
             if (text := getattr(self, attribute)) is not None:
-                _choice(table, key, text, texts, "scene")
+                _choice(table, key, text, texts(), "scene")
 
     @classmethod
     def from_mapping(cls, tables: Mapping[str, Any], *, where: str = "scene") -> Scene:
@@ -179,7 +182,7 @@ class Scene:
                     )
                 if (table, key) in _CHOICES:
                     attribute, texts = _CHOICES[table, key]
-                    known[attribute] = _choice(table, key, value, texts, where)
+                    known[attribute] = _choice(table, key, value, texts(), where)
                 else:
                     known[_QUANTITIES[table, key].attribute] = _quantity(table, key, value, where)
         scene = cls(**known)
