@@ -167,10 +167,10 @@ def page_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
         if name == "analyse":
             bench = ["--scene", str(data / "damped.scene.toml"), "--method", "classic"]
             assert main(["analyse", str(OLD_RUN), *bench, "--output", str(out)]) == 0
-            return out / f"{OLD_RUN.stem}.results" / "report.html"
+            return out / f"{OLD_RUN.name}.results" / "report.html"
         if name == "warned":
             assert main(["analyse", clipped, "--output", str(out)]) == 0
-            return out / "clipped_simulated_position.results" / "report.html"
+            return out / "clipped_simulated_position.txt.results" / "report.html"
         if name == "simulate":
             words = [
                 "simulate",

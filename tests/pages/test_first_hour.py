@@ -36,7 +36,7 @@ import springmass as sm
 a = sm.analyse("damped.txt", scene="bench.toml")
 print(a)
 print(2 * a["period"], a["k"] > 0, a["k"].unit)
-print(type(a.plot.amplitude()).__name__, a.to_dataframe().shape[1] > 2, "distance" in a.to_dataset())
+print(type(a.plot("amplitude")).__name__, a.to_dataframe().shape[1] > 2, "distance" in a.to_dataset())
 import xarray as xr
 with xr.open_dataset("bob.h5") as samples:
     print(sorted(samples.data_vars)[:1], samples.sizes["time"] > 300)
@@ -78,12 +78,12 @@ def test_from_a_file_to_a_figure(typed: Callable[..., str], clipped: Callable[..
         "bench.toml",
         "--figures",
         "svg",
-        shows=("period", "±", "report: damped.results/report.html"),
+        shows=("period", "±", "report: damped.txt.results/report.html"),
     )
     assert max(map(len, shown.splitlines())) <= 80
     for width in ("laptop", "phone", "A4"):
-        assert clipped(bench / "damped.results" / "report.html", width) == []
-    assert (bench / "damped.results" / "figures" / "amplitude.svg").is_file()
+        assert clipped(bench / "damped.txt.results" / "report.html", width) == []
+    assert (bench / "damped.txt.results" / "figures" / "amplitude.svg").is_file()
     for name in ("undamped", "damped"):
         shutil.move(bench / f"{name}.txt", bench / "runs")
     together = typed("analyse", "runs", shows=("undamped", "damped", "next: springmass compare runs"))
