@@ -43,7 +43,7 @@ def write_report_of(task: tuple[str, Job, Path]) -> str:
         if isinstance(run, Failed):
             return _line(job, run)
         try:
-            run = replace(run, loaded=replace(run.loaded, path=Path(job.path)), name=name, time_utc=TIME)
+            run = run.named(name, loaded=replace(run.loaded, path=Path(job.path)), time_utc=TIME)
             write_report(folder, [run], script=f"../../{SHARED}")
         except WriteFailed as error:
             return str(error)
@@ -58,7 +58,12 @@ def analyse_one(job: Job) -> dict[str, Any]:
     row["input_sha256"] = digest_of(job.whole(job.path)) or None
     with quietly():  # messages about a recording go into its row
         (run,) = analyse_all([job.task()])
-    return row | ({"error": _line(job, run)} if isinstance(run, Failed) else row_of(run, job.path))
+    if isinstance(run, Failed):
+        return row | {"error": _line(job, run)}
+    try:
+        return row | row_of(run, job.path)
+    except Exception as error:  # a defect in the program must not stop the other runs
+        return row | {"error": f"{job.path}: {internal_error(error)}"}
 
 
 def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, Any]:

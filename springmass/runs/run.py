@@ -91,10 +91,12 @@ class Run(Mapping[str, Value]):
             loaded = within(loaded_of(source, how), how)
         return cls(loaded, scene_from(scene), how, name or loaded.path.name)
 
-    def named(self, name: str) -> Run:
-        """Return the run under another name, with its analysis if it has one."""
+    def named(self, name: str, **changes: Any) -> Run:
+        """Return the run under another name, and with other fields, with its analysis if it has one."""
         other = copy.copy(self)
-        object.__setattr__(other, "name", name)
+        other.__dict__.pop("result", None)
+        for field, value in {"name": name, **changes}.items():
+            object.__setattr__(other, field, value)
         return other
 
     @cached_property
