@@ -106,13 +106,7 @@ class Replay:
         self._closed = True
 
     def seek(self, t_s: float) -> None:
-        """Seek to the first sample at or after the recording time ``t_s`` in s, or to the end if there is none.
-
-        Raises
-        ------
-        ValueError
-            If ``t_s`` is not finite.
-        """
+        """Seek to the first sample at or after the recording time ``t_s`` in s, or to the end if there is none."""
         if not math.isfinite(t_s):
             raise ValueError(f"t_s must be a finite time in seconds, got {t_s!r}")
         self._next = int(np.searchsorted(self._due, t_s))

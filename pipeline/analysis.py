@@ -98,13 +98,6 @@ class Analysis:
     def smoothed(self) -> Smoothed:
         """Return position, velocity and acceleration at every sample from the fit, with their uncertainties.
 
-        Raises
-        ------
-        AnalysisError
-            If the run does not oscillate.
-
-        Examples
-        --------
         >>> import numpy as np
         >>> from pipeline.analyse import analyse
         >>> t = np.arange(1000) / 100

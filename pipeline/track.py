@@ -139,13 +139,7 @@ class Track:
         return int(self.t.size)
 
     def demand_length(self, what: str) -> None:
-        """Raise an error if the track is no length, which ``what`` needs.
-
-        Raises
-        ------
-        TrackError
-            If the quantity is not a length.
-        """
+        """Raise an error if the track is no length, which ``what`` needs."""
         if self.quantity != "length":
             raise TrackError(f"{what} needs a length in m, got {self.quantity} in {self.unit}; leave it out")
 
@@ -165,31 +159,6 @@ class Track:
     ) -> Track:
         """Make a track from array-like objects.
 
-        Parameters
-        ----------
-        t : (n,) array_like, s
-            NaN or infinite where unknown.
-        y : (n,) array_like, m
-            NaN where unmeasured.
-        rate_hz : float, optional
-            Sampling rate, Hz; by default the reciprocal of the median time step.
-        flags : (n,) array_like of int, optional
-        sigma_m, quantum_m : float, optional
-            As the attributes of the same names.
-        kind : str
-            "live", "replay" or "simulated".
-        quantity, unit : str
-            Quantity in ``y`` and its unit.
-
-        Raises
-        ------
-        TrackError
-            If the arrays are not one-dimensional or have different lengths, if there are fewer than two samples, if
-            time never increases and no rate is given, if the rate, sigma_m or quantum_m is not positive and finite, or
-            if the quantity or its unit is not in :data:`UNITS`.
-
-        Examples
-        --------
         >>> track = Track.from_arrays([0.0, 0.01, 0.02], [0.2, 0.21, float("nan")])
         >>> track.rate_hz, len(track)
         (100.0, 3)

@@ -111,13 +111,7 @@ def quietly() -> Iterator[None]:
 
 
 def internal_error(error: BaseException) -> str:
-    """Return one line about a program defect; write its traceback to a file, or to stderr if that fails.
-
-    Parameters
-    ----------
-    error : BaseException
-        The exception that was caught.
-    """
+    """Return one line about a program defect; write its traceback to a file, or to stderr if that fails."""
     import tempfile
     import traceback
 

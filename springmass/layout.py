@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["PACKAGES", "PREFIX", "STDIN", "part", "static_file"]
-
 STDIN = "<stdin>"
 """The path that represents standard input, which is ``-`` on the command line."""
 PACKAGES = ("acquisition", "failure", "pipeline", "storage")
@@ -19,8 +17,6 @@ PREFIX = "springmass." if (_HOME / PACKAGES[0]).is_dir() else ""
 def part(name: str) -> Path:
     """Return the folder of one of the packages or of the bundled recordings, without checking that it exists.
 
-    Examples
-    --------
     >>> part("storage").name
     'storage'
     """
@@ -30,8 +26,6 @@ def part(name: str) -> Path:
 def static_file(name: str) -> Path:
     """Return the path of a file for browsers: a script, a style sheet or a picture.
 
-    Examples
-    --------
     >>> static_file("charts.js").is_file()
     True
     """

@@ -22,8 +22,6 @@ def cell(text: str) -> str:
     A spreadsheet evaluates a cell that begins with ``=``, ``+``, ``-`` or ``@`` as a formula; a leading apostrophe
     makes it text. Numbers remain numbers.
 
-    Examples
-    --------
     >>> cell("=1+1"), cell("-3.5")
     ("'=1+1", '-3.5')
     """
@@ -42,8 +40,6 @@ _FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
 def pretty(estimate: Estimate | None) -> str:
     """Return an estimate for the page: the digits of :func:`pipeline.numerics.estimate.format_value`, typeset.
 
-    Examples
-    --------
     >>> pretty(Estimate(-8.36e-5, 9.6e-7, "m"))
     '(−8.360 ± 0.096) × 10⁻⁵ m'
     """
@@ -58,8 +54,6 @@ def pretty(estimate: Estimate | None) -> str:
 def pretty_number(value: float | None, digits: int = 2) -> str:
     """Typeset a number without an uncertainty to a few digits; return a dash for None or NaN.
 
-    Examples
-    --------
     >>> pretty_number(498765.0, 3)
     '4.99 × 10⁵'
     """
@@ -81,8 +75,6 @@ _PREFIXES = {
 def prefixed(estimate: Estimate) -> Estimate:
     """Return an estimate with an SI prefix that gives a value of about 1 to 1000; most units have no prefixes.
 
-    Examples
-    --------
     >>> prefixed(Estimate(0.05145, 2e-5, "m"))
     51.450(20) mm
     """
@@ -97,8 +89,6 @@ def prefixed(estimate: Estimate) -> Estimate:
 def page_unit(unit: str) -> str:
     """Return a unit as the page writes it.
 
-    Examples
-    --------
     >>> page_unit("1/(m s)"), page_unit("rad/s^2"), page_unit("m^(1-n)/s"), page_unit("(m/s^2)^(1-n)/s")
     ('m⁻¹ s⁻¹', 'rad/s²', 'm¹⁻ⁿ/s', '(m/s²)¹⁻ⁿ/s')
     """
@@ -132,8 +122,6 @@ def raised(power: int) -> str:
 def cells(estimate: Estimate | None) -> str:
     """Return an estimate as value, u and unit for three cells of a spreadsheet, with the digits of u, divided by |.
 
-    Examples
-    --------
     >>> cells(Estimate(0.7525961, 4.96e-5, "s")), cells(Estimate(101325.0, 1490.0, "Pa"))
     ('0.752596|0.000050|s', '1.013e+05|0.015e+05|Pa')
     """
@@ -162,8 +150,6 @@ def unbroken(text: str) -> str:
 def equation(name: str, estimate: Estimate) -> str:
     """Write a parameter with its value or its upper limit.
 
-    Examples
-    --------
     >>> equation("beta", Estimate(0.235, 0.012, "1/(m s)")), equation("mu", UpperLimit(1e-5, 2e-5, "m/s"))
     ('β = 0.235 ± 0.012 m⁻¹ s⁻¹', 'μ < 4.7 × 10⁻⁵ m/s (95 %)')
     """
@@ -186,8 +172,6 @@ _SUBSTITUTES = (
 def typeset(message: str) -> str:
     """Return a message with numbers and units typeset as in the page's tables.
 
-    Examples
-    --------
     >>> typeset("gamma = (6.50 +- 0.12)e-03 1/s; left in, the amplitude changes by -0.4 mm (2.0%)")
     'γ = (6.50 ± 0.12) × 10⁻³ s⁻¹; left in, the amplitude changes by −0.4 mm (2.0\xa0%)'
     """

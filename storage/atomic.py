@@ -31,8 +31,6 @@ def write_whole(path: str | os.PathLike[str], data: bytes | str, *, overwrite: b
     Raises RunExists if the file exists and may not be replaced, and WriteFailed if it cannot be written. An existing
     file is then unchanged.
 
-    Examples
-    --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_whole(folder + "/results.json", "{}").read_text()

@@ -11,8 +11,6 @@ from failure import Error
 def one_line(error: BaseException) -> str:
     """Return an error's text on a single line (HDF5 uses several).
 
-    Examples
-    --------
     >>> one_line(OSError("no space\\n  left"))
     'no space left'
     >>> one_line(MemoryError())

@@ -46,8 +46,6 @@ def parsed(text: bytes, key: str) -> Any:
 def decoded(content: object, kind: type[_T], key: str) -> _T:
     """Convert parsed JSON to its struct; raise ValueRefused for the first value that the struct does not allow.
 
-    Examples
-    --------
     >>> class Rate(Struct):
     ...     rate_hz: Annotated[float, Meta(ge=1e-6)]
     >>> decoded({"rate_hz": 0}, Rate, "info")
@@ -83,8 +81,6 @@ def json_text(value: Any) -> str:
 
     Raises TypeError or ValueError if JSON cannot store a value: an object, NaN, an infinity.
 
-    Examples
-    --------
     >>> json_text({"b": np.float64(0.5), "a": [1, None]})
     '{"a":[1,null],"b":0.5}'
     """

@@ -171,13 +171,7 @@ class Family:
     source: str = ""
 
     def demand_options(self, options: Mapping[str, Any], *, past: bool = False) -> None:
-        """Check that the family has all the given options, or had them in an earlier version.
-
-        Raises
-        ------
-        SensorError
-            If an option is unknown; the message lists the unknown options and the options of the family.
-        """
+        """Check that the family has all the given options, or had them in an earlier version."""
         unknown = sorted(set(options) - set(self.options) - set(self.past_options if past else ()))
         if unknown:
             known = ", ".join(self.options) or "none"

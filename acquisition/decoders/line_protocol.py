@@ -46,8 +46,6 @@ _ENVELOPE = re.compile(rb"\$([ -#%-)+-~]+)\*([0-9A-F]{4})\r?")  # printable char
 def checksum(body: bytes) -> int:
     """Return the CRC-16/CCITT-FALSE (polynomial 1021, initial value FFFF) of the bytes between ``$`` and ``*``.
 
-    Examples
-    --------
     >>> f"{checksum(b'123456789'):04X}"
     '29B1'
     """

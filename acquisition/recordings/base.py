@@ -47,26 +47,7 @@ class Format(Protocol):
         time: str | None = None,
         time_unit: str | None = None,
     ) -> Recording:
-        """Read one channel of one run of a file.
-
-        Parameters
-        ----------
-        path : str
-            Used in messages and as the recording's name; it is not opened.
-        data : bytes
-            The content of the file.
-        channel, run, time : str, optional
-            The column to read, its run and the column of its times, if the file leaves them open.
-        rate_hz : float, optional
-            The rate if the file does not state it, Hz. It is an error if the file contradicts it.
-        unit, time_unit : str, optional
-            The units of the channel and of the times if the file does not state them.
-
-        Raises
-        ------
-        FormatError
-            If the content is faulty; the message is one line for the user.
-        """
+        """Read one channel of one run of a file."""
         ...
 
 

@@ -125,13 +125,7 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Check every value, and take a number or a pair (value, u) for the estimate that it states.
-
-        Raises
-        ------
-        SceneError
-            As for :meth:`from_mapping`.
-        """
+        """Check every value, and take a number or a pair (value, u) for the estimate that it states."""
         for (table, key), quantity in _QUANTITIES.items():
             if (given := getattr(self, quantity.attribute)) is not None:
                 found = _quantity(table, key, _stated(given, quantity), "scene")
@@ -145,22 +139,6 @@ class Scene:
     def from_mapping(cls, tables: Mapping[str, Any], *, where: str = "scene") -> Scene:
         """Check the tables of a scene file and convert them to a scene.
 
-        Parameters
-        ----------
-        tables : mapping
-            Tables as read by ``tomllib``: ``{"bob": {"mass_kg": {"value": 0.2, "u": 5e-5}}, ...}``.
-        where : str
-            Source named in error messages, usually the file.
-
-        Raises
-        ------
-        SceneError
-            For an unknown table or key, a value that is not a number or not an allowed text, a value outside its range,
-            an uncertainty that is negative or too large, or more vapour than the pressure allows. The message names the
-            file, the key, the value and the allowed ones.
-
-        Examples
-        --------
         >>> Scene.from_mapping({"bob": {"mass_kg": 0.2007}}).bob_mass_kg
         0.2007 kg
         """

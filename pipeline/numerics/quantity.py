@@ -53,8 +53,6 @@ class Unit:
     def of(self, unit: str) -> str:
         """Write the unit for a recording whose values have this unit in place of the metre.
 
-        Examples
-        --------
         >>> Unit(-1, -1).of("V"), Unit(1, -1).of("rad"), Unit(-1, -1).of("m/s^2"), Unit(0, -1).of("N"), Unit(1).of("1")
         ('1/(V s)', 'rad/s', 's/m', '1/s', '1')
         >>> Unit(1, -1, less="n").of("rad/s"), Unit(-2, -1, radian=1).of("1")

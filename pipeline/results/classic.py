@@ -51,25 +51,6 @@ class Classic:
 def classic(track: Track, scene: Scene | None = None) -> Classic:
     """Evaluate a run as in the report.
 
-    Parameters
-    ----------
-    track : Track
-        The run. Samples that are flagged as unusable before the analysis are left out; false echoes are not sought.
-    scene : Scene, optional
-
-    Returns
-    -------
-    Classic
-
-    Raises
-    ------
-    AnalysisError
-        If there are fewer than eight sampled maxima, or the record is shorter than one window.
-    TrackError
-        If the track does not contain lengths.
-
-    Notes
-    -----
     Period (eqs. 13, 18): time from one sampled maximum to the seventh after it, over seven, with
     :math:`u = 0.01/7` s. Only two of about a thousand samples determine it, so its error is 58 to 183 times the bound.
 

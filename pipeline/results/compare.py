@@ -51,13 +51,7 @@ class SpringRun:
 
     @classmethod
     def of(cls, name: str, derived: Derived, *, clock: str = "") -> SpringRun:
-        """Make a run from the results of an analysis.
-
-        Raises
-        ------
-        AnalysisError
-            If the scene states no mass of the bob, or if an angle was recorded and the scene states no spring.
-        """
+        """Make a run from the results of an analysis."""
         if derived.own_mass_kg is None or derived.effective_mass_kg is None:
             raise AnalysisError(f"{name}: a comparison of springs needs [bob] mass_kg in the scene")
         if "spring_constant" not in derived.estimates:
@@ -110,27 +104,6 @@ def compare_springs(
 ) -> Comparison:
     """Test whether runs made with one spring give one spring constant.
 
-    Parameters
-    ----------
-    runs : sequence of SpringRun
-        At least two runs.
-    spring_mass_kg : Estimate, optional
-        Mass of the spring in all runs, kg. If it is not stated, it is fitted as far as the runs determine it.
-    mass_correlation : float
-        Correlation between the errors of the masses of two runs, 0 to 1. It is 1 if the only uncertainty is that of the
-        calibration of one balance.
-    probability : float
-        Probability of the chi-square quantile up to which the runs count as in agreement.
-
-    Raises
-    ------
-    ValueError
-        If fewer than two runs are given, or the correlation lies outside 0 to 1.
-    AnalysisError
-        If a mass or a frequency is not positive, or an uncertainty is negative or not finite.
-
-    Notes
-    -----
     The constant k and the mass s of the spring are fitted by generalised least squares to
     :math:`k = \\omega_i^2 M(s, m_i)`, where M is the oscillating mass
     (:func:`pipeline.bench.spring.oscillating_mass_kg`). The covariance of the right-hand sides is
@@ -147,8 +120,6 @@ def compare_springs(
     its exchange makes all runs agree, or reduces their tension to a hundredth, because exchanged records need not agree
     to the last digit.
 
-    Examples
-    --------
     The numbers of the report, with its two periods exchanged as printed:
 
     >>> bare = SpringRun("undamped", Estimate(8.3458, 0.0158), Estimate(0.2007, 5e-5))

@@ -157,8 +157,6 @@ def decoded(text: str) -> F8:
 def value_label(what: str, unit: str) -> str:
     """Return the label of an axis with the unit in which values of a recording are shown.
 
-    Examples
-    --------
     >>> value_label("amplitude", "m"), value_label("amplitude", "m/s^2")
     ('amplitude / mm', 'amplitude / (m/s²)')
     """
@@ -168,8 +166,6 @@ def value_label(what: str, unit: str) -> str:
 def rate_label(what: str, order: int, unit: str) -> str:
     """Return the label of an axis of a derivative by time.
 
-    Examples
-    --------
     >>> rate_label("velocity", 1, "m"), rate_label("rate", 1, "rad")
     ('velocity / (m/s)', 'rate / (rad/s)')
     """

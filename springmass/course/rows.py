@@ -73,13 +73,7 @@ def is_course(folder: str | os.PathLike[str]) -> bool:
 
 
 def read_rows(folder: str | os.PathLike[str]) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Return the rows of ``results.csv`` by column, and the course's own columns; an empty cell is None.
-
-    Raises
-    ------
-    ProgramError
-        With exit code 2 if the folder has no results of a course, 3 if they are damaged.
-    """
+    """Return the rows of ``results.csv`` by column, and the course's own columns; an empty cell is None."""
     if not is_course(folder):
         raise ProgramError(f"{folder}: expected a folder that springmass batch made; name that of its -o", USAGE)
     path = os.path.join(folder, CSV)

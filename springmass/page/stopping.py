@@ -21,8 +21,6 @@ def more_seconds(u: float, wanted_u: float, seconds: float, amplitude: Callable[
     weighted by :math:`A^2`; u falls as :math:`J^{-1/2}`. The result is infinite if the swing dies out first, or if the
     recording would have to last more than fifty times as long as now.
 
-    Examples
-    --------
     A steady swing: u falls with the power 3/2 of the time.
 
     >>> round(more_seconds(8.0, 1.0, 10.0, lambda t: np.ones_like(t)))

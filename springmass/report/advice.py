@@ -52,8 +52,6 @@ def is_standing(finding: Mapping[str, Any]) -> bool:
 def lab_report_line(finding: Mapping[str, Any]) -> str:
     """Return what a lab report should say about a warning; empty for a note.
 
-    Examples
-    --------
     >>> lab_report_line({"code": "rest_drift", "severity": "warning", "message": "The rest position drifts by 1 mm."})
     'The rest position drifts by 1 mm. The stated uncertainties include this.'
     """

@@ -28,8 +28,6 @@ MOST_ROWS = 1_000_000
 def columns_of(unit: str) -> tuple[str, ...]:
     """Return the columns of ``motion.csv`` for a record in a unit.
 
-    Examples
-    --------
     >>> columns_of("rad")[3:7]
     ('smooth_angle_rad', 'u_smooth_angle_rad', 'derivative_rad_per_s', 'u_derivative_rad_per_s')
     """

@@ -60,8 +60,6 @@ def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
 def date_words(recorded: Mapping[str, Any]) -> str:
     """Return in words when a run was recorded; empty if nothing but its title may say so.
 
-    Examples
-    --------
     >>> date_words({"start_time": "2026-11-22T22:30:35.97+00:00"})
     'Recorded 2026-11-22 22:30:35 UTC.'
     """

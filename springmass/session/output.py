@@ -16,8 +16,6 @@ from storage.recovery.recover import run_paths
 def default_name(what: str, now: datetime) -> Path:
     """Return a name with time and subject, and with a number if the name is taken.
 
-    Examples
-    --------
     >>> str(default_name("undamped", datetime(2026, 11, 22, 14, 5)))
     '2026-11-22_1405_undamped.h5'
     """

@@ -22,8 +22,6 @@ def shown(estimate: Estimate | None, style: TerminalStyle) -> str:
 def concise(estimate: Estimate | None, style: TerminalStyle) -> str:
     """Return an estimate with its uncertainty as digits in parentheses, for many estimates side by side.
 
-    Examples
-    --------
     >>> concise(Estimate(0.05145, 2e-5, "m"), TerminalStyle(True, True, si=False))
     '51.450(20) mm'
     """

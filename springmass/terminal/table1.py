@@ -23,8 +23,6 @@ def text_table(
     Names that are wider than their column are shortened. If the runs do not fit side by side, the uncertainty is given
     as digits in parentheses.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> from pipeline.analyse import analyse
     >>> from pipeline.track import Track

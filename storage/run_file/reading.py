@@ -147,13 +147,6 @@ class Run:
     def blocks(self, size: int = 1024) -> Iterator[Block]:
         """Yield the samples in blocks, which are read on demand.
 
-        Parameters
-        ----------
-        size : int
-            Samples per block, at least 1; the last may be shorter.
-
-        Notes
-        -----
         A damaged chunk is found when it is read. The checksum of a whole column is compared before the blocks of the
         last chunk.
         """
@@ -177,15 +170,7 @@ class Run:
         return _block(self.header, 0, self._rows(0, 0))
 
     def dataset(self) -> xarray.Dataset:
-        """Return the samples as a checked dataset in memory, independent of the file.
-
-        Returns
-        -------
-        xarray.Dataset
-            On the dimension ``time``: time (s), distance (m), quality and, if the file has them, distance_errors (m)
-            and velocity (m/s), with the file's attributes. The attributes of the dataset are kind, channel, title,
-            format and the instrument's name, clock and numbers.
-        """
+        """Return the samples as a checked dataset in memory, independent of the file."""
         import xarray as xr
 
         header, values = self.header, layout.arrays(self.samples(), self.header.info.sigma_m)
@@ -208,13 +193,7 @@ class Run:
         return tuple(self._differences(()))
 
     def verify(self, *, but: Iterable[str] = ()) -> None:
-        """Read header, columns and original files again and compare them with their digests.
-
-        Parameters
-        ----------
-        but : iterable of str
-            Columns to leave out, such as those of :data:`CHECKED` after :meth:`samples` has checked them.
-        """
+        """Read header, columns and original files again and compare them with their digests."""
         for error in self._differences(but):
             raise error
 

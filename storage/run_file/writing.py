@@ -41,45 +41,6 @@ def write_run(
     """Write a run file whole.
 
     The blocks are written as they arrive, so at most a chunk of 65536 samples and one block are kept in memory.
-
-    Parameters
-    ----------
-    path : str or PathLike
-        The file to create.
-    blocks : iterable of Block
-        Consecutive blocks. A column that some blocks lack is filled as in :func:`acquisition.block.concatenate`.
-    info : SourceInfo
-        The source; its ``kind`` is stored with the data.
-    originals : sequence of Original
-        Files to store bit for bit.
-    scene : mapping, optional
-        The scene's tables, which JSON must be able to store, with string keys. Tuples are read back as lists.
-    title, channel, format : str
-        The run's title, the quantity that is used as the distance, and the format family of the recording.
-    traps : sequence of Trap
-        Remarks of the reader.
-    malformed_rows : int
-        Number of rows that were not samples.
-    provenance : mapping, optional
-        Any further information, which JSON must be able to store, with string keys. ``software``, ``version``,
-        ``created_utc``, ``start_time`` (ISO 8601, the time of t = 0) and ``configuration`` also become attributes for
-        other tools.
-    overwrite : bool
-        Whether an existing file may be replaced.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    RunExists
-        If the file exists and may not be replaced; in this case no block has been read.
-    WriteFailed
-        If the file cannot be written, blocks are not consecutive or have different quantities, or JSON cannot store
-        the scene or the provenance. Errors of the iterable of blocks pass through. In all cases an existing file is
-        unchanged.
     """
     with run_writer(path, sigma_m=info.sigma_m, overwrite=overwrite) as run:
         for block in blocks:

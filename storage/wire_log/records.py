@@ -85,8 +85,6 @@ class Record(NamedTuple):
 def frame(kind: Kind, payload: bytes, sequence: int, mono_ns: int, log: int, channel: int = 0) -> bytes:
     """Return one record with a payload of at most 65535 bytes.
 
-    Examples
-    --------
     >>> frame(Kind.DATA, b"R0500", sequence=7, mono_ns=1, log=2, channel=3).hex(" ", -4)
     'f5a90500 07000000 01000000 00000000 02000000 02030000 034438e3 52303530 30'
     """

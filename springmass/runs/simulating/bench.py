@@ -53,8 +53,6 @@ def bench_position(
     The bob hangs at rest until its release; without one it starts at t = 0. The equation of motion is solved by Strang
     splitting, only up to the latest time needed.
 
-    Examples
-    --------
     >>> scene = Scene.from_mapping({"bob": {"mass_kg": 0.2}, "spring": {"constant_n_per_m": 20.0},
     ...                             "start": {"displacement_m": 0.05}})
     >>> f"{bench_position(scene)(0.1 * np.pi):.6f}"
