@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from storage.atomic import whole_file, write_failed
-from storage.errors import OutOfMemory, RunDamaged, RunOpen, WriteFailed, one_line
+from storage.errors import OutOfMemory, RunDamaged, RunOpen, StorageError, WriteFailed, one_line
 
 if TYPE_CHECKING:
     import h5py
@@ -64,6 +64,8 @@ def writing_h5(path: Path) -> Iterator[None]:
     try:
         with _signals_wait():
             yield
+    except StorageError:
+        raise
     except _ERRORS as error:
         _raise_if_out_of_memory(path, error)
         remedy = "check the disk space and the values to be written"
@@ -91,6 +93,8 @@ def reading_h5(path: Path, what: str) -> Iterator[None]:
     """Convert the errors that HDF5 raises on damaged bytes to :class:`RunDamaged`; ``what`` is read."""
     try:
         yield
+    except StorageError:
+        raise
     except _ERRORS as error:
         _raise_if_out_of_memory(path, error)
         for sign, otherwise in _OPEN.items():
