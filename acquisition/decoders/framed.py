@@ -12,7 +12,7 @@ from acquisition.readings import NO_READINGS, Reading, Readings
 
 
 class FramedDecoder(ABC):
-    """A :class:`acquisition.decoders.family.Decoder` of frames; each family implements :meth:`reading`.
+    """A :class:`springmass.extend.Decoder` of frames; each family implements :meth:`reading`.
 
     Parameters
     ----------

@@ -54,13 +54,16 @@ def check(extension: Family | Format | Law | Integrator, *examples: Any, checksu
         raise TypeError(f"expected a Family, Format, Law or Integrator, got {extension!r:.80}")
     if not cases:
         raise TypeError(f"{kind} {extension.name}: give an example to check(), as its docstring says")
-    failures = {}
+    failures: dict[str, Exception | None] = {}
     for rule, case in product(rules, cases):
+        message, raised = "", None
         try:
             rule(*case)
+        except AssertionError as error:
+            message = str(error)
         except Exception as error:
-            kind_of = type(error).__name__
-            raised = "" if isinstance(error, AssertionError) else f"handle what raises {kind_of} in {rule.__name__}: "
-            failures[f"{kind} {extension.name}: {raised}{' '.join(str(error).split())}"] = error
+            message, raised = f"handle what raises {type(error).__name__} in {rule.__name__}: {error}", error
+        if message:
+            failures[f"{kind} {extension.name}: {' '.join(message.split())}"] = raised
     if failures:
-        raise AssertionError("\n".join(failures)) from next(iter(failures.values()))
+        raise AssertionError("\n".join(failures)) from next(filter(None, failures.values()), None)

@@ -38,7 +38,7 @@ def make_law(
     Parameters
     ----------
     name : str
-        Short name that is not in :data:`pipeline.damping.laws.LAWS`.
+        Short name that is not in :data:`springmass.LAWS`.
     amplitude : callable
         ``amplitude(t, A0, *coefficients)`` returns the amplitudes (n,) at times t (n,) in s, for the amplitude A0 at
         t = 0. It must work in any unit of length. Its rate must depend only on the amplitude: from any later
