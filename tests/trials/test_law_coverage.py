@@ -72,6 +72,9 @@ class Cell:
         """Return a line of the table: for each quantity the two shares, and how wide u is."""
         cells = [f"{self.drag} | {self.seconds:g} s, {self.noise_m * 1e3:g} mm"]
         for k in range(len(QUANTITIES) if self.drag in WITHIN else 2):
+            if not np.isfinite(self.errors[:, k]).any():
+                cells.append("-")
+                continue
             cells.append(f"{self.covered(k, 1.0):.0%}, {self.covered(k, 1.959964):.0%}, {self.width(k):.2f}")
         return f"| {' | '.join(cells)} |"
 
@@ -80,6 +83,8 @@ class Cell:
         found = []
         for k, name in enumerate(QUANTITIES if self.drag in WITHIN else QUANTITIES[:2]):
             count = int(np.count_nonzero(np.isfinite(self.errors[:, k])))
+            if count == 0:
+                continue
             for sigmas, least in ((1.0, LEAST_68), (1.959964, LEAST_95)):
                 doubt = 3.3 * math.sqrt(least * (1.0 - least) / count)
                 if self.covered(k, sigmas) < least - doubt:
@@ -139,6 +144,8 @@ def one_record(job: tuple[str, float, float, int]) -> tuple[list[float], list[fl
     # Clock and scale are exact here: what the record's own scatter says is held against it.
     stated = {name: (e.value, motion.derived.budgets[name].u_of("A")) for name, e in analysis.estimates.items()}
     for name, e in motion.derived.coefficients.items():
+        if not truth(drag).get(name, 1.0):
+            continue  # of one drag only, the other is stated where chance shows it, and not quoted
         stated[name] = e.value, motion.derived.budgets[name].u_of("A")
     fit = motion.damping.fits.get("linear+quadratic" if drag in WITHIN else drag)
     own = {}
