@@ -32,7 +32,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
 
 $(VENV)/.installed-dev: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) 'pip>=25.1'  # the first that installs dependency groups
-	$(PIP) -e '.[dask,notebook]' --group dev
+	$(PIP) -e '.[dask]' --group dev
 	@touch $@ $(VENV)/.installed
 
 demo: $(VENV)/.installed

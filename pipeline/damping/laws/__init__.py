@@ -9,7 +9,9 @@ a law from a function.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any, cast
 
 from failure.extensions import entry_points_of, load_entry
@@ -37,7 +39,7 @@ __all__ = [
 ]
 
 _ALL: tuple[Law, ...] = (*DRAGS, Power())
-LAWS: dict[str, Law] = {law.name: law for law in _ALL}
+LAWS: Mapping[str, Law] = MappingProxyType({law.name: law for law in _ALL})
 """The built-in damping laws by name, in the order in which they are tried."""
 
 
