@@ -27,7 +27,7 @@ from springmass.commands.options import (
 )
 from springmass.course.rows import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
-from springmass.runs.analysing import law_line
+from springmass.runs.analysing import Task, analysed, law_line
 from springmass.runs.comparing import Compared, compare_runs, comparison_json
 from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
 from springmass.runs.options import How
@@ -74,9 +74,8 @@ def compare(
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
     scenes = read_scenes(options.scene, len(inputs))
     out = None if options.output is None else make_folder(options.output)
-    runs = [
-        Run.of(path, scene, how, name) for path, scene, name in zip(inputs, scenes, distinct_names(inputs), strict=True)
-    ]
+    each = zip(inputs, distinct_names(inputs), scenes, strict=True)
+    runs = analysed(Task(path, name, scene, how) for path, name, scene in each)
     compared = compare_runs(runs, mass_correlation=options.mass_correlation)
     parameters = {**how.parameters, "mass_correlation": options.mass_correlation}
     result = comparison_json(compared, provenance_of(how.accuracy, parameters, now_utc()))

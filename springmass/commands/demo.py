@@ -11,6 +11,7 @@ from acquisition.replay import Replay
 from springmass.commands.options import File, output
 from springmass.errors import OK, suggest
 from springmass.report.write import write_report
+from springmass.runs.analysing import Task, analysed
 from springmass.runs.comparing import compare_runs
 from springmass.runs.loading import load, sample_data
 from springmass.runs.options import ReadOptions
@@ -29,15 +30,15 @@ def demo(
 ) -> int:
     """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
     out = make_folder(output)
-    analysed = [_one(name, out) for name in RUNS]
-    compared = compare_runs(analysed)
+    runs = [_one(name, out) for name in RUNS]
+    compared = compare_runs(runs)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
-    print(text_table(RUNS, [a.analysis for a in analysed], style_of(sys.stdout)))
-    for one in analysed:
+    print(text_table(RUNS, [a.analysis for a in runs], style_of(sys.stdout)))
+    for one in runs:
         print(f"\n{one.name.capitalize()}:")
         print(findings_text(one.result["findings"]))
     print(f"\n{compared.comparison.message}")
-    print(f"\nReport: {write_report(out / 'demo.results', analysed, compared=compared)}")
+    print(f"\nReport: {write_report(out / 'demo.results', runs, compared=compared)}")
     suggest("springmass analyse YOUR_RECORDING --scene BENCH.toml; springmass scene prints such a file to fill in")
     return OK
 
@@ -51,4 +52,5 @@ def _one(name: str, out: Path) -> Run:
     path = out / f"{name}.h5"
     with Replay(old.samples_in_blocks(), VirtualClock(), info=old.info, speed=None) as source:
         save_run(path, old, blocks=source, scene=scene.to_mapping(), overwrite=True)
-    return Run.of(path, name=name)
+    (run,) = analysed([Task(str(path), name)])
+    return run

@@ -61,6 +61,16 @@ def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
             yield Failed(task, INTERNAL, f"{task.path}: {internal_error(error)}")
 
 
+def analysed(tasks: Iterable[Task]) -> list[Run]:
+    """Return the analysed run of each recording; the first failure is an error."""
+    runs = []
+    for found in analyse_all(tasks):
+        if isinstance(found, Failed):
+            raise found.question or ProgramError(found.message, found.code)
+        runs.append(found)
+    return runs
+
+
 def law_line(run: Run, scene_file: str | Path | None) -> str:
     """Return a line naming the damping law that the scene states; empty if it states none, or an option set the law.
 
