@@ -20,7 +20,7 @@ def damped():
 def test_reading_a_text_recording(benchmark):
     """Reading 12,000 rows of text gives 12,000 samples."""
     loaded = benchmark(load, sample_data() / "damped_simulated_position.txt")
-    assert len(loaded.track) == 12000
+    assert len(loaded.loaded.track) == 12000
 
 
 def test_the_whole_analysis(benchmark, damped):

@@ -40,6 +40,9 @@ with contextlib.suppress(ImportError):
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+collect_ignore = ["plugin/check_extras.py"]  # a test of the plug-in, which is not installed here
+
+
 @pytest.fixture(autouse=True)
 def a_page_of_one_width(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wrap what the program prints at 100 columns, whatever terminal or test runner is around."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Unpack
@@ -36,7 +36,7 @@ UNITS = {
 
 
 def batch(
-    sources: Sequence[AnySource],
+    sources: Iterable[AnySource],
     scene: AnyScene | None = None,
     *,
     executor: Executor | None = None,
@@ -46,7 +46,7 @@ def batch(
 
     Parameters
     ----------
-    sources : sequence
+    sources : iterable
         Sources that :func:`springmass.analyse` takes.
     scene : optional
         As for :func:`springmass.analyse`: one for all runs; default: each run's own scene.
@@ -64,7 +64,7 @@ def batch(
     Examples
     --------
     >>> from springmass import sample_data
-    >>> frame = batch(sorted(sample_data().glob("*_position.txt")))
+    >>> frame = batch(sample_data() / f"{name}_simulated_position.txt" for name in ("damped", "undamped"))
     >>> [round(period, 4) for period in frame["period"]]
     [0.7901, 0.7585]
     """

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import springmass as sm
-from pipeline.track import Track
 
 FOLDER = "peers"
 
@@ -36,27 +35,27 @@ def numbers_of(path: Path) -> dict[str, list[float]]:
 
 
 @pytest.fixture(scope="module")
-def pendulum(recordings: Path) -> Track:
+def pendulum(recordings: Path) -> sm.Run:
     """Return kafe2's pendulum: its angle, rad, at 121 times."""
     numbers = numbers_of(peer(recordings, "kafe2_pendulum.yml"))
-    return Track.from_arrays(numbers["x_data"], numbers["y_data"], quantity="angle", unit="rad")
+    return sm.load((numbers["x_data"], numbers["y_data"]), unit="rad")
 
 
-def test_kafe2s_pendulum_with_its_law_stated(pendulum: Track) -> None:
+def test_kafe2s_pendulum_with_its_law_stated(pendulum: sm.Run) -> None:
     """kafe2 fits a linear law, c = 0.00992(16) 1/s: ours agrees within its u and is no wider than 1.1 of it."""
     rate = sm.analyse(pendulum, law="linear")["damping_rate"]
     assert abs(rate.value - 0.00992) < 0.00016
     assert rate.u <= 1.1 * 0.00016
 
 
-def test_kafe2s_pendulum_without_a_law_covers_its_rate(pendulum: Track) -> None:
+def test_kafe2s_pendulum_without_a_law_covers_its_rate(pendulum: sm.Run) -> None:
     """The average over laws covers kafe2's rate, and is less certain than with the law stated."""
     rate = sm.analyse(pendulum)["damping_rate"]
     assert abs(rate.value - 0.00992) < 2.0 * rate.u
     assert rate.u > sm.analyse(pendulum, law="linear")["damping_rate"].u
 
 
-def test_kafe2s_pendulum_starts_at_its_angle(pendulum: Track) -> None:
+def test_kafe2s_pendulum_starts_at_its_angle(pendulum: sm.Run) -> None:
     """kafe2's starting angle is 0.5984(26) rad."""
     amplitude = sm.analyse(pendulum, law="linear")["amplitude"]
     assert abs(amplitude.value - 0.5984) < 0.0026
