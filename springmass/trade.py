@@ -205,9 +205,10 @@ def measure_integrators(problem: Problem, spacing_s: float, count: int) -> Itera
     truth = reference(problem, spacing_s, count, 4 * PARTS[-1])[0].y
     long = spacing_s * count * problem.equation.angular_frequency_per_s > LONGEST_ADAPTIVE
 
-    def row(method: str, setting: str, y: F8, steps: int, seconds: float) -> dict[str, Any]:
+    def row(method: str, setting: str, y: F8, steps: int, seconds: float, *, unstable: bool = False) -> dict[str, Any]:
         error = float(np.max(np.abs(y - truth))) / problem.amplitude_m()
-        return {"method": method, "setting": setting, "error": error, "steps": steps, "time_s": seconds}
+        facts = {"method": method, "setting": setting, "error": error, "steps": steps, "time_s": seconds}
+        return {**facts, "unstable": unstable}
 
     for integrator in integrators():
         if integrator.refusal(problem) or (long and isinstance(integrator, SolveIvp)):
@@ -223,7 +224,9 @@ def measure_integrators(problem: Problem, spacing_s: float, count: int) -> Itera
                 solved = solver.run(problem, spacing_s / parts, count * parts, every=parts)
             except DynamicsError:
                 continue  # it diverges at this step
-            yield row(integrator.name, setting, solved.y, count * parts, time.perf_counter() - start)
+            spent_s = time.perf_counter() - start
+            unstable = bool(integrator.order) and spacing_s / parts > integrator.stable_step(problem)
+            yield row(integrator.name, setting, solved.y, count * parts, spent_s, unstable=unstable)
     for tolerance in TOLERANCES:
         start = time.perf_counter()
         try:

@@ -11,39 +11,39 @@ from springmass.commands.options import File, argument, converted, option
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
 
 TEMPLATE = """\
-# What was at the bench. Every value may be left out (#): what is not known is not used.
-# { value = ..., u = ... } states a standard uncertainty; a plain number counts as exact.
+# What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
+# { value = ..., u = ... } states a standard uncertainty; a plain number counts as exact. What is not known is not used.
 
 [bob]
-mass_kg = { value = 0.2000, u = 0.0001 }    # all that hangs on the spring, disc included
+# mass_kg = { value = ..., u = ... }        # kg, such as 0.2007 and 0.0001: all that hangs on the spring, disc included
 
 [spring]
-mass_kg = { value = 0.0100, u = 0.0005 }    # a third of it swings along
-# constant_n_per_m = 14.0                   # for springmass simulate; an analysis measures it
+# mass_kg = { value = ..., u = ... }        # kg, such as 0.0104 and 0.0001: a third of it swings along
+# constant_n_per_m = ...                    # for springmass simulate; an analysis measures it
 
-# [pendulum]
-# length_m = { value = 1.000, u = 0.001 }   # from the pivot to the middle of the bob: its angle gives g
+[pendulum]
+# length_m = { value = ..., u = ... }       # m, from the pivot to the middle of the bob: its angle gives g
 
-# [disc]
-# diameter_m = { value = 0.102, u = 0.0005 }
+[disc]
+# diameter_m = { value = ..., u = ... }     # m, such as 0.102 and 0.0005
 
 [air]
-temperature_c = { value = 20.0, u = 1.0 }   # sets the speed of sound: the scale of all distances
-# pressure_pa = 101325
-# relative_humidity = 0.5
+# temperature_c = { value = ..., u = ... }  # degrees C: it sets the speed of sound, the scale of a rangefinder
+# pressure_pa = ...                         # 101325 if it is not stated
+# relative_humidity = ...                   # 0 to 1, 0.5 if it is not stated
 
 [sensor]
-position = "below"                          # or "above" the bob
-# mean_samples = 8                          # it gives the mean of its last 8 distances
-# lag_s = { value = 0.05, u = 0.005 }       # or follows with a first-order lag
+# position = "below"                        # of a rangefinder: "below" or "above" the bob
+# mean_samples = ...                        # it gives the mean of its last so many distances
+# lag_s = { value = ..., u = ... }          # s, or it follows with a first-order lag
 
-# For springmass simulate and record --simulate:
+# For springmass simulate and record --simulate; an analysis measures these:
 # [start]
-# displacement_m = 0.05
+# displacement_m = ...                      # m, such as 0.05
 # [damping]                                 # dA/dt = -(mu + gamma A + beta A^2)
-# gamma_per_s = 0.0073
-# beta_per_m_s = 0.235
-# mu_m_per_s = 0.0
+# gamma_per_s = ...                         # such as 0.0073
+# beta_per_m_s = ...                        # such as 0.235
+# mu_m_per_s = ...
 """
 
 
@@ -73,6 +73,7 @@ def scene(
     ] = (),
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
+    from pipeline.bench.scene import Scene
     from springmass.runs.about import about_of, write_about
     from springmass.runs.scenes import ask_about, read_scene, stated_keys
 
@@ -83,6 +84,9 @@ def scene(
         checked = read_scene(check)
         ask_about(checked, check)
         print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
+        if checked == Scene():
+            suggest(f"write what you measured into {check}, and remove the # before it")
+            return OK
         suggest(f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
         return OK
     if recording is None:

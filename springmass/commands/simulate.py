@@ -28,6 +28,7 @@ from springmass.runs.simulating.simulation import (
     count_of,
     default_tolerance,
     demand_stable,
+    prediction,
     prepare,
     simulated,
     summary,
@@ -153,7 +154,9 @@ def _after(simulation: Simulation, count: int) -> str:
     lines, steps = [f"method           {solution.integrator.words}"], f"{count} states"
     if solution.integrator.order:
         steps = f"{solution.parts * count} steps"
-        lines.append(f"step             {solution.step_s:.6g} s, {steps}")
+        limit = solution.integrator.stable_step(solution.problem)
+        stability = f", unstable: the limit is {limit:.3g} s" if solution.step_s > limit else ""
+        lines.append(f"step             {solution.step_s:.6g} s, {steps}{stability}")
     if solution.error is None or solution.velocity_error is None:
         lines.append(wrapped(f"predicted error  none: {solution.no_estimate}", " " * 17))
     else:
@@ -161,7 +164,19 @@ def _after(simulation: Simulation, count: int) -> str:
     if check is not None:
         lines.append(f"measured error   {_errors(check.error, check.velocity_error)}, against {check.words}")
     took = f"{simulation.choosing_s * 1e3:.2g} ms to choose, {solution.running_s * 1e3:.2g} ms to run"
-    return "\n".join([*lines, f"price            {took}, {steps}"])
+    return "\n".join([*lines, f"price            {took}, {steps}", f"prediction       {_predicted(simulation)}"])
+
+
+def _predicted(simulation: Simulation) -> str:
+    """Return the motion in the quantities of Table 1."""
+    found, seconds = prediction(simulation), float(simulation.trajectory.t[-1])
+    if found is None:
+        return "none: this start and drag give no oscillation"
+    quality = "" if found["quality_factor"] is None else f", Q = {found['quality_factor']:.4g}"
+    return (
+        f"T = {found['period_s']:.6g} s, lambda = {found['damping_rate_per_s']:.4g} 1/s{quality} at A0 = "
+        f"{found['amplitude_m']:.4g} m; A = {found['last_amplitude_m']:.4g} m after {seconds:.4g} s"
+    )
 
 
 def _errors(position: float, velocity: float) -> str:

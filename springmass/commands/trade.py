@@ -68,7 +68,7 @@ def trade(
     if not solved:
         print(f"no integrator solves the law {motion.law.name}; name another with --law")
         return OK
-    cells = [[r["method"], r["setting"], f"{r['error']:.1e}", str(r["steps"]), _ms(r)] for r in solved]
+    cells = [[r["method"], _setting(r), f"{r['error']:.1e}", str(r["steps"]), _ms(r)] for r in solved]
     print(_table(["integrator", "setting", "error / amplitude", "steps", "time / ms"], cells))
     return OK
 
@@ -77,6 +77,10 @@ def _tier(row: Mapping[str, Any]) -> list[str]:
     found = row["error_over_bound"]
     errors = [f"{found[each]:.3g}" if each in found else "-" for each in QUANTITIES]
     return [row["record"], row["tier"], *errors, _ms(row), str(row["failed"] or "-")]
+
+
+def _setting(row: Mapping[str, Any]) -> str:
+    return f"{row['setting']}{', unstable' if row['unstable'] else ''}"
 
 
 def _ms(row: Mapping[str, Any]) -> str:

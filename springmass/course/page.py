@@ -28,6 +28,7 @@ SHOWN = {
     "spring_constant": "k / (N/m)",
     "amplitude": "A₀",
     "damping_rate": "λ / (1/s)",
+    "disc_damping_rate": "λ of the disc, predicted",
     "drag_coefficient": "C_d",
 }
 """Estimates with a column, and its heading; amplitudes have the unit of their run."""
@@ -141,6 +142,8 @@ def write_groups(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequenc
 def _cell(row: Mapping[str, Any], name: str) -> tuple[str, str] | None:
     """Return an estimate's text, and its value as the sort key."""
     value, u = row.get(name), row.get(f"{name}_u")
+    if value is not None and name == "disc_damping_rate":
+        return f"{value:.2g}", repr(value)
     if value is None or u is None:
         return None
     return repr(Estimate(value, u, row["unit"] if name == "amplitude" else "")), repr(value)

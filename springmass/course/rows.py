@@ -24,7 +24,7 @@ QUALITY = (
 )  # fmt: skip
 WHOLE = ("samples", *QUALITY, "errors", "warnings")
 NUMBERS = (
-    "rate_hz", "duration_s", "u_clock", "reduced_chi2",
+    "rate_hz", "duration_s", "u_clock", "reduced_chi2", "disc_damping_rate",
     *(name for pair in ((x, f"{x}_u") for x in (*ESTIMATES, *PLACES)) for name in pair),
 )  # fmt: skip
 DETAILS = ("findings", "messages", "correlations", "drag_points")

@@ -135,6 +135,9 @@ def _damping(analysis: Analysis) -> dict[str, Any]:
         "reduced_chi2": _number(damping.best.reduced_chi2),
         "correlations": _json({"names": list(derived.joint.names), "matrix": matrix}),
         "drag_points": _json(drag_points(analysis)),
+        "disc_damping_rate": next(
+            (_number(x.predicted) for x in analysis.effects if x.name == "disc_drag" and x.predicted is not None), None
+        ),
     }
     try:
         spring = SpringRun.of("", derived, clock=analysis.track.clock)

@@ -150,7 +150,9 @@ def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
             for row in table_rows([run.analysis for run in some], missing=True)
         ]
         trust = trust_of(some[0].analysis) if len(runs) == 1 else {}
-        yield {"names": [run.name for run in some], "rows": rows, "trust": trust}
+        sound = bool(trust) and all(one.grade == "sound" for one in trust.values())
+        names = [run.name for run in some]
+        yield {"names": names, "rows": rows, "trust": {} if sound else trust, "all_sound": sound}
 
 
 def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, stem: str) -> dict[str, Any]:

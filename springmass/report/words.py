@@ -93,9 +93,14 @@ def damping_sentence(analysis: Analysis) -> str:
     others, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
     if not others:
         return f"{text}; no other law was tried."
+    if others == 1:
+        return f"{text}; the other law is {'rejected' if rejected else 'unlikely'}."
     if rejected == others:
         return f"{text}; the recording rejects all {others} other laws."
-    return f"{text}; of {others} other laws {rejected} are rejected and {others - rejected} unlikely."
+    if not rejected:
+        return f"{text}; all {others} other laws are unlikely."
+    ruled_out = f"{rejected} {'is' if rejected == 1 else 'are'} rejected and {others - rejected} unlikely"
+    return f"{text}; of {others} other laws {ruled_out}."
 
 
 def listed(words: Sequence[str]) -> str:

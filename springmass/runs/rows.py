@@ -56,6 +56,11 @@ class TableRow:
         """The estimates as printed, with two digits of u."""
         return tuple(NOTHING if x is None else str(x) for x in self.estimates)
 
+    @property
+    def on_screen(self) -> str:
+        """The symbol in Unicode where an index cannot be set lower, as in T_s."""
+        return self.page_symbol.replace(" ", "_")
+
 
 def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     """Return the contents of Table 1 for a run: estimates and coefficients, each with its law."""

@@ -167,7 +167,7 @@ class Run(Mapping[str, Value]):
             return Value.of(everything[name])
         for row in self.rows:
             (estimate,) = row.estimates
-            if estimate is not None and name in (row.symbol, row.page_symbol.replace(" ", "_")):
+            if estimate is not None and name in (row.symbol, row.on_screen):
                 return Value.of(estimate)
         law, _, parameter = name.partition(".")
         if isinstance(motion, Oscillation) and law in motion.damping.fits:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -55,12 +56,17 @@ def read_tables(path: str | Path) -> dict[str, Any]:
             "name the scene, not the recording",
             USAGE,
         )
+    text = ""
     try:
         # On Windows, PowerShell 5 writes `springmass scene > bench.toml` in UTF-16, and editors add a byte order mark.
         utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-        return tomllib.loads(content.decode("utf-16" if utf16 else "utf-8-sig"))
+        text = content.decode("utf-16" if utf16 else "utf-8-sig")
+        return tomllib.loads(text)
     # An integer of thousands of digits raises a plain ValueError; thousands of nested brackets, a RecursionError.
     except (ValueError, RecursionError) as error:
+        if unfilled := re.search(r"^\s*(\w+)\s*=[^#\n]*\.\.\.", text, re.MULTILINE):
+            demand = f"{unfilled[1]} has no number yet; put yours for the dots, or # before the line"
+            raise ProgramError(f"{path}: {demand}", USAGE) from error
         reason = " ".join(str(error).split())
         demand = f"not a TOML file ({reason}); see the scene file in the reference"
         raise ProgramError(f"{path}: {demand}", USAGE) from error

@@ -32,7 +32,7 @@ def text_table(
     ['period', '0.000022']
     """
     rows = table_rows(runs, missing=True)
-    symbols = [row.page_symbol.replace(" ", "") if style.unicode else row.symbol for row in rows]
+    symbols = [row.on_screen if style.unicode else row.symbol for row in rows]
     left = max([len("quantity"), *(len(row.quantity) for row in rows)])
     room = style.width - max([len("symbol"), *map(len, symbols)]) - 4
     for form in (shown, concise) if len(names) > 1 else (shown,):

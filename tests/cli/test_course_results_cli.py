@@ -72,6 +72,17 @@ def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return top / "out"
 
 
+def test_the_drag_of_the_disc_stands_beside_the_damping(course):
+    """A prediction by diameter and air is the same for both discs, and of the size of what was measured."""
+    with (course / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    predicted = {disc: [float(row["disc_damping_rate"]) for row in rows if row["disc"] == disc] for disc in DRAG}
+    assert predicted["thin"] == pytest.approx(predicted["thick"], rel=0.05)
+    assert all(0.3 < float(row["damping_rate"]) / float(row["disc_damping_rate"]) < 3.0 for row in rows)
+    page = (course / "index.html").read_text(encoding="utf-8")
+    assert all(f">{float(row['disc_damping_rate']):.2g}</td>" in page for row in rows)
+
+
 def test_planted_faults_are_named_and_the_mean_is_of_the_others(faulty, cli):
     """Exchanged masses are named as pairs, within a bench and between two; a mass in grams by itself."""
     compared = json.loads(cli("compare", faulty, "--json").out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from springmass.runs.scenes import read_scene
+from pipeline.bench.scene import Scene
+from springmass.runs.scenes import read_scene, stated_keys
 
 Cli = Callable[..., Any]
 
@@ -26,25 +28,27 @@ def run(tmp_path: Path, data: Path) -> Path:
 def test_a_scene_may_have_the_encoding_of_a_shell_or_editor(cli: Cli, tmp_path: Path, encoding: str) -> None:
     """PowerShell 5 saves the template in UTF-16; some editors begin UTF-8 with a byte order mark."""
     path = tmp_path / "bench.toml"
-    path.write_text(cli("scene").out, encoding=encoding)
+    path.write_text(cli("scene").out.replace("[spring]", "[spring]\nmass_kg = 0.01"), encoding=encoding)
     assert read_scene(path).spring_mass_kg is not None
 
 
-def test_the_template_is_a_scene_and_passes_its_check(cli: Cli, tmp_path: Path) -> None:
-    """What is printed is read without a question, with its comments taken out as well."""
-    text = cli("scene").out
-    path = tmp_path / "bench.toml"
+def test_the_template_states_nothing_until_it_is_filled_in(cli: Cli, tmp_path: Path, run: Path) -> None:
+    """Unedited it is no measurement, and no rangefinder; a key without a number of one's own is named and refused."""
+    text, path = cli("scene").out, tmp_path / "bench.toml"
     path.write_text(text)
     done = cli("scene", "--check", path)
     assert (done.code, done.err) == (0, "")
-    whole = [
-        line.removeprefix("# ")
-        for line in text.splitlines()
-        if line.startswith(("[", "# [")) or " = " in line.partition("{")[0]
-    ]
-    path.write_text("\n".join(whole))
-    done = cli("scene", "--check", path)
-    assert (done.code, done.err) == (0, "")
+    assert read_scene(path) == Scene()
+    path.write_text(text.replace("# diameter_m", "diameter_m"))
+    refused = cli("analyse", run, "--scene", path, "--no-report")
+    assert refused.code == 2
+    assert "diameter_m" in refused.complaint
+    filled = re.sub(r"^# (\w+ = |\[)", r"\1", text, flags=re.MULTILINE).replace(
+        "pressure_pa = ...", "pressure_pa = 1e5"
+    )
+    path.write_text(filled.replace("{ value = ..., u = ... }", "0.2").replace("= ...", "= 1"))
+    assert cli("scene", "--check", path).code == 0
+    assert len(stated_keys(read_scene(path)).split(", ")) == len(re.findall(r"^# \w+ = ", text, re.MULTILINE))
 
 
 def test_a_check_asks_about_values_and_refuses_what_cannot_be(cli: Cli, tmp_path: Path) -> None:

@@ -56,6 +56,30 @@ def test_a_linear_scene_is_solved_exactly(cli: Callable, tmp_path: Path) -> None
     assert found["equation"]["angular_frequency_per_s"] == 10.0
 
 
+@pytest.mark.parametrize(
+    ("damping", "rate", "last"),
+    [
+        ("gamma_per_s = 0.05", 0.05, 0.05 * np.exp(-1.0)),
+        ("beta_per_m_s = 1.0", 0.05, 0.05 / 2.0),
+        ("mu_m_per_s = 0.001", 0.02, 0.03),
+    ],
+)
+def test_the_prediction_is_told_in_the_quantities_of_table_1(
+    cli: Callable, tmp_path: Path, damping: str, rate: float, last: float
+) -> None:
+    """Period, damping rate and Q at the start, and the amplitude at the end as its law says; printed and in JSON."""
+    path = tmp_path / "bench.toml"
+    path.write_text(f"{LINEAR}[damping]\n{damping}\n")
+    done = cli("simulate", "--scene", path, "--seconds", "20", "--folder", tmp_path)
+    (found,) = cli("simulate", "--scene", path, "--seconds", "20", "--json").results
+    predicted = found["prediction"]
+    assert predicted["period_s"] == pytest.approx(0.2 * np.pi, rel=1e-4)
+    assert predicted["damping_rate_per_s"] == pytest.approx(rate)
+    assert predicted["quality_factor"] == pytest.approx(10.0 / (2.0 * rate))
+    assert predicted["last_amplitude_m"] == pytest.approx(last, rel=0.01)
+    assert f"A = {predicted['last_amplitude_m']:.4g} m after 20 s" in done.out
+
+
 def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Callable, scene: Path, tmp_path: Path) -> None:
     """A run file of kind simulated, which nothing overwrites unasked."""
     run = tmp_path / "run.h5"

@@ -25,6 +25,10 @@ def test_a_terminal_gets_one_page_that_fits(data: Path, tmp_path: Path) -> None:
     assert "52.006 ± 0.0" in terminal.screen.text
     assert "s⁻¹" in terminal.screen.text
     assert "+-" not in terminal.screen.text
+    table, _, sound = terminal.screen.text.partition("Sound: ")
+    symbols = sound.partition(".")[0].replace("\n", " ").split(", ")
+    assert len(symbols) > 12
+    assert all(f" {symbol} " in table for symbol in symbols)
 
 
 def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(data: Path, tmp_path: Path) -> None:

@@ -41,6 +41,8 @@ def test_a_scene_has_its_own_trade(cli: Cli, tmp_path: Path) -> None:
     done = cli("-q", "trade", "--scene", scene, "--seeds", "1", "--seconds", "8")
     assert (done.code, done.err) == (0, "")
     assert all(word in done.out for word in (*TIERS, "strang", "dop853", "rk4", "20 % false echoes"))
+    unstable = {line.split()[0] for line in done.out.splitlines() if "unstable" in line}
+    assert unstable == {"forward-euler"}  # which grows at any step without damping
 
 
 @pytest.mark.parametrize("arguments", [("--seeds", "0"), ("--seconds", "-1"), ("--seconds", "1")])

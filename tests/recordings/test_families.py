@@ -47,6 +47,7 @@ STATED = frozenset({"nominal_clock", "stated_error_is_not_noise"})
 SUMMED = frozenset({"nominal_clock", "offset_unknown"})
 GRID = frozenset({"nominal_clock"})
 FORCED = GRID | {"unit_assumed"}
+UNTIMED = GRID | {"time_unit_assumed"}
 GIVEN = GRID | {"unit_given"}
 
 TABLE = [
@@ -74,7 +75,7 @@ TABLE = [
         (20.688, 21.101),
         traps=STATED,
     ),
-    Row(FILO, "capstone", 11886, 100, (1.0, 119.85), (0.4788, 0.4182), "", "position", traps=FORCED | GIVEN),
+    Row(FILO, "capstone", 11886, 100, (1.0, 119.85), (0.4788, 0.4182), "", "position", traps=UNTIMED | GIVEN),
     Row(
         FILO,
         "capstone",
@@ -84,7 +85,7 @@ TABLE = [
         (0.29, np.nan),
         "",
         "velocity",
-        traps=FORCED | GIVEN | {"missing_samples"},
+        traps=UNTIMED | GIVEN | {"missing_samples"},
     ),
     Row(
         MATTIA,
@@ -126,8 +127,8 @@ TABLE = [
         clock="device",
         traps=frozenset({"jittered_time", "unit_assumed"}),
     ),
-    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (36.81932105, 9.153431271), "", "x", traps=FORCED | GIVEN),
-    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (-3.838981342, -36.50951911), "", "y", traps=FORCED | GIVEN),
+    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (36.81932105, 9.153431271), "", "x", traps=UNTIMED | GIVEN),
+    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (-3.838981342, -36.50951911), "", "y", traps=UNTIMED | GIVEN),
     Row(
         SHM,
         "lvm",

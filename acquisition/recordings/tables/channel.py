@@ -100,7 +100,7 @@ def read_samples(
     """Return the samples in the rows of a channel."""
     timing, found = find_timing(path, rows, table.formula, rate_hz)
     if table.formula is None and table.times is not None and not table.times.unit:
-        found.append(Trap("unit_assumed", "the times have no unit: read as seconds"))
+        found.append(Trap("time_unit_assumed", "the times have no unit: read as seconds"))
     found.extend(clock_traps(timing))
     unread, t = rows.unread, place(rows, timing)
     timed = np.isfinite(t)

@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.bench.derived_drag import DerivedDrag, derive_drag, needs_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Integrator, Problem, Trajectory, get_integrator
-from pipeline.dynamics.band import Band, spread, uncertain
+from pipeline.dynamics.band import STRONGEST, Band, spread, uncertain
 from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
 from pipeline.dynamics.solve_ivp import DOP853
 from pipeline.dynamics.strang import STRANG
@@ -269,6 +269,36 @@ def _euler(problem: Problem, exact: Trajectory, name: str) -> Trajectory:
             count //= 2
 
 
+def prediction(found: Simulation) -> dict[str, float | None] | None:
+    """Return what Table 1 gives of a measured run: at the start, and the amplitude at the end; None without swings.
+
+    :math:`\\lambda = \\gamma + \\beta A + \\mu/A`, :math:`Q = \\omega_0/2\\lambda`, and the phase turns by
+    :math:`\\sqrt{\\omega_0^2-\\gamma^2} + 3cA^2/8\\omega_0`. The last amplitude is that of the last state.
+    """
+    eq, start = found.problem.equation, found.problem.amplitude_m()
+    omega, (gamma, beta, mu) = eq.angular_frequency_per_s, eq.laws()
+    if not start or not (rate := gamma + beta * start + mu / start) < STRONGEST * omega:
+        return None
+    return {
+        "period_s": 2.0 * math.pi / (math.sqrt(omega**2 - gamma**2) + 0.375 * eq.cubic_per_m2_s2 * start**2 / omega),
+        "damping_rate_per_s": rate,
+        "quality_factor": 0.5 * omega / rate if rate else None,
+        "amplitude_m": start,
+        "last_amplitude_m": _last_amplitude(found),
+    }
+
+
+def _last_amplitude(found: Simulation) -> float:
+    """Return the amplitude of the last state, for which drag tilts the ellipse of states and friction shifts it."""
+    eq, y, v = found.problem.equation, float(found.trajectory.y[-1]), float(found.trajectory.v[-1])
+    omega, (gamma, beta, _) = eq.angular_frequency_per_s, eq.laws()
+    y += math.copysign(eq.friction_m_per_s2, v) / omega**2 if v else 0.0
+    rate = min(gamma + beta * math.hypot(y, v / omega), STRONGEST * omega)
+    hard = 0.5 * eq.cubic_per_m2_s2 / omega**2
+    square = y**2 + (v + rate * y) ** 2 / (omega**2 - rate**2) + hard * y**4
+    return math.sqrt(2.0 * square / (1.0 + math.sqrt(max(1.0 + 4.0 * hard * square, 0.0))))
+
+
 def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | None, band: Band | None) -> dict[str, Any]:
     """Return a simulation as the JSON of ``springmass simulate``, compared with no run."""
     solution, check = found.solution, found.check
@@ -290,6 +320,7 @@ def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | Non
         "choosing_s": found.choosing_s,
         "running_s": solution.running_s,
         "amplitude_m": found.problem.amplitude_m(),
+        "prediction": prediction(found),
         "equation": {name: getattr(found.problem.equation, name) for name in found.problem.equation.__slots__},
         "terms": [{key: getattr(term, key) for key in ("name", "size", "included", "why")} for term in solution.terms],
         "effects": [

@@ -60,7 +60,7 @@ def test_the_unit_of_bare_numbers_is_never_guessed(tmp_path: Path, text: str) ->
         open_recording(path)
     assert caught.value.question.examples == {"unit": "m"}
     recording = open_recording(path, unit="cm")
-    assert {"unit_assumed", "nominal_clock"} <= {trap.code for trap in recording.traps}
+    assert {"time_unit_assumed", "nominal_clock"} <= {trap.code for trap in recording.traps}
     assert recording.info.rate_hz == 10.0
 
 
