@@ -220,7 +220,8 @@ def _compared(compared: Compared) -> dict[str, Any]:
     return {
         "found": found,
         "message": typeset(found.message),
-        "findings": [picked(x, ("code", "severity", "advice")) for x in compared.findings],
+        "findings": [picked(x, ("code", "severity", "message", "advice", "details")) for x in compared.findings],
+        "reported": compared.reported,
         "rows": list(zip(itertools.count(1), found.names, found.each, found.pulls, strict=False)),
         "joint": [laws_across(joint) for joint in compared.joint],
     }

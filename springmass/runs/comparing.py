@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.damping.joint import JointDamping, JointFit, join
 from pipeline.errors import AnalysisError
-from pipeline.findings.finding import Finding, word
+from pipeline.findings.finding import Finding, by_severity, word
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.found import Found
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
@@ -18,6 +19,7 @@ from pipeline.results.derive import limited
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.frames import comparison_frame
 from springmass.runs.json_results import SCHEMA, parameters_json, picked, plain
+from springmass.runs.reported import Reported, judge, read_reported
 from springmass.runs.run import Run
 
 if TYPE_CHECKING:
@@ -37,12 +39,15 @@ class Compared:
     findings : tuple of Finding
         The most severe first.
     runs : mapping of str to Run
+    reported : tuple of Reported
+        Values that somebody printed, each with its verdict.
     """
 
     comparison: Comparison
     joint: tuple[JointDamping, ...]
     findings: tuple[Finding, ...]
     runs: Mapping[str, Run]
+    reported: tuple[Reported, ...] = ()
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row per run, and a row "together" for their mean."""
@@ -71,10 +76,13 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
             )
 
 
-def compare_runs(runs: Sequence[Run], *, mass_correlation: float = 0.0) -> Compared:
+def compare_runs(
+    runs: Sequence[Run], *, mass_correlation: float = 0.0, reported: str | os.PathLike[str] | None = None
+) -> Compared:
     """Compare two or more runs of one spring; raise AnalysisError if one does not oscillate.
 
-    ``mass_correlation`` is the correlation coefficient between the errors of two bobs' masses, 0 to 1.
+    ``mass_correlation`` is the correlation coefficient between the errors of two bobs' masses, 0 to 1. ``reported``
+    is a table of printed values to judge.
     """
     demand_one_spring([(run.name, run.scene) for run in runs])
     motions = [(run.name, _moving(run)) for run in runs]
@@ -90,7 +98,9 @@ def compare_runs(runs: Sequence[Run], *, mass_correlation: float = 0.0) -> Compa
         join([(name, m.damping, float(m.demodulated.t[-1]) - m.damping.t0) for name, m in group])
         for group in _of_one_bob(motions, [run.scene for run in runs])
     )
-    return Compared(comparison, joint, tuple(_findings(comparison, joint)), {run.name: run for run in runs})
+    judged, mistakes = judge(read_reported(reported, runs), runs) if reported is not None else ((), ())
+    findings = by_severity([*_findings(comparison, joint), *mistakes])
+    return Compared(comparison, joint, findings, {run.name: run for run in runs}, judged)
 
 
 def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -128,6 +138,7 @@ def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[s
             for joint in compared.joint
         ],
         "findings": compared.findings,
+        **({"reported": compared.reported} if compared.reported else {}),
         "runs": [run.result for run in runs],
         "provenance": provenance,
     }
