@@ -125,7 +125,7 @@ def judge(rows: Sequence[Reported], runs: Sequence[Run]) -> tuple[tuple[Reported
             found.append(wrong)
         found += [small] if small else []
         if small:
-            also = "its u is too small"
+            also = f"its u is {small.numbers['times']} times too small"
             verdict = also if verdict == "agrees" else f"{verdict}; {also}"
         judged.append(
             Reported(
