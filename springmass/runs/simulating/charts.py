@@ -67,8 +67,9 @@ def _both(
         lines = (Series(words, x, y, "other" if measured else "data", True), line_of(runs.words, beside_x, beside_y))
         grows = log and float(np.min(y)) > 0.0 and float(np.max(y)) > 20.0 * float(np.max(beside_y))
         height, x_label = (3.6, "displacement y / mm") if equal else (2.4, "time / s")
-        panel = Panel(f"{words}: {label}", lines, height, x_label, log=log and bool(grows), equal=equal)
         # Beside points an axis would not show all of a line that leaves them.
+        every = (*(replace(each, line=True) for each in measured), *lines)
+        panel = Panel(f"{words}: {label}", every, height, x_label, log=log and bool(grows), equal=equal)
         panels.append(replace(panel, series=(*measured, *lines), range=panel.reach()) if measured else panel)
     return tuple(panels)
 
