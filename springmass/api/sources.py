@@ -134,6 +134,7 @@ def compare(
     *,
     mass_correlation: float = 0.0,
     reported: Path | None = None,
+    hooke: Path | None = None,
     **how: Unpack[Analysing],
 ) -> Compared:
     """Test whether runs agree on one spring constant, and whether one damping law fits all runs of one bob.
@@ -148,6 +149,8 @@ def compare(
         Correlation between the errors of two bobs' masses, 0 to 1.
     reported : path, optional
         A table with the columns run, name, value, u and unit: printed values whose mistakes are among the findings.
+    hooke : path, optional
+        A table of masses and rest positions, for a spring constant by Hooke's law.
     **how
         Keyword arguments of :func:`analyse`.
 
@@ -155,7 +158,7 @@ def compare(
     ------
     springmass.Error
         If fewer than two runs are given, one does not oscillate, a scene gives no bob mass, the scenes state
-        different springs, or the table cannot be read.
+        different springs, or a table cannot be read.
     """
     if len(sources) < 2:
         raise AnalysisError(f"compare needs two runs at least, got {len(sources)}")
@@ -168,4 +171,4 @@ def compare(
     ]
     names = distinct_names([run.name or "run" for run in each])
     named = [run.named(name) for run, name in zip(each, names, strict=True)]
-    return compare_runs(named, mass_correlation=mass_correlation, reported=reported)
+    return compare_runs(named, mass_correlation=mass_correlation, reported=reported, static=hooke)
