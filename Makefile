@@ -77,6 +77,7 @@ docs: $(VENV)/.installed-dev
 # The screenshots need chromium; Debian: apt-get install chromium.
 docs-figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/figures/draw.py
+	$(BIN)/python docs/figures/gallery.py
 	$(BIN)/python docs/figures/wiring.py
 	$(BIN)/python docs/figures/screenshots.py
 

@@ -133,6 +133,8 @@ def compare(
     scene: AnyScene | Sequence[AnyScene | None] | None = None,
     *,
     mass_correlation: float = 0.0,
+    reported: Path | None = None,
+    hooke: Path | None = None,
     **how: Unpack[Analysing],
 ) -> Compared:
     """Test whether runs agree on one spring constant, and whether one damping law fits all runs of one bob.
@@ -145,14 +147,18 @@ def compare(
         As for :func:`analyse`: one for all runs, or a list with one for each; default: each run's own scene.
     mass_correlation : float
         Correlation between the errors of two bobs' masses, 0 to 1.
+    reported : path, optional
+        A table with the columns run, name, value, u and unit: printed values whose mistakes are among the findings.
+    hooke : path, optional
+        A table of masses and rest positions, for a spring constant by Hooke's law.
     **how
         Keyword arguments of :func:`analyse`.
 
     Raises
     ------
     springmass.Error
-        If fewer than two runs are given, one does not oscillate, a scene gives no bob mass, or the scenes state
-        different springs.
+        If fewer than two runs are given, one does not oscillate, a scene gives no bob mass, the scenes state
+        different springs, or a table cannot be read.
     """
     if len(sources) < 2:
         raise AnalysisError(f"compare needs two runs at least, got {len(sources)}")
@@ -164,6 +170,5 @@ def compare(
         for one, its in zip(sources, scenes, strict=True)
     ]
     names = distinct_names([run.name or "run" for run in each])
-    return compare_runs(
-        [run.named(name) for run, name in zip(each, names, strict=True)], mass_correlation=mass_correlation
-    )
+    named = [run.named(name) for run, name in zip(each, names, strict=True)]
+    return compare_runs(named, mass_correlation=mass_correlation, reported=reported, static=hooke)

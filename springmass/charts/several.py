@@ -10,8 +10,10 @@ from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.results.compare import Comparison
+from pipeline.results.masses import Hooke, MassLine
 from pipeline.track import UNUSABLE
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of, value_label
+from springmass.typeset import prefixed, pretty
 
 DETAIL_PERIODS = 8
 
@@ -63,6 +65,38 @@ def comparison(found: Comparison) -> Chart:
         "common to all runs (clock, mass of the spring) cancel."
     )
     return Chart("comparison", "Comparison", caption, panels)
+
+
+def masses(line: MassLine) -> Chart:
+    """Squared periods against the mass with their line, and what is left over its u, with the exact condition."""
+    order = np.argsort(line.mass_kg)
+    mass, squared, u, bend = (each[order] for each in (line.mass_kg, line.squared_s2, line.u, line.bend_s2))
+    start = min(-line.effective_mass.value, 0.0)
+    ends = np.array([start, 1.05 * float(mass[-1])])
+    fitted, zero = line_of("line", ends * 1e3, line.at(ends)), line_of("line", ends * 1e3, np.zeros(2))
+    exact = line_of("exact condition", mass * 1e3, bend / u, "other")
+    residual = (squared - line.at(mass)) / u
+    x_label = "mass on the spring / g"
+    panels = (
+        Panel("T² / s²", (fitted, Series("squared period ± u", mass * 1e3, squared, u=u)), x_label=x_label),
+        Panel("residual / u", (zero, exact, Series("residual", mass * 1e3, residual)), 1.4, x_label, zero=True),
+    )
+    zero_at = pretty(prefixed(line.effective_mass))
+    caption = (
+        f"Squared period of every bob. The line has the slope 4π²/k with k = {pretty(line.constant)}; the mass that it "
+        f"adds to the bob's, the effective mass of the spring, is {zero_at}. Below, the differences from the line, "
+        "and those of a spring along which waves run."
+    )
+    return Chart("masses", "Many masses", caption, panels)
+
+
+def static(found: Hooke) -> Chart:
+    """Rest positions against the mass, with the line of Hooke's law."""
+    order = np.argsort(found.mass_kg)
+    mass, position, line = (1e3 * each[order] for each in (found.mass_kg, found.position_m, found.line_m))
+    series = (line_of("line", mass, line), Series("rest position", mass, position))
+    caption = f"Rest position of every mass. The line has the slope g/k with k = {pretty(found.constant)}."
+    return Chart("hooke", "Hooke's law", caption, (Panel("position / mm", series, x_label="mass on the spring / g"),))
 
 
 def course(label: str, rows: Sequence[tuple[str, float, float]], differing: Mapping[str, str]) -> Chart:

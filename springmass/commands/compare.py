@@ -28,7 +28,7 @@ from springmass.commands.options import (
 from springmass.course.rows import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import Task, analysed, law_line
-from springmass.runs.comparing import Compared, compare_runs, comparison_json
+from springmass.runs.comparing import Compared, beside, compare_runs, comparison_json
 from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
 from springmass.runs.options import How
 from springmass.runs.outputs import distinct_names, make_folder, now_utc
@@ -49,6 +49,12 @@ class CompareOptions:
     mass_correlation: Annotated[
         Share, option("R", "correlation between the errors of two bobs' masses (default: 0)")
     ] = 0.0
+    reported: Annotated[
+        File | None, option("FILE", "table of printed values to judge: columns run, name, value, u, unit")
+    ] = None
+    hooke: Annotated[
+        File | None, option("FILE", "table of masses and rest positions: k by Hooke's law beside that of the runs")
+    ] = None
     output: Annotated[File | None, output("DIR", "folder for a report (default: write no report)")] = None
     figures: Figures = ()
     json: Json = False
@@ -76,7 +82,9 @@ def compare(
     out = None if options.output is None else make_folder(options.output)
     each = zip(inputs, distinct_names(inputs), scenes, strict=True)
     runs = analysed(Task(path, name, scene, how) for path, name, scene in each)
-    compared = compare_runs(runs, mass_correlation=options.mass_correlation)
+    compared = compare_runs(
+        runs, mass_correlation=options.mass_correlation, reported=options.reported, static=options.hooke
+    )
     parameters = {**how.parameters, "mass_correlation": options.mass_correlation}
     result = comparison_json(compared, provenance_of(how.accuracy, parameters, now_utc()))
     if options.json:
@@ -107,8 +115,10 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     from springmass.course.benches import compare_rows
     from springmass.terminal.printing import visible_lines
 
-    if options.output is not None or options.scene:
-        raise ProgramError("-o and --scene go with single runs; a course has its page and its scenes", USAGE)
+    if options.output is not None or options.scene or options.reported is not None or options.hooke is not None:
+        raise ProgramError(
+            "-o, --scene, --reported and --hooke go with single runs; a course has its page and its scenes", USAGE
+        )
     rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
     found = compare_rows(rows)
     print(
@@ -127,12 +137,15 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
 
 
 def _print_text(compared: Compared, runs: list[Run]) -> None:
-    from springmass.terminal.printing import comparison_text, findings_text, wrapped
+    from springmass.terminal.printing import comparison_text, findings_text, reported_text, wrapped
     from springmass.terminal.style import style_of
 
     print(comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout)))
-    for joint in compared.joint:
-        print(f"\n{wrapped(joint.message)}")
+    for message in (*beside(compared), *(joint.message for joint in compared.joint)):
+        print(f"\n{wrapped(message)}")
+    if compared.reported:
+        mistakes = [plain(f) for f in compared.findings if f.code.startswith("reported_")]
+        print(f"\n{reported_text(compared.reported, style_of(sys.stdout))}\n\n{findings_text(mistakes, full=True)}")
     for run in runs:
         grave = [f for f in run.result["findings"] if f["severity"] != "info"]
         if grave:

@@ -23,11 +23,13 @@ from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.simulation import (
+    Growth,
     Simulation,
     band_of,
     count_of,
     default_tolerance,
     demand_stable,
+    growths,
     prediction,
     prepare,
     simulated,
@@ -41,10 +43,14 @@ FAR_BELOW = 1e-3  # of the band; a smaller tolerance gives no benefit
 
 def simulate(
     *,
-    scene: Annotated[File, option("S.toml", "scene file: masses, spring, start, damping")],
+    scene: Annotated[
+        File | None, option("S.toml", "scene file: masses, spring, start, damping (default: that of RUN)")
+    ] = None,
     method: Annotated[str, option("NAME", "integrator, or auto (default: auto)")] = "auto",
     dt: Annotated[Positive, option("S", "sampling interval and step of the solver, s (default: 0.01)")] = 0.01,
-    seconds: Annotated[Positive, option("N", "length of the simulation, s (default: 10)")] = 10.0,
+    seconds: Annotated[
+        Positive | None, option("N", "length of the simulation, s (default: that of RUN, else 10)")
+    ] = None,
     tolerance: Annotated[
         Finite | None, option("E", "largest error relative to the amplitude (default: from the band)")
     ] = None,
@@ -65,16 +71,23 @@ def simulate(
     read: ReadOptions = ReadOptions(),
 ) -> int:
     """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
-    count, where, say = count_of(seconds, dt), str(scene), sys.stderr if as_json else sys.stdout
+    if scene is None and against is None:
+        raise ProgramError("simulate needs --scene S.toml, or --against RUN with a scene of its own", USAGE)
+    where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if output is not None and Path(output).exists() and not overwrite:
         raise ProgramError(f"{visible(str(output))}: exists; take another name, or --overwrite", USAGE)
-    stated, analysis, longest_s = read_scene(scene), None, seconds
-    ask_about(stated, scene)
+    stated, analysis, longest_s = None if scene is None else read_scene(scene), None, seconds or 10.0
+    if scene is not None and stated is not None:
+        ask_about(stated, scene)
     if against is not None:
         from springmass.runs.simulating.against import duration_s
 
-        analysis = Run.of(against, stated, How.of(read.given())).analysis
-        longest_s = max(seconds, duration_s(analysis))
+        run = Run.of(against, stated, How.of(read.given()))
+        stated, analysis = run.scene, run.analysis
+        longest_s = max(seconds or 0.0, duration_s(analysis))
+        seconds = seconds or longest_s
+    count = count_of(seconds or 10.0, dt)
+    assert stated is not None
     ready = prepare(stated, longest_s, analysis=analysis, where=where)
     if ready.from_run:
         tell(f"from {against}: {', '.join(ready.from_run)}")
@@ -87,11 +100,13 @@ def simulate(
     try:
         simulation = simulated(ready.problem, method, dt, count, wanted, check=check)
     except DynamicsError as error:
-        raise ProgramError(f"{scene}: {error}", USAGE) from error
+        raise ProgramError(f"{where}: {error}", USAGE) from error
     print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
     print(_before(_tolerance(wanted, band, given=tolerance is not None), effects), file=say)
     print(_after(simulation, count), file=say)
-    results, over = summary(simulation, effects, wanted, band), None
+    grown = growths(ready.problem, dt, count)
+    print("\n".join(_grown(each) for each in grown), file=say)
+    results, over = summary(simulation, effects, wanted, band) | {"growth": [each.summary() for each in grown]}, None
     if analysis is not None:
         from springmass.runs.simulating.against import deviation_text, lay_over
 
@@ -114,7 +129,8 @@ def simulate(
     elif output is not None:
         print(f"written          {visible(str(output))}", file=say)
     for path in written[:1]:
-        suggest(f"springmass analyse {shlex.quote(str(path))} --scene {shlex.quote(where)}")
+        of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
+        suggest(f"springmass analyse {shlex.quote(str(path))}{of_scene}")
     if as_json:
         print(json.dumps(results))
     return OK
@@ -176,6 +192,17 @@ def _predicted(simulation: Simulation) -> str:
     return (
         f"T = {found['period_s']:.6g} s, lambda = {found['damping_rate_per_s']:.4g} 1/s{quality} at A0 = "
         f"{found['amplitude_m']:.4g} m; A = {found['last_amplitude_m']:.4g} m after {seconds:.4g} s"
+    )
+
+
+def _grown(growth: Growth) -> str:
+    """Say what a step of a method does to the amplitude, and from which step on the method fails."""
+    measured = "" if growth.measured is None else f"; measured {growth.measured:.7f}"
+    law = f"sqrt(1 + (w h)^2) = {growth.predicted:.7f}" if growth.predicted > 1.0 else "1"
+    limit = f"with steps above {growth.fails_above_s:.3g} s" if growth.fails_above_s else "with any step, undamped,"
+    return (
+        f"{growth.words:<17}a step multiplies the amplitude by {law}{measured}\n"
+        f"                 {limit} small swings grow"
     )
 
 

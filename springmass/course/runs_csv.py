@@ -7,19 +7,19 @@ import io
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
 from pipeline.registry.laws import law_names
 from springmass.course.rows import RESERVED
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.inputs import InputFile
+from springmass.runs.table_lines import table_lines
 from springmass.values import ANY_LAW
 
 NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
@@ -32,7 +32,6 @@ TEMPLATE = (
     "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
     "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
 )  # fmt: skip
-LARGEST = 64 << 20  # maximum size of a table of runs, bytes
 Values = Mapping[str, Any]
 _UNIT = re.compile(r"_(kg|g|m|mm|cm|s|hz|c|pa|n_per_m|per_s)(_u)?$")
 _TAG = re.compile(r"[a-z][a-z0-9_]*")
@@ -78,7 +77,7 @@ def read_table(path: str | Path) -> RunsTable:
     Numbers may have a decimal comma unless commas separate the columns.
     """
     path = Path(path)
-    table = list(_lines(path))
+    table = list(table_lines(path, "table of runs"))
     if not table:
         raise ProgramError(f"{path}: expected a table of runs, got an empty file; see batch --template", USAGE)
     (_, head, comma), *lines = table
@@ -98,28 +97,6 @@ def read_table(path: str | Path) -> RunsTable:
         if texts:
             rows.append((line, texts["path"], _values(path.parent, where, texts, decimal_comma=comma)))
     return RunsTable(path, tags, tuple(rows))
-
-
-def _lines(path: Path) -> Iterator[tuple[int, list[str], bool]]:
-    """Yield line number, cells and whether numbers may have a decimal comma, for each row."""
-    try:
-        if path.stat().st_size > LARGEST:
-            raise ProgramError(f"{path}: a table of runs must be at most {LARGEST >> 20} MB", USAGE)
-        with open_regular_text(path, "utf-8-sig") as file:
-            text = file.read()
-    except OSError as error:
-        raise ProgramError(f"{path}: no table of runs can be read ({error.strerror}); check the name", USAGE) from error
-    except UnicodeDecodeError as error:
-        raise ProgramError(f"{path}: not in UTF-8; save the sheet as CSV UTF-8", USAGE) from error
-    first = text.partition("\n")[0]
-    mark = max(",;\t", key=first.count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark)
-    try:
-        for cells in reader:
-            if cells and not cells[0].lstrip().startswith("#"):
-                yield reader.line_num, cells, mark != ","
-    except csv.Error as error:
-        raise ProgramError(f"{path}, line {reader.line_num}: not a row of a table ({error})", USAGE) from error
 
 
 def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:

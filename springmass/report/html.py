@@ -22,7 +22,7 @@ from springmass.report.recorded import bench_words, calibration_of, date_words, 
 from springmass.report.summary import summary
 from springmass.report.trust import trust_of
 from springmass.report.words import method
-from springmass.runs.comparing import Compared
+from springmass.runs.comparing import Compared, beside
 from springmass.runs.json_results import picked
 from springmass.runs.laws import laws_across, laws_of
 from springmass.runs.rows import table_rows
@@ -221,8 +221,9 @@ def _compared(compared: Compared) -> dict[str, Any]:
     found = compared.comparison
     return {
         "found": found,
-        "message": typeset(found.message),
-        "findings": [picked(x, ("code", "severity", "advice")) for x in compared.findings],
+        "message": typeset(" ".join([found.message, *beside(compared)])),
+        "findings": [picked(x, ("code", "severity", "message", "advice", "details")) for x in compared.findings],
+        "reported": compared.reported,
         "rows": list(zip(itertools.count(1), found.names, found.each, found.pulls, strict=False)),
         "joint": [laws_across(joint) for joint in compared.joint],
     }

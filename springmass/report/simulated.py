@@ -54,7 +54,7 @@ def write_folder(
 
     name = Path(where).name.removesuffix(".toml").removesuffix(".scene")
     target = make_folder(out) / in_a_name(name, ".simulated")
-    charts, tables = list(charted.simulation(simulation, effective_mass_kg(scene))), {}
+    charts, tables = list(charted.simulation(simulation, effective_mass_kg(scene), against)), {}
     trajectory = simulation.trajectory
     if band is not None:
         charts.append(charted.band(simulation, band))

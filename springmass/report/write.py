@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 from springmass.charts.chart import Chart
 from springmass.charts.draw import Kind, save
 from springmass.charts.run import CHARTS, charts_of
-from springmass.charts.several import comparison, overlay
+from springmass.charts.several import comparison, masses, overlay, static
 from springmass.errors import detail
 from springmass.report.budgets import budget_csv
 from springmass.report.html import render_html
@@ -68,7 +68,11 @@ def write_report(
 def _names(stems: Sequence[str]) -> set[str]:
     """Return the names of all files that a report of these runs may contain, or one of 0.2.0."""
     charts = [f"{stem}{name}" for stem in stems for name in (*CHARTS, "classic", "logarithmic")]
-    figures = {f"figures/{name}.{kind}" for name in (*charts, "comparison", "overlay") for kind in get_args(Kind)}
+    figures = {
+        f"figures/{name}.{kind}"
+        for name in (*charts, "comparison", "overlay", "masses", "hooke")
+        for kind in get_args(Kind)
+    }
     return {
         PAGE,
         LAB_REPORT,
@@ -98,6 +102,10 @@ def _write(
         several["overlay"] = over
     if compared is not None:
         several["comparison"] = comparison(compared.comparison)
+        if compared.line is not None:
+            several["masses"] = masses(compared.line)
+        if compared.hooke is not None:
+            several["hooke"] = static(compared.hooke)
     pictures: dict[str, bytes] = {}
     if kinds:
         (folder / "figures").mkdir()

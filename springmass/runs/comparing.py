@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,14 +11,17 @@ from pipeline.analyse import Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.damping.joint import JointDamping, JointFit, join
 from pipeline.errors import AnalysisError
-from pipeline.findings.finding import Finding, word
+from pipeline.findings.finding import Finding, by_severity, word
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.found import Found
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.derive import limited
+from pipeline.results.masses import Hooke, MassLine, mass_line
 from springmass.errors import USAGE, ProgramError
 from springmass.runs.frames import comparison_frame
+from springmass.runs.hooke import read_hooke
 from springmass.runs.json_results import SCHEMA, parameters_json, picked, plain
+from springmass.runs.reported import Reported, judge, read_reported
 from springmass.runs.run import Run
 
 if TYPE_CHECKING:
@@ -37,12 +41,28 @@ class Compared:
     findings : tuple of Finding
         The most severe first.
     runs : mapping of str to Run
+    reported : tuple of Reported
+        Values that somebody printed, each with its verdict.
+    line : MassLine or None
+        Line through the squared periods of three or more bobs of different mass.
+    hooke : Hooke or None
+        The spring constant by Hooke's law.
     """
 
     comparison: Comparison
     joint: tuple[JointDamping, ...]
     findings: tuple[Finding, ...]
     runs: Mapping[str, Run]
+    reported: tuple[Reported, ...] = ()
+    line: MassLine | None = None
+    hooke: Hooke | None = None
+
+    @property
+    def normalised_error(self) -> float | None:
+        """E_n of Hooke's law and the oscillation, at most 1 if they agree; None if there is only one of them."""
+        if self.hooke is None or not self.comparison.agree:
+            return None
+        return self.hooke.normalised_error(self.comparison.spring_constant)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row per run, and a row "together" for their mean."""
@@ -71,18 +91,26 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
             )
 
 
-def compare_runs(runs: Sequence[Run], *, mass_correlation: float = 0.0) -> Compared:
+def compare_runs(
+    runs: Sequence[Run],
+    *,
+    mass_correlation: float = 0.0,
+    reported: str | os.PathLike[str] | None = None,
+    static: str | os.PathLike[str] | None = None,
+) -> Compared:
     """Compare two or more runs of one spring; raise AnalysisError if one does not oscillate.
 
-    ``mass_correlation`` is the correlation coefficient between the errors of two bobs' masses, 0 to 1.
+    ``mass_correlation`` is the correlation coefficient between the errors of two bobs' masses, 0 to 1. ``reported``
+    is a table of printed values to judge, ``static`` one of masses and positions.
     """
     demand_one_spring([(run.name, run.scene) for run in runs])
     motions = [(run.name, _moving(run)) for run in runs]
+    springs = [
+        SpringRun.of(name, motion.derived, clock=run.analysis.track.clock)
+        for (name, motion), run in zip(motions, runs, strict=True)
+    ]
     comparison = compare_springs(
-        [
-            SpringRun.of(name, motion.derived, clock=run.analysis.track.clock)
-            for (name, motion), run in zip(motions, runs, strict=True)
-        ],
+        springs,
         spring_mass_kg=runs[0].scene.spring_mass_kg,
         mass_correlation=mass_correlation,
     )
@@ -90,7 +118,29 @@ def compare_runs(runs: Sequence[Run], *, mass_correlation: float = 0.0) -> Compa
         join([(name, m.damping, float(m.demodulated.t[-1]) - m.damping.t0) for name, m in group])
         for group in _of_one_bob(motions, [run.scene for run in runs])
     )
-    return Compared(comparison, joint, tuple(_findings(comparison, joint)), {run.name: run for run in runs})
+    judged, mistakes = judge(read_reported(reported, runs), runs) if reported is not None else ((), ())
+    findings = by_severity([*_findings(comparison, joint), *mistakes])
+    line = mass_line(springs, mass_correlation)
+    hooke = read_hooke(static) if static is not None else None
+    return Compared(comparison, joint, findings, {run.name: run for run in runs}, judged, line, hooke)
+
+
+def beside(compared: Compared) -> list[str]:
+    """Return a sentence on the line through the squared periods, and one on Hooke's law."""
+    line, static = compared.line, compared.hooke
+    lines = []
+    if line is not None:
+        grams = Estimate(1e3 * line.effective_mass.value, 1e3 * line.effective_mass.u, "g")
+        lines.append(
+            f"T^2 against the mass is a line of slope 4 pi^2/k with k = {line.constant}; the effective "
+            f"mass of the spring, a third of its mass, is {grams}."
+        )
+    if static is not None:
+        text, error = f"Hooke's law: k = {static.constant} from {len(static.mass_kg)} masses", compared.normalised_error
+        if error is not None:
+            text += f"; E_n = {error:.2g}, it {'agrees' if error <= 1.0 else 'does not agree'} with the oscillation"
+        lines.append(f"{text}.")
+    return lines
 
 
 def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -128,10 +178,21 @@ def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[s
             for joint in compared.joint
         ],
         "findings": compared.findings,
+        **({"mass_line": _line_json(compared.line)} if compared.line is not None else {}),
+        **(
+            {"hooke": {"constant": compared.hooke.constant, "normalised_error": compared.normalised_error}}
+            if compared.hooke
+            else {}
+        ),
+        **({"reported": compared.reported} if compared.reported else {}),
         "runs": [run.result for run in runs],
         "provenance": provenance,
     }
     return {key: plain(value) for key, value in content.items()}
+
+
+def _line_json(line: MassLine) -> dict[str, Any]:
+    return picked(line, ("constant", "effective_mass", "chi2", "dof"))
 
 
 def _moving(run: Run) -> Oscillation:

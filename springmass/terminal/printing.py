@@ -12,6 +12,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
+from springmass.runs.reported import Reported
 from springmass.terminal.quantities import concise
 from springmass.terminal.style import PLAIN, TerminalStyle
 from springmass.terminal.table1 import aligned, readable, shortened
@@ -111,6 +112,15 @@ def comparison_text(comparison: Comparison, analyses: Sequence[Analysis], style:
         names = [shortened(name, max(room, 8)) for name in names]
     table = aligned([(name, *row) for name, row in zip(("run", *names, "together"), rows, strict=True)], close=close)
     return f"{table}\n\n{wrapped(comparison.message)}"
+
+
+def reported_text(rows: Sequence[Reported], style: TerminalStyle = PLAIN) -> str:
+    """Return printed values beside those of this analysis, with the verdict on each."""
+    lines = [("printed", "of", "value", "this analysis", "verdict")]
+    for row in rows:
+        found = "-" if row.found is None else concise(row.found, style)
+        lines.append((readable(row.name, style), readable(row.run, style), row.printed, found, row.verdict))
+    return aligned(lines)
 
 
 def wrapped(text: str, indent: str = "", columns: int = 100) -> str:

@@ -146,3 +146,58 @@ def test_an_unreadable_run_ends_the_comparison(capsys: pytest.CaptureFixture[str
     """A comparison of what is left would answer another question: exit code 3."""
     assert main(["compare", BARE, "nothing.txt", "--scene", BARE_SCENE]) == 3
     assert "nothing.txt" in capsys.readouterr().err
+
+
+def five_masses(folder: Path, hooke: str) -> list[str]:
+    """Write runs of five bobs on a spring of 14 N/m and 20 g, and a table; return the arguments that name them."""
+    arguments: list[str] = []
+    for grams in (120, 160, 200, 240, 280):
+        kg = 1e-3 * grams
+        omega = math.sqrt(14.0 / (kg + 0.02 / 3 + 0.02**2 / (45 * kg)))
+        run = written_run(folder / f"m{grams}.txt", omega=omega, beta=0.0, seconds=30.0, seed=grams)
+        (folder / f"m{grams}.toml").write_text(f"[bob]\nmass_kg = {{ value = {kg}, u = 2e-5 }}\n")
+        arguments += [run, "--scene", str(folder / f"m{grams}.toml")]
+    (folder / "hooke.csv").write_text(hooke)
+    return [*arguments, "--hooke", str(folder / "hooke.csv")]
+
+
+@pytest.mark.parametrize("head", ["mass (g),position (cm)", "mass_g;position_cm"])
+def test_many_masses_and_hookes_law(head: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The line through T^2 gives k and a third of the spring's mass, and positions give k by Hooke's law, with E_n."""
+    errors_cm = (0.04, -0.05, 0.02, 0.03, -0.04)
+    rows = [
+        (grams, 90 - grams * 0.0981 / 14.0 * 10 + e)
+        for grams, e in zip((120, 160, 200, 240, 280), errors_cm, strict=True)
+    ]
+    comma = ";" in head
+    body = "".join(f"{g};{y:.2f}\n".replace(".", ",") if comma else f"{g},{y:.2f}\n" for g, y in rows)
+    arguments = five_masses(tmp_path, f"{head}\n{body}")
+    result = compared([*arguments, "-o", str(tmp_path / "out"), "--figures", "svg"], capsys)
+    line = result["mass_line"]
+    assert abs(line["constant"]["value"] - 14.0) < 3 * line["constant"]["u"]
+    assert abs(line["effective_mass"]["value"] - 0.02 / 3) < 3 * line["effective_mass"]["u"]
+    assert result["hooke"]["constant"]["value"] == pytest.approx(14.0, abs=0.2)
+    assert result["hooke"]["normalised_error"] < 1.0
+    for chart in ("masses", "hooke"):
+        assert (tmp_path / "out" / "figures" / f"{chart}.svg").exists()
+    assert main(["compare", *arguments]) == 0
+    assert "Hooke's law: k = 1" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("weight,position_m\n1,2\n", "expected the columns mass_kg and position_m"),
+        ("mass_kg,position_m\n0.1,far\n", "line 2: position must be a number"),
+        ("mass_kg,position_m\n0.1,0.5\n0.2,0.4\n", "three masses"),
+        ("mass_kg,position_m\n0.1,0.5\n0.2,0.4\n0.3,0.52\n", "do not follow the masses"),
+    ],
+)
+def test_a_static_measurement_that_gives_no_constant_is_one_line(
+    table: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The error says what to write or to do."""
+    assert main(["compare", *five_masses(tmp_path, table)]) in (2, 3)
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said

@@ -267,3 +267,51 @@ def test_the_charts_of_a_simulation_stand_on_a_page(cli: Callable, scene: Path, 
     assert not (folder / "figures").exists()
     assert cli("simulate", "--scene", scene, "--seconds", "20", "--folder", tmp_path, "--figures", "pdf").code == 0
     assert {path.name for path in (folder / "figures").iterdir()} == {f"{name}.pdf" for name in charts}
+
+
+def test_a_run_with_its_scene_is_enough(cli: Callable, scene: Path, tmp_path: Path) -> None:
+    """Start, constant and damping come from the recording, the mass from its scene, and the length is the run's."""
+    run, full = tmp_path / "bob.h5", MIXED
+    scene.write_text(full)
+    assert cli("simulate", "--scene", scene, "--seconds", "30", "--sensor", "ideal", "-o", run).code == 0
+    only_mass = tmp_path / "mass.toml"
+    only_mass.write_text("[bob]\nmass_kg = 0.2\n")
+    assert cli("scene", run, "--scene", only_mass).code == 0
+    done = cli("simulate", "--against", run, "--json")
+    (found,) = done.results
+    assert found["samples"] == pytest.approx(3001, abs=1)
+    assert found["equation"]["angular_frequency_per_s"] == pytest.approx(10.0, rel=1e-4)
+    assert found["equation"]["gamma_per_s"] == pytest.approx(0.0073, rel=0.05)
+    assert found["against"]["rms_m"] < 1e-4
+    (missing,) = [cli("simulate", "--json")]
+    assert missing.code == 2
+    assert "--against RUN" in missing.complaint
+
+
+@pytest.mark.parametrize("step_s", [0.002, 0.01, 0.03])
+def test_forward_euler_grows_by_its_formula(cli: Callable, tmp_path: Path, step_s: float) -> None:
+    """Each step multiplies the amplitude by sqrt(1 + w^2 h^2), that of symplectic Euler keeps it; measured alike."""
+    path = tmp_path / "linear.toml"
+    path.write_text(LINEAR)
+    (found,) = cli("simulate", "--scene", path, "--dt", step_s, "--json").results
+    forward, symplectic = found["growth"]
+    assert forward["predicted"] == pytest.approx(np.sqrt(1.0 + (10.0 * step_s) ** 2), rel=1e-12)
+    assert forward["measured"] == pytest.approx(forward["predicted"], rel=1e-6)
+    assert forward["fails_above_s"] == 0.0
+    assert symplectic["measured"] == pytest.approx(1.0, abs=2e-5)
+    assert symplectic["fails_above_s"] == pytest.approx(0.2)
+
+
+def test_the_measured_run_stands_in_the_charts_of_both_methods(cli: Callable, scene: Path, tmp_path: Path) -> None:
+    """Position, velocity, energy and phase have the recording, which is the exact motion here, as their points."""
+    run = tmp_path / "bob.h5"
+    assert cli("simulate", "--scene", scene, "--seconds", "20", "--sensor", "ideal", "-o", run).code == 0
+    assert cli("simulate", "--against", run, "--folder", tmp_path).code == 0
+    page = (tmp_path / "bob.h5.simulated" / "simulation.html").read_text("utf-8")
+    (text,) = re.findall(r'<script type="application/json" id="charts">(.*?)</script>', page, re.DOTALL)
+    charts = {chart["name"]: chart for chart in json.loads(text)}
+    for name in ("position", "velocity", "energy", "phase"):
+        for panel in charts[name]["panels"]:
+            measured, _, exact = panel["series"]
+            assert measured["label"] == "measured"
+            assert decoded(measured["y"])[0] == pytest.approx(decoded(exact["y"])[0], rel=0.01, abs=0.01)

@@ -25,10 +25,10 @@ LONG = (
     "docs/tutorial.md",
     "docs/how-to/compare-runs.md",
     "docs/how-to/compare-with-the-classic-method.md",
-    "docs/how-to/make-a-lab-report.md",
     "docs/how-to/record-at-the-bench.md",
     "docs/how-to/simulate-a-bench.md",
     "docs/reference/command-line.md",
+    "docs/explanation/euler.md",
     "docs/explanation/method.md",
 )
 """Pages with many commands: they run with the trials."""

@@ -15,7 +15,7 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics import Problem
 from pipeline.dynamics.band import C16, Band
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.track import F8
+from pipeline.track import F8, UNUSABLE
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.runs.simulating.simulation import FINE, count_of, solve
 
@@ -41,6 +41,7 @@ class Move:
 class Against:
     """A measured run with a prediction laid over it, at the samples used (n,), in s and m.
 
+    ``free`` has the times since the first sample, the displacements and the fitted velocities without false echoes.
     ``band`` has the quantiles (4, n) of the predicted distance relative to ``predicted``; ``inside`` is the share of
     the samples within its 95 % widened by the noise, and ``leaves_s`` the time from which the run leaves it.
     """
@@ -50,6 +51,7 @@ class Against:
     predicted: F8
     rms_m: float
     noise_m: float
+    free: tuple[F8, F8, F8]
     band: F8 | None = None
     inside: float | None = None
     leaves_s: float | None = None
@@ -137,17 +139,20 @@ def lay_over(
         step_s = min(step_s, 1.0 / (FINE * problem.equation.angular_frequency_per_s))
     count = count_of(step_s * max(1, math.ceil(duration_s(analysis) / step_s)), step_s)
     trajectory = solve(problem, method, step_s, count, tolerance).trajectory
-    predicted: F8 = motion.rest.at(t) + trajectory.at(t - t[0])
+    rest, good = motion.rest.at(t), (analysis.flags[used] & UNUSABLE) == 0
+    free = tuple(each[good] for each in (t - t[0], measured - rest, motion.waveform.velocity[used]))
+    predicted: F8 = rest + trajectory.at(t - t[0])
     rms = float(np.sqrt(np.mean((measured - predicted) ** 2)))
     noise = analysis.estimates["noise"].value
     if band is None:
-        return Against(t, measured, predicted, rms, noise)
+        return Against(t, measured, predicted, rms, noise, free)
     around = band.displacement_at(t - t[0])
     left = measured - predicted
     outside = (left < around[0] - WIDER * noise) | (left > around[3] + WIDER * noise)
     moves = _moves(band, t - t[0], left, values or {})
     inside = 1.0 - float(np.mean(outside))
-    return Against(t, measured, predicted, rms, noise, around, inside, _leaves(t, outside, problem), moves)
+    leaves_s = _leaves(t, outside, problem)
+    return Against(t, measured, predicted, rms, noise, free, around, inside, leaves_s, moves)
 
 
 def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,20 +20,27 @@ POINTS = 1500
 GROWN = 1e6  # multiple of the starting amplitude above which curves are cut off
 
 
-def simulation(found: Simulation, mass_kg: float | None) -> tuple[Chart, ...]:
-    """Return the charts of a simulation; without a mass, the energy is that of one kilogram."""
+def simulation(found: Simulation, mass_kg: float | None, over: Against | None = None) -> tuple[Chart, ...]:
+    """Return the charts of a simulation over a measured run; without a mass, the energy is that of one kilogram."""
     runs = beside_exact(found)
     exact = runs.exact
     period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
     turns = max(2, int(TURNS * period / exact.spacing_s) + 1)
     end = PERIODS * period if exact.t[-1] > 2 * PERIODS * period else None
-    of_position = _both(runs, "y / mm", lambda of, n: (of.t[:n], of.y[:n] * 1e3))
-    of_velocity = _both(runs, "v / (m/s)", lambda of, n: (of.t[:n], of.v[:n]))
     label = "E / mJ" if mass_kg is not None else "E per mass / (mJ/kg)"
-    of_energy = _both(runs, label, lambda of, n: _energy(of, n, mass_kg), log=True)
     shown = slice(0, turns)
-    of_phase = _both(runs, "v / (m/s)", lambda of, n: (of.y[:n][shown] * 1e3, of.v[:n][shown]), equal=True)
-    beside = "Each method beside the exact motion."
+    beside_run = _measured(found, mass_kg, over, exact.t[-1])
+    of_position = _both(runs, "y / mm", lambda of, n: (of.t[:n], of.y[:n] * 1e3), beside_run[:1])
+    of_velocity = _both(runs, "v / (m/s)", lambda of, n: (of.t[:n], of.v[:n]), beside_run[1:2])
+    of_energy = _both(runs, label, lambda of, n: _energy(of, n, mass_kg), beside_run[2:3], log=True)
+    of_phase = _both(
+        runs,
+        "v / (m/s)",
+        lambda of, n: (of.y[:n][shown] * 1e3, of.v[:n][shown]),
+        _measured_phase(beside_run, TURNS * period),
+        equal=True,
+    )
+    beside = "Each method beside the exact motion" + (", and the measured run." if beside_run else ".")
     return (
         Chart("position", "Position", beside, of_position, end),
         Chart("velocity", "Velocity", beside, of_velocity, end),
@@ -46,6 +54,7 @@ def _both(
     runs: Eulers,
     label: str,
     values: Callable[[Trajectory, int], tuple[F8, F8]],
+    measured: Sequence[Series] = (),
     *,
     log: bool | None = None,
     equal: bool = False,
@@ -55,10 +64,13 @@ def _both(
     for (_, words), run in zip(EULERS, runs.eulers, strict=True):
         x, y = values(run, len(run.y))
         beside_x, beside_y = values(runs.exact, len(run.y))
-        series = (Series(words, x, y, line=True), line_of(runs.words, beside_x, beside_y))
+        lines = (Series(words, x, y, "other" if measured else "data", True), line_of(runs.words, beside_x, beside_y))
         grows = log and float(np.min(y)) > 0.0 and float(np.max(y)) > 20.0 * float(np.max(beside_y))
         height, x_label = (3.6, "displacement y / mm") if equal else (2.4, "time / s")
-        panels.append(Panel(f"{words}: {label}", series, height, x_label, log=log and bool(grows), equal=equal))
+        # Beside points an axis would not show all of a line that leaves them.
+        every = (*(replace(each, line=True) for each in measured), *lines)
+        panel = Panel(f"{words}: {label}", every, height, x_label, log=log and bool(grows), equal=equal)
+        panels.append(replace(panel, series=(*measured, *lines), range=panel.reach()) if measured else panel)
     return tuple(panels)
 
 
@@ -70,6 +82,25 @@ def _energy(of: Trajectory, count: int, mass_kg: float | None) -> tuple[F8, F8]:
     rows = np.unique(np.linspace(0, end - 1, min(end, POINTS)).astype(np.intp))
     start = of.problem.amplitude_m() * of.problem.equation.angular_frequency_per_s
     return of.t[rows], 0.5e3 * (1.0 if mass_kg is None else mass_kg) * start * start * relative[rows]
+
+
+def _measured(found: Simulation, mass_kg: float | None, over: Against | None, end_s: float) -> list[Series]:
+    """Return displacement in mm, velocity in m/s and energy in mJ of a measured run from its start to a time."""
+    if over is None:
+        return []
+    rows = over.free[0] <= end_s
+    t, y, v = (each[rows] for each in over.free)
+    omega = found.problem.equation.angular_frequency_per_s
+    energy = 0.5e3 * (1.0 if mass_kg is None else mass_kg) * (v**2 + (omega * y) ** 2)
+    return [Series("measured", t, each) for each in (y * 1e3, v, energy)]
+
+
+def _measured_phase(measured: Sequence[Series], end_s: float) -> list[Series]:
+    if not measured:
+        return []
+    displacement, velocity, _ = measured
+    rows = displacement.x <= end_s
+    return [Series("measured", displacement.y[rows], velocity.y[rows])]
 
 
 def _error(found: Simulation, runs: Eulers) -> tuple[Panel, ...]:

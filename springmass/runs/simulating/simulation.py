@@ -299,6 +299,56 @@ def _last_amplitude(found: Simulation) -> float:
     return math.sqrt(2.0 * square / (1.0 + math.sqrt(max(1.0 + 4.0 * hard * square, 0.0))))
 
 
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """The factor by which each step of an Euler method multiplies an amplitude, relative to the exact motion.
+
+    For :math:`y'' = -\\omega^2 y` a step h has the eigenvalues :math:`1 \\pm i\\omega h` by forward Euler, of modulus
+    :math:`\\sqrt{1 + \\omega^2 h^2}`, and eigenvalues of modulus 1 by symplectic Euler. ``measured`` is the mean factor
+    over ten periods of this motion, None if the run is too short. Above ``fails_above_s`` any motion grows.
+    """
+
+    method: str
+    words: str
+    predicted: float
+    measured: float | None
+    fails_above_s: float
+
+    def summary(self) -> dict[str, Any]:
+        """Return the growth as the JSON of ``springmass simulate`` has it."""
+        names = ("method", "predicted", "measured", "fails_above_s")
+        return {name: getattr(self, name) for name in names}
+
+
+def growths(problem: Problem, step_s: float, count: int) -> tuple[Growth, ...]:
+    """Return the growth by both Euler methods with a step."""
+    turn = problem.equation.angular_frequency_per_s * step_s
+    period = max(1, round(2.0 * math.pi / turn))
+    steps = min(10 * period, count)
+    found = []
+    for name, words in EULERS:
+        integrator = get_integrator(name)
+        predicted = math.sqrt(1.0 + turn * turn) if name == "forward-euler" else 1.0
+        measured = _measured_growth(problem, integrator, step_s, steps, period)
+        found.append(Growth(name, words, predicted, measured, integrator.stable_step(problem)))
+    return tuple(found)
+
+
+def _measured_growth(problem: Problem, integrator: Integrator, step_s: float, steps: int, period: int) -> float | None:
+    """Return the mean growth of the amplitude a step beyond that of the exact motion, from one period to the last."""
+    if steps < 2 * period or problem.amplitude_m() == 0.0:
+        return None
+    try:
+        both = [integrator.run(problem, step_s, steps), auto(problem, step_s, steps, ROUGH).trajectory]
+    except DynamicsError:
+        return None  # a step that is far too large, or a bob that comes to rest
+    with np.errstate(divide="ignore"):
+        logs = 0.5 * np.log([each.relative_energy() for each in both])
+    gains = np.mean(logs[:, -period:], axis=1) - np.mean(logs[:, :period], axis=1)
+    grown = float(gains[0] - gains[1]) / (steps + 1 - period)
+    return math.exp(grown) if math.isfinite(grown) and grown < 1.0 else None
+
+
 def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | None, band: Band | None) -> dict[str, Any]:
     """Return a simulation as the JSON of ``springmass simulate``, compared with no run."""
     solution, check = found.solution, found.check

@@ -1,6 +1,6 @@
 """The report's numbers, recomputed from its own inputs; a golden value is never changed to make a test pass.
 
-One test or more for each row of the table on docs/explanation/a-published-report.md, in its order.
+One test or more for each mistake on docs/tutorial-report.md, in the report's order.
 """
 
 from __future__ import annotations

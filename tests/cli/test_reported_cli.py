@@ -1,0 +1,111 @@
+"""``springmass compare --reported``: mistakes in what somebody printed, on the terminal, in JSON and on the page."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from springmass.cli import main
+from tests.reported import Row, periodic_rows, record, write_table
+from tests.synthetic import Truth
+
+# Table 1 and the conclusion of the report, with the units of its own lines.
+PRINTED: list[Row] = [
+    ("bare", "period", 0.753, 0.001, "s"),
+    ("bare", "f", 1.33, 0.002, "Hz"),
+    ("bare", "omega", 8.35, 0.01, "s^-1"),
+    ("bare", "k", "14.0", 0.002, "N/m"),
+    ("bare", "A", 0.05914, 0.000004, "cm"),
+    ("disc", "period", 0.726, 0.001, "s"),
+    ("disc", "f", 1.38, 0.002, "Hz"),
+    ("disc", "omega", 8.66, 0.01, "s^-1"),
+    ("disc", "k", 16.311, 0.003, "N/m"),
+    ("disc", "sensor_error", 0.00239, "", "m"),
+    ("disc", "gamma", 0.01463, 0.0000000002, "1/s"),
+    ("disc", "v_rms", 0.18073, 0.000007, "m/s"),
+    ("disc", "Re", 1220, 300, ""),
+]
+SIX = ["exchanged", "power_of_ten", "u_too_small", "not_noise", "false_echoes", "not_exponential"]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> list[str]:
+    """Return the arguments that name runs like the report's, whose periods are those that it printed, exchanged."""
+    bare = Truth(amplitude=0.05914, omega=2 * math.pi * 7 / 5.08, gamma=0.002)
+    disc = Truth(amplitude=0.05092, omega=2 * math.pi * 7 / 5.27, gamma=0.0073, beta=0.235)
+    arguments: list[str] = []
+    for name, truth, mass, seconds, echoes in (("bare", bare, 0.2007, 10, 0), ("disc", disc, 0.2176, 120, 36)):
+        record(tmp_path, name, truth, mass, seconds, noise_m=1e-4, echoes=echoes, seed=1)
+        (tmp_path / f"{name}.toml").write_text(
+            f"[bob]\nmass_kg = {{ value = {mass}, u = 0.00005 }}\n[disc]\ndiameter_m = 0.102\n"
+            "[air]\ntemperature_c = 20\n"
+        )
+        arguments += [str(tmp_path / f"{name}_position.txt"), "--scene", str(tmp_path / f"{name}.toml")]
+    return arguments
+
+
+def test_six_of_six_on_the_reports_own_table(
+    bench: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each mistake has its line on the terminal, in the JSON and on the page; --strict rejects the table."""
+    table = str(write_table(tmp_path / "printed.csv", PRINTED))
+    assert main(["compare", *bench, "--reported", table, "-o", str(tmp_path / "out"), "--strict"]) == 5
+    printed, page = capsys.readouterr().out, (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert main(["compare", *bench, "--reported", table, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    codes = {finding["code"] for finding in result["findings"]}
+    for code in SIX:
+        for where in (printed, page, codes):
+            assert f"reported_{code}" in where
+    assert "reported_differs" not in codes
+    assert len(result["reported"]) == len(PRINTED)
+
+
+def test_a_right_table_has_no_findings(bench: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Values read off a graph, with semicolons and decimal commas as a sheet writes them, agree."""
+    rows = [
+        *periodic_rows("bare", 5.08, 0.2007),
+        *periodic_rows("disc", 5.27, 0.2176),
+        ("bare", "A", "5.9", "0.2", "cm"),
+    ]
+    table = write_table(tmp_path / "printed.csv", rows)
+    table.write_text(table.read_text().replace(",", ";").replace(".", ","))
+    assert main(["compare", *bench, "--reported", str(table), "--json", "--strict"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert {row["verdict"] for row in result["reported"]} == {"agrees"}
+    assert not [f for f in result["findings"] if f["code"].startswith("reported_")]
+
+
+def test_a_value_that_no_usual_mistake_explains_differs(
+    bench: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is said how far off it is; a quantity that a recording does not give is not compared, and says so."""
+    rows: list[Row] = [("bare", "period", 0.9, 0.001, "s"), ("bare", "colour", 3, "", "")]
+    assert main(["compare", *bench, "--reported", str(write_table(tmp_path / "t.csv", rows)), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert "reported_differs" in {f["code"] for f in result["findings"]}
+    assert result["reported"][1]["verdict"].startswith("not compared")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("other,period,0.7,,s", "must be one of"),
+        ("bare,period,fast,,s", "value must be a number"),
+        ("bare,period,0.7,-1,s", "u must be a number"),
+        ("bare,period,0.7,,kg", "give s"),
+    ],
+)
+def test_a_table_that_cannot_be_read_names_the_line(
+    bench: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, words: str
+) -> None:
+    """The error names file and line, and says what to write."""
+    table = tmp_path / "t.csv"
+    table.write_text(f"run,name,value,u,unit\n{line}\n")
+    assert main(["compare", *bench, "--reported", str(table)]) == 2
+    said = capsys.readouterr().err
+    assert "t.csv, line 2" in said
+    assert words in said
