@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import rooms
 
 from pipeline.dynamics import Equation, Integrator, Problem, get_integrator
 from pipeline.errors import DynamicsError
@@ -33,7 +34,7 @@ def main(folder: Path = HERE) -> list[Path]:
     stability = folder / "stability.svg"
     with style():
         stability.write_bytes(written(stability_figure(), "svg"))
-    return [target, stability]
+    return [target, stability, rooms.main(folder)]
 
 
 def largest_step(integrator: Integrator, ratio: float) -> float:

@@ -65,6 +65,8 @@ class Value(UFloat):  # type: ignore[misc]
     (0.74310(20) s, 1.34571(36) 1/s, 0 s)
     >>> print(2 * period, f"{period:.1uS}", 0.2 * period**-2)
     1.48620 +- 0.00040 s 0.7431(2) 0.36219 +- 0.00019
+    >>> print(f"{period.ufloat:.1u}")
+    0.7431+/-0.0002
     """
 
     __slots__ = ("_shown", "unit")
@@ -91,6 +93,11 @@ class Value(UFloat):  # type: ignore[misc]
     def u(self) -> float:
         """The standard uncertainty, in ``unit``."""
         return float(self.std_dev)
+
+    @property
+    def ufloat(self) -> UFloat:
+        """The number without its unit, for a package that has units of its own: ``Quantity(x.ufloat, x.unit)``."""
+        return UFloat(self.nominal_value, self._linear_part)
 
     def __str__(self) -> str:
         return self._shown[0] if self._shown else format_value(self.value, self.u, self.unit or "")

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import runpy
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
 
+from springmass import __version__
 from springmass.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -55,6 +57,17 @@ def test_generated_pages_are_up_to_date(tmp_path: Path) -> None:
     runpy.run_path(str(copy / "generate.py"), run_name="__main__")
     for page in copy.glob("*.md"):
         assert page.read_text(encoding="utf-8") == (DOCS / "reference" / page.name).read_text(encoding="utf-8")
+
+
+def test_one_version_is_stated() -> None:
+    """The package, its metadata, its citation and the newest release of the changelog state one version and date."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    newest = re.search(r"^## \[(\d\S+)\] - (\S+)$", changelog, re.MULTILINE)
+    assert newest
+    assert project["version"] == __version__ == newest[1]
+    assert f"version: {newest[1]}\ndate-released: {newest[2]}\n" in citation
 
 
 def test_the_two_commands_of_the_readme_are_targets() -> None:
