@@ -45,18 +45,6 @@ def test_the_amplitude_falls_as_the_scene_says(laws: dict[str, float]) -> None:
     np.testing.assert_allclose(run.y[crests], expected, rtol=2e-3)
 
 
-def test_a_cubic_spring_shifts_the_frequency() -> None:
-    """By 3 c A^2 / (8 omega), to first order."""
-    cubic = 200.0
-    run = get_integrator("strang").run(
-        Problem(Equation(angular_frequency_per_s=8.66, cubic_per_m2_s2=cubic), 0.05), 0.001, 60_000
-    )
-    rising = np.flatnonzero((run.y[:-1] < 0) & (run.y[1:] >= 0))
-    at = run.t[rising] - run.y[rising] * 0.001 / (run.y[rising + 1] - run.y[rising])
-    omega = 2.0 * math.pi * (len(at) - 1) / (at[-1] - at[0])
-    assert omega - 8.66 == pytest.approx(3.0 * cubic * 0.05**2 / (8.0 * 8.66), rel=0.01)
-
-
 def test_the_mass_is_bob_air_and_the_springs_share() -> None:
     """As an analysis counts it."""
     scene = Scene.from_mapping(BENCH)
@@ -68,12 +56,6 @@ def test_the_mass_is_bob_air_and_the_springs_share() -> None:
         Problem.from_scene(Scene.from_mapping({**BENCH, "spring": {}}))
     with pytest.raises(SceneError, match="mass_kg"):
         effective_mass_kg(Scene())
-
-
-def test_laws_go_forth_and_back() -> None:
-    """The coefficients of the amplitude come back from those of the equation."""
-    given = {"gamma_per_s": 0.1, "beta_per_m_s": 0.3, "mu_m_per_s": 0.002}
-    assert Equation.from_laws(7.0, **given).laws() == pytest.approx(tuple(given.values()), rel=1e-15)
 
 
 def test_the_bench_moves_by_the_equation() -> None:
