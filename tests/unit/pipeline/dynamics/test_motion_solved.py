@@ -11,7 +11,6 @@ from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator
-from pipeline.dynamics.terms import required
 from pipeline.errors import SceneError
 from springmass.runs.simulating.bench import REST_M, bench_position
 
@@ -69,15 +68,3 @@ def test_the_bench_moves_by_the_equation() -> None:
     np.testing.assert_allclose(found - REST_M, run.y[rows], rtol=0, atol=0.05 * 2e-6)
     assert position(1e3) == position(2e3) != REST_M
     assert position(-1.0) == pytest.approx(REST_M + 0.05)
-
-
-def test_terms_below_their_share_are_left_out() -> None:
-    """What the tolerance does not require does not act, and the error that leaves stays within the tolerance."""
-    equation = Equation.from_laws(8.66, gamma_per_s=0.01, beta_per_m_s=1e-5, mu_m_per_s=1e-12, cubic_per_m2_s2=1e-6)
-    problem = Problem(equation, 0.05)
-    for tolerance, kept in ((1e-3, {"viscous_drag"}), (1e-4, {"viscous_drag", "quadratic_drag"})):
-        reduced, terms = required(problem, 120.0, tolerance)
-        assert {term.name for term in terms if term.included} == kept
-        full = get_integrator("strang").run(problem, 0.01, 12_000).y
-        less = get_integrator("strang").run(reduced, 0.01, 12_000).y
-        assert 0.0 < np.max(np.abs(full - less)) / 0.05 <= 0.1 * tolerance
