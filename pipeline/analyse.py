@@ -50,25 +50,9 @@ BEATING = 0.3
 def analyse(track: Track, scene: Scene | None = None, options: Options | None = None) -> Analysis:
     """Turn a track into estimates, laws, effects and findings.
 
-    Parameters
-    ----------
-    track : Track
-    scene : Scene, optional
-        What is known about the bench; by default nothing. Its damping law counts as the stated law unless ``options``
-        state another.
-    options : Options, optional
+    The damping law of the scene counts as the stated law unless ``options`` state another. An :class:`AnalysisError`
+    says that fewer than eight samples are usable.
 
-    Returns
-    -------
-    Analysis
-
-    Raises
-    ------
-    AnalysisError
-        If fewer than eight samples are usable.
-
-    Examples
-    --------
     >>> import numpy as np
     >>> t = np.arange(1000) / 100
     >>> rng = np.random.default_rng(1)

@@ -50,25 +50,8 @@ Motion = Oscillation | Overdamped | Still
 class Analysis:
     """The analysis of one run.
 
-    Parameters
-    ----------
-    track : Track
-    scene : Scene
-    options : Options
-    conditioned : Conditioned
-    motion : Oscillation, Overdamped or Still
-        For an overdamped motion, ``estimates`` contains the relaxation rates. For a still bob it contains only the
-        offset and the noise, and for two overlapping modes their periods and amplitudes as well.
-    effects : tuple of Effect
-    findings : tuple of Finding
-        The most severe first.
-    estimates : mapping of str to Estimate
-        The keys are names in :data:`pipeline.registry.quantities.QUANTITIES`.
-
-    Raises
-    ------
-    ValueError
-        If the name of an estimate is not registered.
+    For an overdamped motion, ``estimates`` contains the relaxation rates. For a still bob it contains only the offset
+    and the noise, and for two overlapping modes their periods and amplitudes as well.
     """
 
     track: Track
@@ -77,8 +60,8 @@ class Analysis:
     conditioned: Conditioned
     motion: Motion
     effects: tuple[Effect, ...]
-    findings: tuple[Finding, ...]
-    estimates: Mapping[str, Estimate]
+    findings: tuple[Finding, ...]  # the most severe first
+    estimates: Mapping[str, Estimate]  # by names in :data:`pipeline.registry.quantities.QUANTITIES`
 
     def __post_init__(self) -> None:
         for name in self.estimates:

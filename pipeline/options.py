@@ -14,30 +14,20 @@ ANY_LAW = "any"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """Options of an analysis.
+    """Options of an analysis."""
 
-    Parameters
-    ----------
-    laws : tuple of str or Law
-        The damping laws to try: names in :data:`springmass.LAWS`, or laws of :func:`springmass.make_law`. After the
-        four laws of the tier "fast" all are tried, if none of the four fits or linear and quadratic drag are both
-        needed.
-    stated : str, Law or None
-        The law that the damping follows, if it is known; results are stated by it alone. None takes the law of the
-        scene, if it has one, and "any" leaves the choice to the recording.
-    modes : bool
-        Whether to search for other oscillations beside the main one.
-    rows : {"windows", "samples"}
-        Whether the motion is fitted to the amplitudes and phases of periods, or to all samples.
-    early, late : float
-        Shares of the samples used. If the bob stops before the share ``early``, its rest is left out; if it stops
-        before ``late``, only if the whole recording shows no oscillation.
-    """
-
+    # The damping laws to try: names in :data:`springmass.LAWS`, or laws of :func:`springmass.make_law`. After the four
+    # laws of the tier "fast" all are tried, if none of the four fits or linear and quadratic drag are both needed.
     laws: tuple[str | Law, ...] = tuple(LAWS)
+    # The law that the damping follows, if it is known; results are stated by it alone. None takes the law of the scene,
+    # if it has one, and "any" leaves the choice to the recording.
     stated: str | Law | None = None
-    modes: bool = True
-    rows: Literal["windows", "samples"] = "windows"
+    modes: bool = True  # whether to search for other oscillations beside the main one
+    rows: Literal["windows", "samples"] = (
+        "windows"  # whether amplitudes and phases of periods, or all samples are fitted
+    )
+    # Shares of the samples. If the bob stops before ``early``, its rest is left out; if it stops before ``late``, only
+    # if the whole recording shows no oscillation.
     early: float = 0.25
     late: float = 0.75
 

@@ -49,86 +49,33 @@ UNUSABLE = ~np.uint8(Quality.GAP_BEFORE)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """One run as arrays.
+    """One run as arrays; names that end in ``_m``, here and in the stages, are in ``unit``."""
 
-    Parameters
-    ----------
-    t : (n,) float64, s
-        Time since the start of the run.
-    y : (n,) float64
-        Distance from the sensor in m, or another quantity in ``unit``; NaN where unmeasured. Names that end in ``_m``,
-        here and in the stages, are in this unit.
-    flags : (n,) uint8
-        Sums of the :class:`Quality` bits known before the analysis.
-    rate_hz : float
-        Nominal sampling rate, Hz.
-    sigma_m : float or None
-        Standard deviation of one distance, m, if it is known; None if it must be estimated from the record.
-    quantum_m : float or None
-        Resolution of the distances, m.
-    stated_error_m : float or None
-        Error from the error column of the file, m; None if the file has no such column.
-    clock : str
-        "nominal", "device" or "host".
-    kind : str
-        "live", "replay" or "simulated".
-    velocity : (n,) float64, m/s, or None
-        Velocity from the recording.
-    rate_error, u_rate_error : float or None
-        Relative amount by which the sensor's clock runs faster than the host's, and its standard uncertainty; None if
-        the clocks were not compared.
-    clock_limit : float or None
-        Maximum relative rate error of the sensor's clock; None if it is not stated.
-    held_samples : int
-        Number of samples that came in bursts after a stall, later than jitter explains. The comparison of the clocks
-        excludes them.
-    longest_stall_s : float
-        Maximum delay of these samples, s.
-    compared_s : float or None
-        Duration of the comparison of the clocks, s; None if it lasts from the first sample to the last.
-    speed_of_sound_m_per_s : float or None
-        Speed of sound with which echo times were converted to distances, m/s; None if it is unknown.
-    sonic : bool
-        Whether the distances are those of echoes, so that the temperature of the air changes their scale.
-    u_scale : float
-        Relative standard uncertainty of the scale of the distances, from a calibration; 0 without a calibration.
-    u_offset_m : float
-        Standard uncertainty of the zero of the distances, from a calibration, m; 0 without a calibration.
-    quantity, unit : str
-        Quantity in ``y`` and its unit, an entry of :data:`UNITS`. Only methods that call :meth:`demand_length` need a
-        length.
-    trigger_s : float or None
-        Time at which the trigger saw the bob leave its rest and started the recording, s; None without a trigger.
-
-    Raises
-    ------
-    TrackError
-        If the quantity is not in :data:`UNITS`, or has another unit.
-    """
-
-    t: F8
-    y: F8
-    flags: U8
-    rate_hz: float
-    sigma_m: float | None = None
-    quantum_m: float | None = None
-    stated_error_m: float | None = None
-    clock: str = "nominal"
-    kind: str = "replay"
-    velocity: F8 | None = None
+    t: F8  # (n,) s, since the start of the run
+    y: F8  # (n,) distance from the sensor in m, or another quantity in ``unit``; NaN where unmeasured
+    flags: U8  # (n,) sums of the :class:`Quality` bits known before the analysis
+    rate_hz: float  # nominal sampling rate
+    sigma_m: float | None = None  # standard deviation of one distance; None if it must be estimated from the record
+    quantum_m: float | None = None  # resolution of the distances
+    stated_error_m: float | None = None  # from the error column of the file
+    clock: str = "nominal"  # or "device" or "host"
+    kind: str = "replay"  # or "live" or "simulated"
+    velocity: F8 | None = None  # (n,) m/s, from the recording
+    # Relative amount by which the sensor's clock runs faster than the host's; None if the two were not compared.
     rate_error: float | None = None
     u_rate_error: float | None = None
-    clock_limit: float | None = None
+    clock_limit: float | None = None  # maximum relative rate error of the sensor's clock
+    # Samples that came in bursts after a stall, later than jitter explains; the comparison of the clocks excludes them.
     held_samples: int = 0
     longest_stall_s: float = 0.0
-    compared_s: float | None = None
-    speed_of_sound_m_per_s: float | None = None
-    sonic: bool = False
-    u_scale: float = 0.0
-    u_offset_m: float = 0.0
-    quantity: str = "length"
+    compared_s: float | None = None  # duration of the comparison of the clocks; None for the whole recording
+    speed_of_sound_m_per_s: float | None = None  # with which echo times were converted to distances
+    sonic: bool = False  # whether the distances are those of echoes, whose scale changes with the air
+    u_scale: float = 0.0  # relative standard uncertainty of a calibrated scale; 0 without a calibration
+    u_offset_m: float = 0.0  # standard uncertainty of a calibrated zero
+    quantity: str = "length"  # an entry of :data:`UNITS` with its unit
     unit: str = "m"
-    trigger_s: float | None = None
+    trigger_s: float | None = None  # when the trigger saw the bob leave its rest and started the recording
 
     def __post_init__(self) -> None:
         if UNITS.get(self.quantity) != self.unit:

@@ -18,9 +18,8 @@ import numpy as np
 from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
 from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.solve_ivp import DOP853, LEAST_RTOL, SolveIvp
+from pipeline.dynamics.solve_ivp import LEAST_RTOL, SolveIvp
 from pipeline.dynamics.strang import STRANG
-from pipeline.dynamics.terms import Term, required
 from pipeline.errors import DynamicsError
 
 LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
@@ -33,18 +32,18 @@ class Solution:
     """A solved motion with its stated error.
 
     The errors of displacement and velocity are relative to the starting amplitude and its product with the angular
-    frequency, and include the effect of omitted terms; they are None if halving cannot estimate them.
+    frequency; they are None if halving cannot estimate them.
     """
 
     integrator: Integrator
     parts: int  # steps from one kept state to the next
-    problem: Problem  # from auto with the terms that the tolerance requires only
+    problem: Problem
     trajectory: Trajectory
     error: float | None
     velocity_error: float | None
     no_estimate: str = ""
     running_s: float = 0.0  # of the returned run
-    terms: tuple[Term, ...] = ()  # the decision on each; empty for a method by name, which solves all terms
+    chosen: bool = False  # whether ``auto`` chose the method
 
     @property
     def step_s(self) -> float:
@@ -55,10 +54,7 @@ class Solution:
 def auto(
     problem: Problem, spacing_s: float, count: int, tolerance: float, timer: Callable[[], float] = lambda: 0.0
 ) -> Solution:
-    """Solve a motion to a tolerance, with only the terms that the tolerance requires.
-
-    The exact flow solves a linear scene, Strang splitting every other one. If that cannot reach the tolerance and there
-    is no friction, it is DOP853.
+    """Solve a motion to a tolerance: a linear scene by its exact flow, every other one by Strang splitting.
 
     Parameters
     ----------
@@ -75,22 +71,11 @@ def auto(
     Raises
     ------
     DynamicsError
-        If the tolerance is below the limit of double precision, or no method reaches it.
+        If the tolerance is below the limit of double precision, or the method does not reach it.
     """
     demand_tolerance(problem, spacing_s, count, tolerance)
-    less, terms = required(problem, spacing_s * count, tolerance)
-    left_out = sum(term.size for term in terms if not term.included)
-
-    chosen = EXACT if less.equation.is_linear else STRANG
-    try:
-        found = halved(less, chosen, spacing_s, count, tolerance - left_out, timer)
-    except DynamicsError:
-        if less.equation.friction_m_per_s2 or less.equation.is_linear:
-            raise
-        found = halved(less, DOP853, spacing_s, count, tolerance - left_out, timer)
-    assert found.error is not None
-    assert found.velocity_error is not None
-    return replace(found, error=found.error + left_out, velocity_error=found.velocity_error + left_out, terms=terms)
+    method = EXACT if problem.equation.is_linear else STRANG
+    return replace(halved(problem, method, spacing_s, count, tolerance, timer), chosen=True)
 
 
 def halved(

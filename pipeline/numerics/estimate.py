@@ -15,25 +15,9 @@ from pipeline.track import F8
 class Estimate:
     """A value with its standard uncertainty; it can be used in calculations like a number.
 
-    Parameters
-    ----------
-    value : float
-        Value, in ``unit``.
-    u : float
-        Standard uncertainty (coverage factor 1), in ``unit``; 0 for a value that is taken as exact.
-    unit : str
-        SI unit as printed, "" for a ratio.
-    variable : uncertainties.UFloat, optional
-        Variable that the estimate was calculated from. If it is omitted, the estimate depends on no other.
-        It is ignored when estimates are compared.
-
-    Notes
-    -----
     Results of arithmetic are :class:`uncertainties.UFloat` in SI units, or plain numbers where nothing is uncertain.
     Estimates of one analysis record which variables they depend on, so that their correlations are kept.
 
-    Examples
-    --------
     >>> period = Estimate(0.7431, 0.0002, "s")
     >>> period
     0.74310(20) s
@@ -41,9 +25,10 @@ class Estimate:
     (1.4862+/-0.0004, 0.0+/-0, 0.7431)
     """
 
-    value: float
-    u: float
-    unit: str = ""
+    value: float  # in ``unit``
+    u: float  # standard uncertainty (coverage factor 1); 0 for a value that is taken as exact
+    unit: str = ""  # SI unit as printed, "" for a ratio
+    # The ``uncertainties.UFloat`` that the estimate was calculated from; without one it depends on no other.
     variable: Any = field(default=None, compare=False)
 
     def __post_init__(self) -> None:

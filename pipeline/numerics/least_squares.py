@@ -2,8 +2,8 @@
 
 The search is the Levenberg-Marquardt algorithm of ``scipy.optimize.leastsq``. Its own convergence tests ask how small a
 step or a gain is. On NIST's reference data, fitters with such tests report success at a wrong end for up to 23 of
-54 starts (``tests/reference/fitters.py``). Here a fit has converged only if Bates and Watts' relative offset shows a
-minimum and the singular values of the Jacobian show that the data determine every parameter.
+54 starts (docs/decisions/0012-scipy-least-squares.md). Here a fit has converged only if Bates and Watts' relative
+offset shows a minimum and the singular values of the Jacobian show that the data determine every parameter.
 ``tests/reference/test_nist.py`` shows six correct digits from 53 of the 54 starts and no false success. A second
 search, by a trust region, solved the remaining start as well but took twice the code.
 """

@@ -2,7 +2,7 @@
 
 The periodograms of libraries state this rate for white noise only. At a rate of 0.01 their threshold finds a line in
 each of 200 records of noise with a correlation of 0.9 from block to block. The search here finds one in at most two of
-a hundred records (``tests/unit/pipeline/numerics/test_spectrum.py``).
+a hundred records (``tests/trials/test_disturbances.py``).
 """
 
 from __future__ import annotations

@@ -27,27 +27,15 @@ SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those fa
 
 @dataclass(frozen=True, slots=True)
 class SpringRun:
-    """The result of one run for its spring.
-
-    Parameters
-    ----------
-    name : str
-    angular_frequency : Estimate
-        Angular frequency of the undamped motion, rad/s. Its uncertainty is only that from scatter of the record; that
-        of the clock may be common to several runs and is separate.
-    mass_kg : Estimate
-        Oscillating mass without the spring, kg: bob, disc and air carried along.
-    u_clock : float
-        Relative standard uncertainty of the clock's rate.
-    clock : str
-        Name of the clock; runs with the same name share the clock and its error.
-    """
+    """The result of one run for its spring."""
 
     name: str
+    # Angular frequency of the undamped motion, rad/s. Its uncertainty is only that from scatter of the record; that of
+    # the clock may be common to several runs and is separate.
     angular_frequency: Estimate
-    mass_kg: Estimate
-    u_clock: float = 0.0
-    clock: str = ""
+    mass_kg: Estimate  # oscillating mass without the spring: bob, disc and air carried along
+    u_clock: float = 0.0  # relative standard uncertainty of the clock's rate
+    clock: str = ""  # runs with the same name share the clock and its error
 
     @classmethod
     def of(cls, name: str, derived: Derived, *, clock: str = "") -> SpringRun:

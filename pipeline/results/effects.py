@@ -8,7 +8,7 @@ starting amplitude. The table shows all effects, included or not, with the reaso
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,6 @@ from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.terms import Term, required
 from pipeline.motion.averaged import Fitted, Phase, Rest
 from pipeline.numerics.quantity import Unit, amount
 from pipeline.registry.effects import check_effect
@@ -79,11 +78,10 @@ def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
 def simulated_effects(
     scene: Scene,
     problem: Problem,
-    terms: Sequence[Term],
     seconds: float,
     drag: DerivedDrag | None,
 ) -> tuple[Effect, ...]:
-    """Return the effects table of a simulation, whose terms are empty for a named method, which solves all of them.
+    """Return the effects table of a simulation, which solves all terms of the equation.
 
     Leaving out a share s of the mass shifts the
     phase by :math:`s\\omega T/2` over a run of duration T, which changes the displacement by up to twice the sine of
@@ -107,7 +105,7 @@ def simulated_effects(
     return (
         *_masses(scene, moved),
         _disc(scene, problem, seconds, drag),
-        *_terms(problem, terms, seconds),
+        *_forces(problem, seconds),
         Effect("temperature", turned(SOFTER_PER_K * u_kelvin), None, "1", False, softer),
         Effect("sideways_mode", None, None, "1", False, swings),
         _buoyancy(scene, omega, start, "1"),
@@ -149,12 +147,29 @@ def _disc(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | No
     return Effect("disc_drag", size, None, "1", True, f"no [damping] is stated: derived, {drag.words}")
 
 
-def _terms(problem: Problem, terms: Sequence[Term], seconds: float) -> Iterator[Effect]:
-    for term in terms or required(problem, seconds, 1.0)[1]:
-        why, included = term.why, term.included
-        if not terms and term.size > 0.0:
-            why, included = "a method by name solves all terms", True
-        yield Effect(term.name, term.size, None, "1", included, why)
+def _forces(problem: Problem, seconds: float) -> Iterator[Effect]:
+    """Yield each force of the equation with a bound on the change of the displacement without it, over the amplitude.
+
+    With :math:`\\dot A = -(\\mu + \\gamma A + \\beta A^2)` the bounds are :math:`\\gamma T + \\gamma^2 T/2\\omega`,
+    :math:`\\beta A_0 T`, :math:`\\mu T/A_0` and, through the phase, :math:`3|c|A_0^2T/8\\omega`. Variations within a
+    cycle add about one radian to the time T. With a cubic term an error of the amplitude changes the frequency, and the
+    other bounds are multiplied by the phase drift that this causes.
+    """
+    eq, start = problem.equation, problem.amplitude_m()
+    gamma, beta, mu = eq.laws()
+    omega, cubic = eq.angular_frequency_per_s, abs(eq.cubic_per_m2_s2)
+    time = seconds + 1.0 / omega
+    bend = 0.75 * cubic * (start / omega) ** 2
+    drift = 1.0 + bend / math.sqrt(1.0 + bend) * omega * time
+    sizes = {
+        "viscous_drag": gamma * time * (1.0 + 0.5 * gamma / omega) * drift,
+        "quadratic_drag": beta * start * time * drift,
+        "friction": mu * time / start * drift if start > 0.0 else 0.0,
+        "amplitude_dependent_frequency": 0.375 * cubic * start**2 / omega * time,
+    }
+    for name, size in sizes.items():
+        why = f"up to {min(size, 1.0):.1g} of the amplitude" if size > 0.0 else "the scene has none"
+        yield Effect(name, min(size, 1.0), None, "1", size > 0.0, why)
 
 
 def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[Effect]:

@@ -14,7 +14,6 @@ import numpy as np
 
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band
-from pipeline.dynamics.terms import required
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import Figures, File, Json, Overwrite, flag, option, output
@@ -95,8 +94,7 @@ def simulate(
     wanted = default_tolerance(band) if tolerance is None and method == "auto" else tolerance
     if not force:
         demand_stable(ready.problem, method, dt if tolerance is None else None, where=where)
-    terms = required(ready.problem, dt * count, wanted)[1] if method == "auto" and wanted else ()
-    effects = simulated_effects(ready.stated, ready.problem, terms, dt * count, ready.drag)
+    effects = simulated_effects(ready.stated, ready.problem, dt * count, ready.drag)
     try:
         simulation = simulated(ready.problem, method, dt, count, wanted, check=check)
     except DynamicsError as error:

@@ -132,8 +132,8 @@ def _readings(found: Simulation, sensor: VirtualSensor, name: str, seed: int) ->
     omega, rest = problem.equation.angular_frequency_per_s, _rest_m(found.trajectory)
     # The sound of the last reading is still on its way to the bob at the end of the run.
     longer_s = seconds + 2.0 * spacing_s + 3.0 * rest / sensor.speed_of_sound_m_per_s
-    parts = max(1, math.ceil(FINE * omega * spacing_s)) if found.solution.terms else 1
-    method = "auto" if found.solution.terms else found.solution.integrator.name
+    parts = max(1, math.ceil(FINE * omega * spacing_s)) if found.solution.chosen else 1
+    method = "auto" if found.solution.chosen else found.solution.integrator.name
     count = parts * (count_of(longer_s, spacing_s) + 1)
     motion = solve(problem, method, spacing_s / parts, count, None).trajectory
 

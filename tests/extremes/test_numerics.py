@@ -26,15 +26,6 @@ def limit(name: str, ratio: float) -> float:
     return OMEGA * get_integrator(name).stable_step(Problem(equation, 0.05))
 
 
-@pytest.mark.parametrize("x", [1e-3, 1e-2, 0.0866, 1.0, 3.0])
-def test_forward_euler_grows_by_the_root_of_one_plus_x_squared(x: float) -> None:
-    """An undamped step of x = omega h multiplies the amplitude by sqrt(1 + x^2)."""
-    method = get_integrator("forward-euler")
-    run = method.run(Problem(FREE, 0.05), x / OMEGA, 100)
-    grown = math.sqrt(run.relative_energy()[-1])
-    assert grown == pytest.approx((1.0 + x * x) ** 50, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("name", "expected"), [("symplectic-euler", 2.0), ("verlet", 2.0), ("rk4", 2.8284), ("yoshida4", 1.5734)]
 )
@@ -53,39 +44,6 @@ def test_exact_flows_have_no_limit(name: str, x: float) -> None:
     run = get_integrator(name).run(Problem(FREE, 0.05), x / OMEGA, 10_000)
     assert math.isinf(limit(name, 0.0))
     np.testing.assert_allclose(run.relative_energy(), 1.0, atol=1e-11)
-
-
-@pytest.mark.parametrize("ratio", [1e-4, 0.01, 0.3])
-def test_damped_forward_euler_is_stable_below_two_gamma_over_omega_squared(ratio: float) -> None:
-    """The limit is 2 gamma / omega^2."""
-    assert limit("forward-euler", ratio) == pytest.approx(2.0 * ratio, rel=1e-12)
-
-
-def test_undamped_forward_euler_has_no_stable_step() -> None:
-    """Its limit is 0."""
-    assert limit("forward-euler", 0.0) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("name", "ratio", "expected"), [("symplectic-euler", 1.0, 0.828), ("symplectic-euler", 1e3, 1e-3)]
-)
-def test_damped_limits_of_symplectic_euler(name: str, ratio: float, expected: float) -> None:
-    """At gamma = omega 0.83, at 1000 omega 0.001."""
-    assert limit("symplectic-euler", ratio) == pytest.approx(expected, rel=2e-3)
-
-
-def test_energy_of_rk4_after_ten_million_steps() -> None:
-    """At omega h = 0.0866 RK4 loses 5.7 %: 1e5 steps as run, 1e7 as their power."""
-    method = get_integrator("rk4")
-    run = method.run(Problem(FREE, 0.05), 0.01, 100_000, every=100_000)
-    assert run.relative_energy()[-1] ** 100 - 1.0 == pytest.approx(-0.057, abs=0.001)
-
-
-@pytest.mark.parametrize(("name", "drift"), [("exact", 4e-15), ("strang", 2e-9)])
-def test_energy_of_exact_flows_after_ten_million_steps(name: str, drift: float) -> None:
-    """Evaluated at each time the exact flow keeps the energy to 4e-15; stepped, Strang to 2e-9."""
-    run = get_integrator(name).run(Problem(FREE, 0.05), 0.01, 10_000_000, every=1_000_000)
-    assert np.max(np.abs(run.relative_energy() - 1.0)) <= drift
 
 
 def test_times_do_not_accumulate() -> None:
@@ -161,16 +119,6 @@ def test_no_damping_and_no_step_is_too_much(name: str, ratio: float, x: float) -
     assert np.all(np.diff(run.relative_energy()) <= 1e-11)
 
 
-@pytest.mark.parametrize("x", [1e-8, 1e-6, 1e-3])
-@pytest.mark.parametrize("name", [*EXPLICIT, "strang"])
-def test_tiny_steps_lose_nothing(name: str, x: float) -> None:
-    """1000 steps of omega h down to 1e-8 are within rounding and the method's own error of the exact answer."""
-    method = get_integrator(name)
-    problem = Problem(FREE, 0.05, 0.1)
-    run, truth = method.run(problem, x / OMEGA, 1000), get_integrator("exact").run(problem, x / OMEGA, 1000)
-    assert np.max(np.abs(run.y - truth.y)) / problem.amplitude_m() <= 1e-12 + 1.2 * x * x * 1000
-
-
 def test_friction_stops_the_bob_where_it_must() -> None:
     """With f = 0.5 m/s^2 it rests at -3.336 mm and does not creep: located turning points, and the latch."""
     problem = Problem(Equation(angular_frequency_per_s=OMEGA, friction_m_per_s2=0.5), 0.05)
@@ -180,15 +128,6 @@ def test_friction_stops_the_bob_where_it_must() -> None:
     assert not run.v[-500:].any()
     with pytest.raises(DynamicsError, match=r"dop853 .*turning points.*take strang or auto"):
         get_integrator("dop853").run(problem, 0.01, 10)
-
-
-@pytest.mark.parametrize("name", EXPLICIT)
-def test_without_located_turning_points_the_bob_creeps(name: str) -> None:
-    """A fixed step ends 0.1 to 4 mm off, and goes on moving."""
-    problem = Problem(Equation(angular_frequency_per_s=OMEGA, friction_m_per_s2=0.5), 0.05)
-    run = get_integrator(name).run(problem, 0.01, 1000)
-    assert 1e-4 < abs(run.y[-1] + 3.336e-3) < 4e-3
-    assert np.ptp(run.y[-500:]) > 0.0 or np.any(run.v[-500:])
 
 
 @pytest.mark.parametrize("name", ["strang"])
@@ -217,17 +156,6 @@ def test_a_state_that_is_no_number_is_refused(name: str, bad: float) -> None:
         assert "\n" not in str(caught.value)
 
 
-def test_negative_and_senseless_coefficients_are_refused() -> None:
-    """Each names itself and what is allowed."""
-    with pytest.raises(DynamicsError, match="gamma_per_s must be 0 or more, got -1"):
-        Equation(angular_frequency_per_s=OMEGA, gamma_per_s=-1.0)
-    with pytest.raises(DynamicsError, match="angular_frequency_per_s must be positive"):
-        Equation(angular_frequency_per_s=0.0)
-    for start in ("far", np.ones(2), None):
-        with pytest.raises(DynamicsError, match="displacement_m must be a number of at most"):
-            Problem(FREE, start)
-
-
 def test_a_softening_spring_lets_nothing_escape() -> None:
     """A start beyond the point where the spring would pull is refused; just inside it stays bounded."""
     equation = Equation(angular_frequency_per_s=OMEGA, cubic_per_m2_s2=-(OMEGA**2) / 0.1**2)
@@ -236,9 +164,3 @@ def test_a_softening_spring_lets_nothing_escape() -> None:
             Problem(equation, *start)
     run = get_integrator("dop853").run(Problem(equation, 0.099), 0.01, 1000)
     assert np.all(np.abs(run.y) <= 0.099 * (1.0 + 1e-10))
-
-
-def test_growth_beyond_numbers_is_an_error_with_its_time() -> None:
-    """Undamped forward Euler in giant steps says when it left the range, and what to take instead."""
-    with pytest.raises(DynamicsError, match=r"forward-euler ran beyond the range of numbers by t = .* s; take"):
-        get_integrator("forward-euler").run(Problem(FREE, 0.05), 1.0, 2000)

@@ -372,7 +372,6 @@ def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | Non
         "amplitude_m": found.problem.amplitude_m(),
         "prediction": prediction(found),
         "equation": {name: getattr(found.problem.equation, name) for name in found.problem.equation.__slots__},
-        "terms": [{key: getattr(term, key) for key in ("name", "size", "included", "why")} for term in solution.terms],
         "effects": [
             {key: getattr(effect, key) for key in ("name", "predicted", "measured", "unit", "included", "why")}
             for effect in effects

@@ -8,17 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.trials.troubles.judge import Given, Verdict, try_one
-from tests.trials.troubles.kinds import PLAIN
 from tests.trials.troubles.motion import Bob, swing
 
 pytestmark = pytest.mark.trials
-
-
-def verdict(*, z: float, named: bool = False, refused: bool = False) -> Verdict:
-    """Return a verdict on one estimate."""
-    given = {} if refused else {"period": Given(z, 1.0, 1.0)}
-    return Verdict("made up", 0, given, (), (), refused, named, 0.0, 1000, "standard")
 
 
 def test_linear_drag_follows_the_solution_by_hand() -> None:
@@ -52,44 +44,3 @@ def test_the_amplitude_falls_as_the_law_says(bob: Bob, rate: Callable[[float], f
     motion = swing(bob, 30.0)
     for t in (0.0, 15.0, 29.0):
         assert motion.rate(t) == pytest.approx(rate(motion.amplitude(t)), rel=1e-3)
-
-
-def test_friction_holds_the_bob_where_the_spring_is_weaker() -> None:
-    """Dry friction ends the motion after the half swings that it takes, within its dead band."""
-    omega, mu = 8.0, 4e-3
-    motion = swing(Bob(omega=omega, amplitude=0.05, mu=mu), 60.0, start=0.0)
-    band = 0.5 * math.pi * mu / omega  # where friction holds against the spring, m
-    swings = math.ceil((0.05 - band) / (2.0 * band))
-    assert motion.t[-1] == pytest.approx(swings * math.pi / omega, rel=0.01)
-    assert abs(motion.x[-1]) <= band
-    assert motion.position(np.array([100.0])) == pytest.approx(motion.x[-1])
-
-
-def test_a_seed_makes_the_same_record_again() -> None:
-    """Two makings of one seed agree to the bit, two seeds do not."""
-    first, again, other = PLAIN[0].make(0), PLAIN[0].make(0), PLAIN[0].make(3)
-    assert np.array_equal(first.y, again.y)
-    assert not np.array_equal(first.y, other.y)
-
-
-@pytest.mark.parametrize(
-    ("one", "word"),
-    [
-        (verdict(z=3.9), "right"),
-        (verdict(z=4.1), "confident wrong"),
-        (verdict(z=4.1, named=True), "named"),
-        (verdict(z=0.0, refused=True), "refused"),
-        (verdict(z=0.0, refused=True, named=True), "named"),
-    ],
-    ids=["right", "wrong", "named", "refused", "refused by name"],
-)
-def test_a_verdict_is_one_of_four(one: Verdict, word: str) -> None:
-    """A number within four uncertainties is right, one beyond is named or wrong; without any, the record is refused."""
-    assert one.word == word
-
-
-def test_a_plain_record_is_right() -> None:
-    """A record without trouble is analysed, and its four numbers lie within four uncertainties."""
-    found = try_one(PLAIN[0], 0, "standard")
-    assert found.word == "right"
-    assert set(found.given) == {"period", "offset", "amplitude", "damping_rate"}

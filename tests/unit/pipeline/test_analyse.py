@@ -14,18 +14,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pipeline.analyse import Analysis, Oscillation, Still, analyse
-from pipeline.errors import AnalysisError, PipelineError
+from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.errors import PipelineError
 from pipeline.numerics.estimate import Estimate
 from pipeline.options import options_for
 from pipeline.track import Track
 from tests.sampling import sampled
-
-
-def run(synthetic: ModuleType, seconds: float = 10.0, sigma_m: float = 3e-4, seed: int = 1, **truth: float) -> Analysis:
-    """Analyse a synthetic record."""
-    t = synthetic.times(seconds)
-    return analyse(Track.from_arrays(t, synthetic.noisy(synthetic.Truth(**truth), t, sigma_m, seed)))
 
 
 def motion_of(result: Analysis) -> Oscillation:
@@ -74,49 +68,6 @@ def test_agrees_with_a_waveform_fit_by_lmfit(
         assert found.u == pytest.approx(u, rel=alike), name
 
 
-def test_truth_of_mixed_drag_is_held(synthetic: ModuleType) -> None:
-    """Two minutes of mixed drag: law, coefficients and all that is estimated lie within 4 u of the truth."""
-    truth = synthetic.Truth(gamma=0.0073, beta=0.235)
-    result = run(synthetic, 120.0, gamma=0.0073, beta=0.235)
-    motion = motion_of(result)
-    assert motion.damping.admissible == ("linear+quadratic",)
-    joint = motion.damping.best.joint
-    for found, value in (
-        (motion.derived.statistical["period"], truth.period),
-        (result.estimates["amplitude"], truth.amplitude),
-        (result.estimates["offset"], truth.offset),
-        (result.estimates["phase"], truth.phase),
-        (result.estimates["noise"], 3e-4),
-        (result.estimates["damping_rate"], 0.0073 + 0.235 * 0.05),
-        (joint["gamma"], 0.0073),
-        (joint["beta"], 0.235),
-    ):
-        assert abs(pull(found, value)) < 4.0
-
-
-STILL = {
-    "constant": lambda t, _: np.full(t.size, 0.2),
-    "white noise": lambda t, rng: 0.2 + 1e-3 * rng.standard_normal(t.size),
-    "step": lambda t, rng: 0.2 + 0.05 * (t > 5.0) + 1e-4 * rng.standard_normal(t.size),
-    "clean step": lambda t, _: 0.2 + 0.05 * (t > 5.0),
-    "ramp": lambda t, rng: 0.2 + 0.01 * t + 1e-4 * rng.standard_normal(t.size),
-    "clean ramp": lambda t, _: 0.2 + 0.01 * t,
-    "one period": lambda t, rng: 0.2 + 0.05 * np.cos(2 * np.pi * t / 10.0) + 1e-4 * rng.standard_normal(t.size),
-    "zero": lambda t, _: np.zeros(t.size),
-}
-
-
-@pytest.mark.parametrize("what", STILL)
-def test_a_run_that_does_not_oscillate_is_an_error_with_its_reason(what: str) -> None:
-    """There is no period, amplitude or damping of what does not oscillate: offset and noise only, and the reason."""
-    t = np.arange(1000) / 100
-    result = analyse(Track.from_arrays(t, STILL[what](t, np.random.default_rng(2))))
-    assert isinstance(result.motion, Still)
-    assert set(result.estimates) == {"offset", "noise"}
-    assert (result.findings[0].code, result.findings[0].severity) == ("no_oscillation", "error")
-    assert result.quality["used"] > 0
-
-
 def test_the_rest_position_of_a_step_is_not_stated_too_finely() -> None:
     """Where the distance steps by 50 mm, the mean's uncertainty is of its size; in white noise it is that of a mean."""
     t = np.arange(3000) / 100
@@ -125,73 +76,6 @@ def test_the_rest_position_of_a_step_is_not_stated_too_finely() -> None:
     white = analyse(Track.from_arrays(t, 0.3 + noise)).estimates["offset"]
     assert 0.01 < step.u < 0.05
     assert white.u == pytest.approx(3e-4 / np.sqrt(t.size), rel=0.1)
-
-
-@pytest.mark.parametrize("y", [[0.1, 0.2], [np.nan] * 1000, [np.inf] * 50, [0.1] * 7])
-def test_too_few_distances_are_refused(y: list[float]) -> None:
-    """Two samples, nothing but missing ones, seven: refused with the number that there was."""
-    with pytest.raises(AnalysisError, match=f"of {len(y)}"):
-        analyse(Track.from_arrays(np.arange(len(y)) / 100, y))
-
-
-def test_missing_and_infinite_samples_are_left_out(synthetic: ModuleType) -> None:
-    """NaN and infinity here and there change the result by less than its uncertainty."""
-    t = synthetic.times(20)
-    y = synthetic.noisy(synthetic.Truth(gamma=0.005), t, 3e-4, 3)
-    whole = analyse(Track.from_arrays(t, y))
-    holes = y.copy()
-    holes[[0, 7, 8, 9, 700, 1999]] = np.nan
-    holes[[100, 900]] = np.inf
-    holes[[300]] = -np.inf
-    result = analyse(Track.from_arrays(t, holes))
-    assert result.quality["missing"] == 9
-    for name in ("period", "amplitude", "offset"):
-        assert abs(result.estimates[name].value - whole.estimates[name].value) < 0.7 * whole.estimates[name].u
-
-
-def test_unsorted_time_is_flagged_and_survived(synthetic: ModuleType) -> None:
-    """Swapped rows and a block out of order are flagged; what is left gives the right period."""
-    truth = synthetic.Truth(gamma=0.005)
-    t = synthetic.times(20)
-    y = synthetic.noisy(truth, t, 3e-4, 4)
-    order = np.arange(2000)
-    order[[500, 501]] = order[[501, 500]]
-    order[1200:1210] = order[1200:1210][::-1]
-    result = analyse(Track.from_arrays(t[order], y[order]))
-    assert result.quality["non_monotonic_time"] == 10
-    assert abs(pull(result.estimates["period"], truth.period)) < 4
-    assert abs(pull(result.estimates["amplitude"], truth.amplitude)) < 4
-
-
-@pytest.mark.parametrize("scale", [4.0])
-def test_scale_of_time_does_not_matter(synthetic: ModuleType, scale: float) -> None:
-    """Twice as fast and four times as slow the relative errors are the same."""
-    t = synthetic.times(20)
-    y = synthetic.noisy(synthetic.Truth(amplitude=0.02, gamma=0.01463), t, 3e-4, 6)
-    here, there = analyse(Track.from_arrays(t, y)), analyse(Track.from_arrays(scale * t, y))
-    for name, power in (("period", 1), ("frequency", -1), ("damping_rate", -1), ("amplitude", 0), ("velocity_rms", -1)):
-        found, expected = there.estimates[name], here.estimates[name]
-        assert found.value == pytest.approx(scale**power * expected.value, rel=1e-6), name
-        assert found.u == pytest.approx(scale**power * expected.u, rel=1e-3), name
-
-
-@pytest.mark.parametrize(
-    ("share", "how"), sampled([(0.2, "anywhere"), (0.05, "one place"), (0.01, "anywhere"), (0.2, "one place")])
-)
-def test_lone_false_echoes_do_no_harm(synthetic: ModuleType, share: float, how: str) -> None:
-    """With up to a fifth of all samples false the period still errs by less than 1.6 times the bound."""
-    truth = synthetic.Truth()
-    t = synthetic.times(10)
-    bound = synthetic.fisher_bounds(truth, t, 3e-4)["period"]
-    errors = []
-    for seed in range(10):
-        rng = np.random.default_rng(seed)
-        y = synthetic.noisy(truth, t, 3e-4, seed + 100)
-        false = rng.random(t.size) < share
-        y[false] = rng.uniform(0.0, 2.0, np.count_nonzero(false)) if how == "anywhere" else y[false] + 0.4
-        motion = motion_of(analyse(Track.from_arrays(t, y)))
-        errors.append((motion.derived.statistical["period"].value - truth.period) / bound)
-    assert np.sqrt(np.mean(np.square(errors))) < 1.6
 
 
 def test_same_track_same_answer(synthetic: ModuleType) -> None:
@@ -206,16 +90,6 @@ def test_same_track_same_answer(synthetic: ModuleType) -> None:
     np.testing.assert_array_equal(track.y, y)
     np.testing.assert_array_equal(track.t, t)
     assert not track.flags.any()
-
-
-def test_every_clock_leaves_its_crystal(synthetic: ModuleType) -> None:
-    """Whoever measured the times, the period's uncertainty holds a crystal's 29 ppm beside the scatter's."""
-    t = synthetic.times(20)
-    track = Track.from_arrays(t, synthetic.noisy(synthetic.Truth(), t, 3e-4, 8))
-    for clock in ("nominal", "device", "host"):
-        motion = motion_of(analyse(replace(track, clock=clock)))
-        period, scatter = motion.derived.estimates["period"], motion.derived.statistical["period"]
-        assert period.u == pytest.approx(math.hypot(scatter.u, period.value * 50e-6 / math.sqrt(3)), rel=1e-6)
 
 
 def sane(result: Analysis) -> None:
@@ -309,19 +183,6 @@ def test_amplitude_and_phase_are_of_the_first_row_though_an_echo_stands_there(sy
         assert abs(one.value - other.value) < 0.5 * max(one.u, other.u), name
 
 
-def test_drag_of_a_power_between_linear_and_quadratic_is_physics(synthetic: ModuleType) -> None:
-    """A boundary layer's A^(3/2) is selected and stated with its power, and nothing warns of it."""
-    result = run(synthetic, 120.0, 1e-4, c=0.07, n=1.5)
-    motion = motion_of(result)
-    assert motion.damping.selected == "power"
-    n = motion.derived.coefficients["n"]
-    assert abs(n.value - 1.5) < 4.0 * n.u < 0.05
-    assert (
-        abs(result.estimates["damping_rate"].value - 0.07 * math.sqrt(0.05)) < 4.0 * result.estimates["damping_rate"].u
-    )
-    assert {finding.severity for finding in result.findings} <= {"info"}
-
-
 def test_a_still_start_ends_at_the_recordings_own_trigger() -> None:
     """What hangs still before the trigger is left out at that moment."""
     rng, t, trigger_s = np.random.default_rng(5), np.arange(3000) / 100.0, 2.0
@@ -343,28 +204,6 @@ def test_a_trigger_in_a_swing_leaves_nothing_out(synthetic: ModuleType) -> None:
     result = analyse(replace(track, trigger_s=2.0))
     assert result.quality["outside"] == 0
     assert not any(finding.code == "at_rest" for finding in result.findings)
-
-
-@pytest.mark.parametrize("window", sampled(range(2, 37, 5)))
-@pytest.mark.parametrize("sigma_m", [1e-4, 1e-3])
-def test_a_cluster_of_echoes_does_not_reach_the_result(synthetic: ModuleType, sigma_m: float, window: int) -> None:
-    """Where 60 % of a period are shifted by 4 mm, amplitude and period still hold their intervals."""
-    truth, t = synthetic.Truth(gamma=0.005), synthetic.times(30)
-    y = synthetic.noisy(truth, t, sigma_m, window)
-    first = round(window * truth.period * 100) + 6
-    y[first : first + 45] += 0.004
-    found = analyse(Track.from_arrays(t, y)).estimates
-    assert abs(pull(found["amplitude"], truth.amplitude)) < 3.5
-    assert abs(pull(found["period"], truth.period)) < 3.5
-
-
-def test_a_rest_position_that_creeps_is_named(synthetic: ModuleType) -> None:
-    """A rest position that creeps by 20 mm within seconds leaves the period within 4 u and is a warning."""
-    truth, t = synthetic.Truth(gamma=0.0065, phase=1.6), synthetic.times(60)
-    y = synthetic.noisy(truth, t, 2e-4, 14) + 0.02 * (1.0 - np.exp(-t / 8.0))
-    found = analyse(Track.from_arrays(t, y))
-    assert abs(pull(found.estimates["period"], truth.period)) < 4.0
-    assert "rest_drift" in {finding.code for finding in found.findings}
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "standard", "best"])

@@ -10,7 +10,7 @@ import pytest
 from pipeline.analyse import analyse
 from pipeline.analysis import Analysis, Oscillation
 from pipeline.bench.scene import Scene
-from pipeline.track import Quality, Track
+from pipeline.track import Track
 from tests.sampling import sampled
 
 NOISES, RATES, GAPS = (1e-4, 3e-4, 2e-3), (50, 100), (0.05, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0)
@@ -70,48 +70,6 @@ def test_a_long_pause_is_named_with_the_part_beyond_it(pause_s: float) -> None:
     assert f"--from {30.0 + pause_s:.2f}" in finding.advice
     assert analysis.estimates["amplitude"].value == pytest.approx(0.052, abs=3e-5)
     assert analysis.estimates["damping_rate"].value == pytest.approx(0.015, abs=1e-4)
-
-
-def test_a_gap_shorter_than_the_record_beside_it_is_bridged() -> None:
-    """Twelve seconds out of sixty are missing in one swing."""
-    t = np.arange(6000) / 100
-    t = t[(t < 20.0) | (t > 32.0)]
-    analysis = analyse(Track.from_arrays(t, damped(t)))
-    assert "long_gap" not in codes(analysis)
-    assert abs(pulled(analysis, 0.790066)) < 4.0
-
-
-@pytest.mark.parametrize("gap_s", [1.5, 5.0])
-@pytest.mark.parametrize("seed", sampled(range(20), 3))
-def test_the_samples_after_a_gap_are_no_echoes(gap_s: float, seed: int) -> None:
-    """A port was lost for seconds; a neighbour across the gap is no neighbour."""
-    t = np.arange(1800) / 100
-    first_s = np.random.default_rng(seed).uniform(4.0, 12.0)
-    t = t[(t < first_s) | (t > first_s + gap_s)]
-    flags = analyse(Track.from_arrays(t, damped(t, seed))).flags
-    assert not np.any(flags[np.abs(t - first_s - 0.5 * gap_s) < 0.5 * gap_s + 0.1] & np.uint8(Quality.FALSE_ECHO))
-
-
-@pytest.mark.parametrize("seed", sampled(range(12), 3))
-def test_lost_rows_are_named_and_covered(seed: int) -> None:
-    """Two per cent of the rows are lost, and the times are row numbers."""
-    rng = np.random.default_rng(seed)
-    y = damped(np.arange(1500) / 50, seed)[rng.random(1500) > 0.02]
-    analysis = analyse(Track.from_arrays(np.arange(y.size) / 50, y))
-    assert "lost_rows" in codes(analysis, "warning")
-    assert not codes(analysis) & {"clipped", "smoothed_sensor", "amplitude_dependent_frequency"}
-    period = analysis.estimates["period"]
-    assert abs(period.value - 0.790066) < 2.0 * period.u
-    assert 0.008 < period.u / period.value < 0.04
-
-
-@pytest.mark.parametrize("seed", sampled(range(40), 4))
-def test_no_rows_are_said_to_be_lost_where_none_are(seed: int) -> None:
-    """Even times alone do not make lost rows, whatever the noise."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(3000) / 100
-    y = damped(t, seed) + rng.choice([0.0, 3e-4, 3e-3]) * rng.standard_normal(t.size)
-    assert "lost_rows" not in codes(analyse(Track.from_arrays(t, y)))
 
 
 @pytest.mark.parametrize("degrees", [20, 30, 45, 60, 75, 90])

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Oscillation, analyse
-from pipeline.bench.air import air_density, air_viscosity
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate, format_value
 from pipeline.results.classic import STATED_ERROR_M, classic
@@ -49,20 +48,6 @@ def decaying_velocity(samples: int = 12_020) -> np.ndarray:
     return velocity * RMS_M_PER_S / math.sqrt(float(np.mean(velocity**2)))
 
 
-def test_signs_of_the_equations_of_motion(synthetic: ModuleType) -> None:
-    """(4b), (8a): dq/dt = p/m and dv/dt = -Omega^2 y; with the printed signs and q/m the motion is no solution."""
-    truth, mass, h = synthetic.Truth(offset=0.0), 0.2007, 1e-4
-    t = np.linspace(0.0, 3.0, 200)
-    velocity = (truth.position(t + h) - truth.position(t - h)) / (2 * h)
-    acceleration = (truth.position(t + h) - 2 * truth.position(t) + truth.position(t - h)) / h**2
-    y = truth.position(t)
-    assert acceleration == pytest.approx(-(truth.omega**2) * y, abs=1e-4)
-    assert not np.allclose(acceleration, truth.omega**2 * y, atol=0.1)
-    momentum = mass * velocity
-    assert velocity == pytest.approx(momentum / mass)
-    assert not np.allclose(velocity, y / mass, atol=0.1)
-
-
 @pytest.mark.parametrize(
     ("seconds", "scene", "name", "value", "u", "digits_value", "digits_u"),
     [
@@ -84,14 +69,6 @@ def test_report_inputs_give_the_golden_values(
     assert found.value == pytest.approx(value, abs=digits_value)
     assert found.u == pytest.approx(u, abs=digits_u)
     assert found.u > 0
-
-
-def test_u_of_the_spring_constant_was_relative_and_rounded_early() -> None:
-    """(16b) 0.002 N/m is the relative uncertainty; with u(omega) = 0.01 it is 0.0024, unrounded 0.0038."""
-    rounded = math.hypot(2 * 0.01 / 8.35, 0.00005 / 0.2007)
-    assert rounded == pytest.approx(0.0024, abs=5e-5)
-    found = estimates(5.27, BARE)["spring_constant"]
-    assert found.u / found.value == pytest.approx(0.0038, abs=5e-5)
 
 
 def test_reports_spring_constants_are_28_sigma_apart() -> None:
@@ -137,42 +114,12 @@ def test_velocity_uncertainty_as_printed() -> None:
     assert round(found.u, 6) == pytest.approx(7e-6, abs=1e-6)
 
 
-def test_velocity_uncertainty_as_right() -> None:
-    """(25) with the deviation of v^2 and the root of N: about 1.0e-3 m/s, a hundred times the printed one."""
-    velocity = decaying_velocity()
-    right = float(np.std(velocity**2)) / (2 * RMS_M_PER_S * math.sqrt(velocity.size))
-    assert right == pytest.approx(1.0e-3, abs=1.5e-4)
-
-
-def test_uncertainty_of_velocity_times_length() -> None:
-    """(26) u(v l) is 9.0e-5 m^2/s, 55 times less than the printed 0.005."""
-    product = RMS_M_PER_S * 0.102
-    u = product * math.hypot(7e-6 / RMS_M_PER_S, 0.0005 / 0.102)
-    assert u == pytest.approx(9.0e-5, abs=5e-7)
-    assert 0.005 / u == pytest.approx(55, abs=0.5)
-
-
 def test_reynolds_number_from_the_length_alone() -> None:
     """1.204 x 0.18073 x 0.102 / 1.825e-5 = 1216 +- 6 where only the disc's diameter is uncertain."""
     found = classic(replace(seven_cycles(5.08), velocity=decaying_velocity()), DISC).estimates
     assert found["reynolds_number"].value == pytest.approx(1216.2, abs=0.1)
     assert found["reynolds_number"].u == pytest.approx(5.96, abs=0.01)
     assert str(found["reynolds_number"]) == "1216.2 +- 6.0"
-
-
-def test_reynolds_number_with_the_air_in_it() -> None:
-    """Density from pressure and humidity, viscosity after Sutherland: 1.22e3, uncertain by 2 %."""
-    temperature_c, u_temperature_k, u_pressure_pa, u_viscosity = 20.0, 2.0, 1500.0, 0.01
-    rho, eta = air_density(temperature_c), air_viscosity(temperature_c)
-    value = rho * RMS_M_PER_S * 0.102 / eta
-    assert value == pytest.approx(1.22e3, abs=10)
-    by_kelvin = (
-        math.log(air_density(21.0) / air_viscosity(21.0)) - math.log(air_density(19.0) / air_viscosity(19.0))
-    ) / 2
-    relative = math.sqrt(
-        (by_kelvin * u_temperature_k) ** 2 + (u_pressure_pa / 101325.0) ** 2 + (0.0005 / 0.102) ** 2 + u_viscosity**2
-    )
-    assert round(100 * relative) == 2
 
 
 def test_the_printed_uncertainty_of_gamma_is_a_variance(synthetic: ModuleType) -> None:
@@ -186,19 +133,6 @@ def test_the_printed_uncertainty_of_gamma_is_a_variance(synthetic: ModuleType) -
     assert abs(found.value - (truth.gamma + truth.beta * truth.amplitude)) > 100 * found.u
 
 
-def test_forward_euler_gains_energy_in_a_geometric_row() -> None:
-    """Not "linearly": 1 + (omega h)^2 a step, amplitude x 32 and energy x 1034 in 10 s at 0.01 s."""
-    omega, h = 8.3458, 0.01
-    y, v, energies = 0.05914, 0.0, []
-    for _ in range(1001):
-        energies.append(0.5 * (v**2 + omega**2 * y**2))
-        y, v = y + h * v, v - h * omega**2 * y
-    ratios = np.array(energies[1:]) / np.array(energies[:-1])
-    assert ratios == pytest.approx(np.full(1000, 1 + (omega * h) ** 2), rel=1e-12)
-    assert energies[-1] / energies[0] == pytest.approx(1034, abs=1)
-    assert math.sqrt(energies[-1] / energies[0]) == pytest.approx(32, abs=0.5)
-
-
 def test_chi_square_of_63_was_no_poor_fit(synthetic: ModuleType) -> None:
     """62.9 over 12,020 points is a 200th each: 2.39 mm is no noise. The exponential falls all the same, by its law."""
     truth = synthetic.Truth(amplitude=0.05092, gamma=0.0073, beta=0.235)
@@ -210,17 +144,3 @@ def test_chi_square_of_63_was_no_poor_fit(synthetic: ModuleType) -> None:
     assert isinstance(motion, Oscillation)
     assert motion.damping.fits["linear"].rejection == "misfit"
     assert motion.damping.selected == "linear+quadratic"
-
-
-@pytest.mark.parametrize(
-    ("value", "u", "unit", "text"),
-    [
-        (5.27 / 7, 0.01 / 7, "s", "0.7529 +- 0.0014 s"),
-        (13.9793, 0.0532, "N/m", "13.979 +- 0.053 N/m"),
-        (16.3113, 0.0643, "N/m", "16.311 +- 0.064 N/m"),
-        (8.34580, 0.01584, "1/s", "8.346 +- 0.016 1/s"),
-    ],
-)
-def test_golden_values_as_printed(value: float, u: float, unit: str, text: str) -> None:
-    """Two digits of uncertainty, where the report printed one and rounded it down."""
-    assert format_value(value, u, unit) == text

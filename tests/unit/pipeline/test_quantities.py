@@ -14,7 +14,6 @@ from pipeline.errors import AnalysisError, TrackError
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun
-from pipeline.streaming import LiveMotion, MotionAccumulator
 from pipeline.track import UNITS, Track
 from tests.sampling import sampled
 from tests.synthetic import Truth, noisy, times
@@ -120,23 +119,6 @@ def test_a_derivative_gives_the_displacement_and_what_follows_from_it(order: int
         assert abs(mine.value - its.value) < 3.0 * np.hypot(mine.u, its.u), name
 
 
-def test_an_angular_velocity_gives_the_angle() -> None:
-    """Its amplitude over omega, and none of what needs a length; a spring constant where the scene has a spring."""
-    t = times(60.0)
-    angle = TRUTH.position(t) - TRUTH.offset
-    y = np.gradient(angle, t, edge_order=2) + 0.0025 * np.random.default_rng(4).standard_normal(t.size)
-    spring = replace(SCENE, spring_mass_kg=Estimate(0.01, 1e-4, "kg"))
-    for scene in (SCENE, spring):
-        found = analyse(Track.from_arrays(t, y, quantity="angular_velocity", unit="rad/s"), scene).estimates
-        amplitude = found["angle_amplitude"]
-        assert amplitude.unit == "rad"
-        assert abs(amplitude.value - TRUTH.amplitude) < 2.5 * amplitude.u < 0.01 * TRUTH.amplitude
-        assert abs(found["period"].value - TRUTH.period) < 3.0 * found["period"].u
-        assert found["velocity_rms"].unit == "rad/s"
-        assert ("spring_constant" in found) == (scene is spring)
-        assert not {"displacement_amplitude", "reynolds_number", "drag_coefficient"} & set(found)
-
-
 def test_what_a_scene_allows_of_an_angle_a_voltage_and_a_force() -> None:
     """A spring constant needs mass and period, of an angle also a spring; Re, energy and drag need a displacement."""
     spring = replace(SCENE, spring_mass_kg=Estimate(0.01, 1e-4, "kg"))
@@ -157,17 +139,6 @@ def test_what_a_scene_allows_of_an_angle_a_voltage_and_a_force() -> None:
         assert ("velocity_rms" in found.estimates) == (quantity == "angle")
 
 
-def test_a_shake_beyond_gravity_is_implausible_and_an_angle_never() -> None:
-    """An acceleration of 30 m/s^2 is none of a hanging bob, nor 30 m/s; 30 rad or 30 V are nobody's business."""
-    t = times(20.0)
-    y = 30.0 * np.cos(8.3 * t) + 0.01 * np.random.default_rng(1).standard_normal(t.size)
-    for quantity, unit in UNITS.items():
-        found = analyse(Track.from_arrays(t, y, quantity=quantity, unit=unit))
-        codes = {finding.code for finding in found.findings}
-        assert ("implausible_motion" in codes) == (quantity in ("length", "velocity", "acceleration")), quantity
-        assert ("implausible_distance" in codes) == (quantity == "length"), quantity
-
-
 def test_what_needs_a_length_says_so_in_one_line() -> None:
     """The report's own method, and springs compared by a pendulum's angle."""
     with pytest.raises(TrackError, match="length in m, got voltage in V"):
@@ -176,14 +147,3 @@ def test_what_needs_a_length_says_so_in_one_line() -> None:
     with pytest.raises(AnalysisError, match=r"^swing: "):
         SpringRun.of("swing", oscillation(found).derived)
     assert SpringRun.of("coil", oscillation(analyse(track("voltage", "V"), SCENE)).derived).clock == ""
-
-
-def test_a_live_angle_has_its_unit() -> None:
-    """Period as of a length, amplitude in rad."""
-    motion = MotionAccumulator(100.0, quantity="angle", unit="rad")
-    samples = track("angle", "rad", seconds=10.0)
-    motion.push(samples.t, samples.y, samples.flags)
-    found = motion.value()
-    assert isinstance(found, LiveMotion)
-    assert (found.amplitude.unit, found.offset.unit, found.period.unit) == ("rad", "rad", "s")
-    assert found.period.value == pytest.approx(TRUTH.period, rel=1e-3)

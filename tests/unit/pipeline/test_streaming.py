@@ -48,40 +48,6 @@ def test_value_is_the_batch_analysis_of_the_same_samples(size: int) -> None:
     assert held.value() == batch(*(column[-1000:] for column in columns))
 
 
-def test_value_can_be_asked_for_again_and_changes_nothing() -> None:
-    """Asking twice gives the same, and pushing goes on from there."""
-    columns = motion(12.0)
-    held, other = MotionAccumulator(RATE_HZ), MotionAccumulator(RATE_HZ)
-    push(held, [column[:800] for column in columns], [])
-    assert held.value() == held.value()
-    push(held, [column[800:] for column in columns], [])
-    push(other, columns, [])
-    assert held.value() == other.value()
-
-
-def test_what_was_pushed_may_be_overwritten() -> None:
-    """The samples held are copies, and a track handed out is one too."""
-    columns = motion(8.0)
-    held = MotionAccumulator(RATE_HZ)
-    push(held, columns, [])
-    before = held.value()
-    columns[1][:] = 0.0
-    held.track().y[:] = 0.0
-    assert held.value() == before
-
-
-def test_clear_forgets_everything() -> None:
-    """After a clear the next samples alone count."""
-    held, fresh = MotionAccumulator(RATE_HZ), MotionAccumulator(RATE_HZ)
-    push(held, motion(10.0, seed=2), [50] * 20)
-    held.clear()
-    assert len(held) == 0
-    assert isinstance(held.value(), NotYet)
-    for one in (held, fresh):
-        push(one, motion(7.0, seed=3), [70] * 10)
-    assert held.value() == fresh.value()
-
-
 def test_memory_is_flat_over_an_hour() -> None:
     """360,000 samples pushed allocate no more than the window holds, and leave the last window."""
     held = MotionAccumulator(RATE_HZ, 10.0)
@@ -142,14 +108,3 @@ def test_it_says_why_there_is_no_value_yet(y: np.ndarray, flags: int) -> None:
     assert isinstance(answer, NotYet)
     assert answer.why
     assert "\n" not in answer.why
-
-
-def test_random_samples_never_raise() -> None:
-    """Whatever comes off a wrong sensor, the value is a motion or a reason."""
-    rng = np.random.default_rng(6)
-    for n in (16, 17, 40, 200, 1000):
-        for _ in range(6):
-            held = MotionAccumulator(RATE_HZ)
-            y = rng.choice([0.1, 0.25, 0.3, 4.0, np.nan], n)
-            held.push(np.arange(n) / RATE_HZ, y, np.where(np.isnan(y), np.uint8(Quality.MISSING), np.uint8(0)))
-            assert isinstance(held.value(), LiveMotion | NotYet)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from acquisition.block import UNITS as BLOCK_UNITS
 from acquisition.block import Flag
 from pipeline.errors import PipelineError, TrackError
-from pipeline.track import UNITS, UNUSABLE, Quality, Track
+from pipeline.track import UNITS, Quality, Track
 
 
 def test_quality_is_the_run_files_flags() -> None:
@@ -21,36 +21,6 @@ def test_quality_is_the_run_files_flags() -> None:
         bit.name: bit.value for bit in Flag
     }
     assert int(Quality.OUTSIDE) not in {bit.value for bit in Flag}
-
-
-def test_only_a_gap_before_leaves_a_sample_usable() -> None:
-    """Every bit but GAP_BEFORE keeps a sample out of fits."""
-    assert [bit for bit in Quality if not int(UNUSABLE) & bit] == [Quality.GAP_BEFORE]
-
-
-def test_lists_become_float_arrays() -> None:
-    """Lists of whole numbers become float64 seconds and metres, flags become bytes."""
-    track = Track.from_arrays([0, 1, 2], [1, 2, 3], flags=[0, 1, 64])
-    assert (track.t.dtype, track.y.dtype, track.flags.dtype) == (np.float64, np.float64, np.uint8)
-    assert len(track) == 3
-    assert track.rate_hz == 1.0
-    assert (track.clock, track.kind) == ("nominal", "replay")
-
-
-def test_arrays_are_copied() -> None:
-    """What happens to the caller's array afterwards does not reach the track."""
-    y = np.array([0.1, 0.2, 0.3])
-    track = Track.from_arrays([0.0, 0.01, 0.02], y)
-    y[:] = 9.0
-    assert track.y.tolist() == [0.1, 0.2, 0.3]
-
-
-@pytest.mark.parametrize("rate", [99.9, 0.1])
-def test_rate_is_the_reciprocal_of_the_median_step(rate: float) -> None:
-    """The rate is told from times even where one of them is missing, repeated or late."""
-    t = np.arange(101) / rate
-    t[20], t[30], t[40] = np.nan, t[29], t[40] + 0.4 / rate
-    assert Track.from_arrays(t, np.zeros(101)).rate_hz == pytest.approx(rate, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -47,14 +47,6 @@ def test_every_key_of_the_reference_scene_is_read() -> None:
     assert scene.tells_of_sensor
 
 
-def test_nothing_known_is_empty() -> None:
-    """No tables, and tables without keys, leave every quantity None."""
-    for tables in ({}, {"bob": {}, "sensor": {}}):
-        scene = Scene.from_mapping(tables)
-        assert scene == Scene()
-        assert scene.to_mapping() == {}
-
-
 REFUSED: list[tuple[str, str, Any]] = [
     ("bob", "mass_g", 200.0),
     ("bob", "mass_kg", -0.2),
@@ -96,32 +88,12 @@ def test_a_refusal_names_file_table_and_key(table: str, key: str, value: object)
     assert "\n" not in message
 
 
-@pytest.mark.parametrize("tables", [{"Bob": {"mass_kg": 0.2}}, {"bob": 0.2}])
-def test_what_is_no_table_of_a_scene_is_refused(tables: dict[str, Any]) -> None:
-    """A table that no scene has, and a number in place of one, are refused with the file and the name."""
-    with pytest.raises(SceneError, match=rf"b\.toml: .*{next(iter(tables))}"):
-        Scene.from_mapping(tables, where="b.toml")
-
-
 def test_air_that_its_pressure_cannot_hold_is_refused() -> None:
     """Temperature, pressure and humidity that each may be true, and together are not, are one line."""
     air = {"temperature_c": 150.0, "pressure_pa": 101325.0, "relative_humidity": 1.0}
     with pytest.raises(SceneError, match=r"b\.toml: \[air\] relative_humidity"):
         Scene.from_mapping({"air": air}, where="b.toml")
     assert Scene.from_mapping({"air": {**air, "relative_humidity": 0.1}}).air_relative_humidity is not None
-
-
-def test_zero_is_allowed_where_it_means_none() -> None:
-    """A massless spring, dry air, no drag and rest at the start are scenes."""
-    scene = Scene.from_mapping(
-        {
-            "spring": {"mass_kg": 0},
-            "air": {"relative_humidity": 0},
-            "damping": {"gamma_per_s": 0},
-            "start": {"displacement_m": 0},
-        }
-    )
-    assert scene.spring_mass_kg == Estimate(0.0, 0.0, "kg")
 
 
 def test_reference_scene_comes_back() -> None:

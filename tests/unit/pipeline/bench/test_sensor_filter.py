@@ -36,14 +36,6 @@ def test_a_running_mean_has_the_response_of_its_coefficients(n: int) -> None:
     assert found.delay(OMEGA) == pytest.approx(-np.angle(response), abs=1e-12)
 
 
-def test_filters_behind_one_another_multiply_and_add() -> None:
-    """A lag behind a mean has the product of the sizes and the sum of the delays."""
-    both, mean, lag = filter_of(mean_samples=7, lag_s=0.05), filter_of(mean_samples=7), filter_of(lag_s=0.05)
-    assert both.gain(OMEGA) == pytest.approx(mean.gain(OMEGA) * lag.gain(OMEGA))
-    assert both.delay(OMEGA) == pytest.approx(mean.delay(OMEGA) + lag.delay(OMEGA))
-    assert lag.gain(OMEGA) == pytest.approx(abs(1.0 / (1.0 + 0.05j * OMEGA)))
-
-
 def recorded(kind: str, size: float, seed: int = 1) -> NDArray[np.float64]:
     """Return a minute of a bob of 50 mm behind a sensor that smooths what it measures, noise included."""
     rng = np.random.default_rng(seed)
@@ -79,16 +71,3 @@ def test_a_stated_filter_is_undone(kind: str, size: float) -> None:
     name = "sensor_lag" if kind == "lag_s" else f"sensor_{kind}"
     late = filter_of(**{kind: size * 1.001}).delay(OMEGA) - filter_of(**{kind: size * 0.999}).delay(OMEGA)
     assert abs(inputs[name]) == pytest.approx(late / 0.002 / size * u, rel=1e-3)
-
-
-def test_velocity_and_quadratic_drag_follow_the_amplitude() -> None:
-    """Behind a lag velocity grows with the amplitude that is put right, beta falls; period and rate do not change."""
-    y = recorded("lag_s", 0.1)
-    bare, stated = analysed(y), analysed(y, lag_s=0.1)
-    gain = filter_of(lag_s=0.1).gain(bare.estimates["angular_frequency"].value)
-    for name, factor in (("velocity_rms", 1.0 / gain), ("period", 1.0), ("damping_rate", 1.0)):
-        assert stated.estimates[name].value == pytest.approx(factor * bare.estimates[name].value, rel=1e-9), name
-    assert isinstance(bare.motion, Oscillation)
-    assert isinstance(stated.motion, Oscillation)
-    one, other = (a.motion.derived.coefficients["beta"].value for a in (bare, stated))  # type: ignore[union-attr]
-    assert other == pytest.approx(gain * one, rel=1e-9)

@@ -23,11 +23,6 @@ def test_heavy_spring_alone_swings_as_a_quarter_wave() -> None:
     assert oscillating_mass_kg(1.0, 1e-12) == pytest.approx(4.0 / math.pi**2, rel=1e-9)
 
 
-def test_a_mass_below_nothing_continues_the_series() -> None:
-    """A fit may try negative masses: value and slope go on through zero."""
-    assert oscillating_mass_kg(-0.03, 0.3) == pytest.approx(0.29, rel=1e-3)
-
-
 def test_an_unweighed_spring_is_uncertain_by_a_share_of_the_bob() -> None:
     """0 to 0.3 of the bob, uncorrected: its root mean square."""
     assert unstated_spring_kg(Scene(bob_mass_kg=Estimate(0.2, 0.0, "kg"))).u == pytest.approx(0.06 / math.sqrt(3.0))

@@ -56,37 +56,6 @@ def test_a_law_of_a_function_is_found_where_it_holds(accuracy: str) -> None:
     assert {"clock_rate", "damping_law"} <= {c.name for c in motion.derived.budgets["d"].contributions}
 
 
-@pytest.mark.parametrize("name", ["linear", "quadratic"])
-def test_a_function_fits_as_the_class_of_the_same_law_does(name: str) -> None:
-    """The same values, uncertainties and BIC as the law that ships, though its slopes are differences."""
-    law = LAWS[name]
-    unit = (law.parameters["gamma" if name == "linear" else "beta"].metre, -1)
-
-    def own(t: Any, A0: float, c: float) -> Any:
-        return law.curve(np.asarray(t), np.array([A0, c]))[0]
-
-    _, motion = analysed(own(T, 0.05, 0.02), make_law("mine", own, {"c": unit}, law.guess))
-    theirs, mine = motion.damping.fits[name], motion.damping.fits["mine"]
-    np.testing.assert_allclose(mine.joint.values, theirs.joint.values, rtol=1e-6)
-    np.testing.assert_allclose(mine.joint.covariance, theirs.joint.covariance, rtol=1e-4)
-    assert mine.bic == pytest.approx(theirs.bic, rel=1e-6)
-    amplitudes = np.array([0.05, 0.02])
-    np.testing.assert_allclose(mine.rates(amplitudes)[0], theirs.rates(amplitudes)[0], rtol=1e-6)
-
-
-def test_a_law_that_does_not_hold_is_rejected() -> None:
-    """A record with linear drag contradicts it."""
-    _, motion = analysed(0.05 * np.exp(-0.05 * T), three_halves(words="a law of mine"))
-    assert motion.damping.selected == "linear"
-    assert motion.damping.fits["three-halves"].rejected
-
-
-def test_units_are_pairs_of_exponents() -> None:
-    """A unit in words is refused before anything is fitted."""
-    with pytest.raises(AnalysisError, match="pair"):
-        make_law("mine", fall, {"d": "1/(m^1/2 s)"}, guess)  # type: ignore[dict-item]
-
-
 def test_laws_are_named_or_given() -> None:
     """Unknown names list what there is; a law of the user needs a new name."""
     assert find_law("linear") is LAWS["linear"]

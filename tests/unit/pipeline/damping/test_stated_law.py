@@ -7,9 +7,8 @@ import pytest
 
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
-from pipeline.damping.laws.of_function import make_law
-from pipeline.numerics.estimate import Estimate, UpperLimit
-from pipeline.options import Options, options_for
+from pipeline.numerics.estimate import UpperLimit
+from pipeline.options import Options
 from pipeline.track import F8, Track
 
 T = np.arange(6000) / 100.0
@@ -49,13 +48,6 @@ def test_the_law_of_the_scene_is_the_stated_one() -> None:
     assert not codes_of(analysis)
 
 
-def test_a_stated_law_is_far_more_certain() -> None:
-    """Over any law the rate is several times as uncertain."""
-    free = analyse(LINEAR)
-    stated = analyse(LINEAR, Scene(damping_law="linear")).estimates["damping_rate"]
-    assert free.estimates["damping_rate"].u > 2.0 * stated.u
-
-
 def test_an_option_replaces_the_law_of_the_scene() -> None:
     """Params state another law, or leave the choice to the recording."""
     scene = Scene(damping_law="linear")
@@ -82,31 +74,6 @@ def test_where_no_law_fits_the_stated_one_is_not_charged_alone() -> None:
     assert "stated_law_rejected" not in codes_of(analysis)
 
 
-def test_a_law_of_the_users_own_can_be_stated() -> None:
-    """A function becomes the law of the results."""
-
-    def falling(t: F8, A0: float, d: float) -> F8:
-        return A0 / (1.0 + d * np.sqrt(A0) * t / 2.0) ** 2
-
-    def guess(t: F8, amplitude: F8) -> tuple[float, float]:
-        slope, level = np.polyfit(t, 1.0 / np.sqrt(amplitude), 1)
-        return float(level**-2), float(2.0 * slope)
-
-    law = make_law("three-halves", falling, {"d": (-1 / 2, -1)}, guess)
-    motion = motion_of(analyse(recorded(falling(T, 0.05, 0.1)), options=Options(stated=law)))
-    assert motion.damping.by_statement
-    assert motion.derived.coefficients["d"].value == pytest.approx(0.1, rel=0.02)
-
-
-@pytest.mark.parametrize("accuracy", ["fast", "best"])
-def test_every_accuracy_takes_a_stated_law(accuracy: str) -> None:
-    """A law that the fast tier does not try is tried, and the fit of the whole waveform uses it."""
-
-    motion = motion_of(analyse(LINEAR, Scene(damping_law="friction"), options_for(accuracy)))
-    assert motion.damping.selected == "friction"
-    assert set(motion.derived.coefficients) == {"mu"}
-
-
 def test_coefficients_that_are_not_determined_are_upper_limits() -> None:
     """Of ten noisy periods neither drag is determined; both keep value and u, which the limit exceeds."""
     t = T[:800]
@@ -126,17 +93,6 @@ def test_an_upper_limit_covers_in_at_least_95_percent(ratio: float) -> None:
     values = ratio + np.random.default_rng(7).standard_normal(4000)
     covered = [UpperLimit(value, 1.0).limit >= ratio for value in values.tolist()]
     assert np.mean(covered) >= 0.95 - 3.3 * np.sqrt(0.05 * 0.95 / len(covered))
-
-
-def test_an_upper_limit_calculates_as_its_estimate_does() -> None:
-    """It stays correlated with what it was calculated from."""
-    beta = Estimate(0.1, 0.2, "1/(m s)")
-    limit = UpperLimit.of(beta)
-    assert isinstance(limit, UpperLimit)
-    assert (limit.value, limit.u) == (0.1, 0.2)
-    assert UpperLimit.of(Estimate(0.3, 0.2)) == Estimate(0.3, 0.2)
-    of_beta = UpperLimit.of(Estimate(0.1, 0.2, "1/(m s)", beta.ufloat))
-    assert (of_beta - beta).std_dev == 0.0
 
 
 def test_the_quality_factor_is_that_of_the_undamped_frequency() -> None:

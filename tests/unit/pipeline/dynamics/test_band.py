@@ -44,30 +44,6 @@ def test_a_linear_scene_has_the_band_of_linear_propagation() -> None:
     assert band.t[-1] >= SECONDS
 
 
-def test_one_uncertain_amplitude_is_the_band_of_the_start() -> None:
-    """Where only the start is uncertain the band is its quantiles, less by as much as the motion has lost since."""
-    scene = Scene.from_mapping({**LINEAR, "bob": {"mass_kg": 0.2}, "spring": {"constant_n_per_m": 20.0}})
-    scene = Scene.from_mapping({**scene.to_mapping(), "start": LINEAR["start"] | {"velocity_m_per_s": 0.0}})
-    scene = Scene.from_mapping({**scene.to_mapping(), "damping": {"gamma_per_s": 0.05}})
-    band = spread(scene, SECONDS)
-    t = np.array([0.0, 3.0, 20.0])
-    middle, quantiles = band.amplitude_at(t)
-    np.testing.assert_allclose(middle, 0.05 * np.exp(-0.05 * t), rtol=0.01)
-    widths = quantiles - middle
-    np.testing.assert_allclose(widths[:, 0], 1e-4 * np.array([-1.96, -1.0, 1.0, 1.96]), rtol=0.02)
-    np.testing.assert_allclose(widths / widths[:, :1], np.tile(middle / 0.05, (4, 1)), rtol=1e-3)
-
-
-def test_the_same_seed_draws_the_same() -> None:
-    """A band can be made again; another seed makes another, as wide within a tenth."""
-    scene = Scene.from_mapping(LINEAR)
-    first, again, other = (spread(scene, 2.0, seed=seed).of_displacement for seed in (0, 0, 1))
-    np.testing.assert_array_equal(first, again)
-    assert not np.array_equal(first, other)
-    widths = [np.mean(found[2] - found[1]) for found in (first, other)]
-    assert widths[0] == pytest.approx(widths[1], rel=0.1)
-
-
 def test_what_has_no_band_is_refused() -> None:
     """A mass that may be 0, and a run too long to draw, are one line each."""
     vague = Scene.from_mapping({**LINEAR, "bob": {"mass_kg": {"value": 0.2, "u": 0.1}}})

@@ -64,21 +64,6 @@ def test_friction_leaves_no_estimate_where_turning_points_are_not_located(name: 
         halved(problem, integrator, 0.001, 100, 1e-3)
 
 
-def test_the_error_of_a_given_step_is_that_of_the_longer_run() -> None:
-    """Half the step shows three quarters of the error of a method of order two; the rest is added."""
-    verlet, truth = get_integrator("verlet"), get_integrator("strang").run(MIXED, 0.001, 4000, every=10).y
-    solution = solved_once(MIXED, verlet, 0.01, 400)
-    assert solution.parts == 1
-    assert solution.error == pytest.approx(np.max(np.abs(solution.trajectory.y - truth)) / 0.05, rel=0.05)
-
-
-def test_halving_ends_where_rounding_is_all_that_is_left() -> None:
-    """Without drag Strang splitting is exact but for rounding, which no shorter step reduces."""
-    problem = Problem(Equation(angular_frequency_per_s=8.66), 0.05)
-    with pytest.raises(DynamicsError):
-        halved(problem, get_integrator("strang"), 0.01, 12_000, 1e-15)
-
-
 def test_auto_takes_the_exact_flow_of_a_linear_scene_else_strang() -> None:
     """Each keeps the tolerance that is asked for."""
     linear = Problem(Equation(angular_frequency_per_s=8.66, gamma_per_s=0.01), 0.05)

@@ -11,7 +11,6 @@ from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator
-from pipeline.dynamics.terms import required
 from pipeline.errors import SceneError
 from springmass.runs.simulating.bench import REST_M, bench_position
 
@@ -45,18 +44,6 @@ def test_the_amplitude_falls_as_the_scene_says(laws: dict[str, float]) -> None:
     np.testing.assert_allclose(run.y[crests], expected, rtol=2e-3)
 
 
-def test_a_cubic_spring_shifts_the_frequency() -> None:
-    """By 3 c A^2 / (8 omega), to first order."""
-    cubic = 200.0
-    run = get_integrator("strang").run(
-        Problem(Equation(angular_frequency_per_s=8.66, cubic_per_m2_s2=cubic), 0.05), 0.001, 60_000
-    )
-    rising = np.flatnonzero((run.y[:-1] < 0) & (run.y[1:] >= 0))
-    at = run.t[rising] - run.y[rising] * 0.001 / (run.y[rising + 1] - run.y[rising])
-    omega = 2.0 * math.pi * (len(at) - 1) / (at[-1] - at[0])
-    assert omega - 8.66 == pytest.approx(3.0 * cubic * 0.05**2 / (8.0 * 8.66), rel=0.01)
-
-
 def test_the_mass_is_bob_air_and_the_springs_share() -> None:
     """As an analysis counts it."""
     scene = Scene.from_mapping(BENCH)
@@ -70,12 +57,6 @@ def test_the_mass_is_bob_air_and_the_springs_share() -> None:
         effective_mass_kg(Scene())
 
 
-def test_laws_go_forth_and_back() -> None:
-    """The coefficients of the amplitude come back from those of the equation."""
-    given = {"gamma_per_s": 0.1, "beta_per_m_s": 0.3, "mu_m_per_s": 0.002}
-    assert Equation.from_laws(7.0, **given).laws() == pytest.approx(tuple(given.values()), rel=1e-15)
-
-
 def test_the_bench_moves_by_the_equation() -> None:
     """Position by position within 1e-7 of finer steps, with friction and a stop too, in any order of asking."""
     damping = {"gamma_per_s": 0.01, "beta_per_m_s": 0.2, "mu_m_per_s": 0.003}
@@ -87,15 +68,3 @@ def test_the_bench_moves_by_the_equation() -> None:
     np.testing.assert_allclose(found - REST_M, run.y[rows], rtol=0, atol=0.05 * 2e-6)
     assert position(1e3) == position(2e3) != REST_M
     assert position(-1.0) == pytest.approx(REST_M + 0.05)
-
-
-def test_terms_below_their_share_are_left_out() -> None:
-    """What the tolerance does not require does not act, and the error that leaves stays within the tolerance."""
-    equation = Equation.from_laws(8.66, gamma_per_s=0.01, beta_per_m_s=1e-5, mu_m_per_s=1e-12, cubic_per_m2_s2=1e-6)
-    problem = Problem(equation, 0.05)
-    for tolerance, kept in ((1e-3, {"viscous_drag"}), (1e-4, {"viscous_drag", "quadratic_drag"})):
-        reduced, terms = required(problem, 120.0, tolerance)
-        assert {term.name for term in terms if term.included} == kept
-        full = get_integrator("strang").run(problem, 0.01, 12_000).y
-        less = get_integrator("strang").run(reduced, 0.01, 12_000).y
-        assert 0.0 < np.max(np.abs(full - less)) / 0.05 <= 0.1 * tolerance

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from pipeline.analyse import Overdamped, analyse
+from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from tests.sampling import sampled
@@ -46,16 +46,6 @@ def test_overdamped_records_give_both_rates(ratio: float, seed: int) -> None:
         assert estimate.unit == "1/s"
 
 
-@pytest.mark.parametrize("seed", sampled(range(10)))
-def test_critical_records_give_one_rate(seed: int) -> None:
-    """At critical damping the one rate is that of the undamped oscillation; both rates are given if it is not seen."""
-    found = analyse(track(released(1.0), 3e-4, seed)).estimates
-    if "relaxation_rate" in found:
-        assert abs(found["relaxation_rate"].value - OMEGA) < 4.0 * found["relaxation_rate"].u
-    else:
-        assert {"relaxation_rate_slow", "relaxation_rate_fast"} <= set(found)
-
-
 @pytest.mark.parametrize("seed", sampled(range(8)))
 @pytest.mark.parametrize("ratio", [0.06, 0.1, 0.3, 0.5, 0.7])
 def test_strongly_damped_oscillations_give_frequency_and_rate(ratio: float, seed: int) -> None:
@@ -66,45 +56,6 @@ def test_strongly_damped_oscillations_give_frequency_and_rate(ratio: float, seed
     found = analyse(track(released(ratio), 1e-3, seed)).estimates
     for name, value in true.items():
         assert abs(found[name].value - value) < 4.0 * found[name].u, name
-
-
-def test_a_push_does_not_disturb() -> None:
-    """A bob that is pushed has the same rates."""
-    slow = analyse(track(released(1.5, speed=-0.3), 3e-4, 1)).estimates["relaxation_rate_slow"]
-    assert slow.value == pytest.approx((1.5 - math.sqrt(1.25)) * OMEGA, abs=4.0 * slow.u + 0.03)
-
-
-SHAPES = {
-    "noise": np.zeros(1000),
-    "step": np.where(T > 4.0, 0.02, 0.0),
-    "early step": np.where(T > 0.3, 0.02, 0.0),
-    "line": 0.002 * T,
-    "parabola": 2e-4 * T**2,
-    "ramp": 0.02 * np.clip(T - 3.0, 0.0, 1.0),
-    "smooth move": 0.01 * np.tanh(2.0 * (T - 5.0)),
-    "wandering": 1e-3 * np.cumsum(np.random.default_rng(3).standard_normal(1000)) / 10.0,
-    "one exponential": 0.02 * np.exp(-0.8 * T),
-}
-
-
-@pytest.mark.parametrize("sigma_m", [3e-4, 2.39e-3])
-@pytest.mark.parametrize("name", SHAPES)
-def test_other_motions_are_no_relaxation(name: str, sigma_m: float) -> None:
-    """Noise, steps, drifts, ramps, moves and a lone exponential have no rate."""
-    result = analyse(track(SHAPES[name], sigma_m, 5))
-    assert not any(each.startswith("relaxation") for each in result.estimates)
-    assert "overdamped" not in {finding.code for finding in result.findings}
-
-
-def test_an_analysis_says_what_it_found() -> None:
-    """Overdamped records carry a finding with both rates, estimates and a spring constant, and no error."""
-    result = analyse(track(released(1.5), 3e-4, 1), SPRING)
-    assert isinstance(result.motion, Overdamped)
-    assert [f.severity for f in result.findings if f.code == "overdamped"] == ["warning"]
-    assert {"relaxation_rate_slow", "relaxation_rate_fast"} <= set(result.estimates)
-    assert not any(f.severity == "error" for f in result.findings)
-    k = result.estimates["spring_constant"]
-    assert k.value == pytest.approx(0.2 * OMEGA**2, abs=4.0 * k.u)
 
 
 @pytest.mark.parametrize("ratio", [0.01, 0.03, 0.1, 0.4])

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from pipeline.numerics.estimate import Estimate, Joint, format_value
+from pipeline.numerics.estimate import Estimate, format_value
 
 PLAIN = re.compile(r"^(-?[\d.]+) \+- ([\d.]+)( \S+)?$")
 SCALED = re.compile(r"^\((-?[\d.]+) \+- ([\d.]+)\)e([+-]\d+)( \S+)?$")
@@ -76,41 +76,6 @@ def test_printed_value_is_the_value_within_a_tenth_of_u(value: float, mantissa: 
     assert len(digits.partition(".")[2]) == len(u_digits.partition(".")[2])
 
 
-@given(st.floats(-9.9e5, 9.9e5), st.floats(1e-4, 9.9e5))
-def test_u_has_two_digits(value: float, u: float) -> None:
-    """u is printed with two significant digits, no more and no fewer."""
-    assume(max(abs(value), u) >= 1e-4)
-    printed = parse(format_value(value, u))[1]
-    assert printed == pytest.approx(float(f"{u:.1e}"), rel=1e-9)
-
-
-@given(st.floats(), st.floats())
-def test_any_pair_is_printed(value: float, u: float) -> None:
-    """No number, however odd, stops a report."""
-    assert format_value(value, u, "m").endswith(" m")
-
-
-JOINT = Joint(("A0", "gamma"), np.array([0.05, 0.01]), np.array([[4e-10, -1e-10], [-1e-10, 1e-8]]), ("m", "1/s"))
-
-
-def test_marginal_uncertainty() -> None:
-    """A parameter comes out with the root of its variance and its unit."""
-    assert JOINT["A0"] == Estimate(0.05, pytest.approx(2e-5), "m")
-    assert JOINT["gamma"] == Estimate(0.01, pytest.approx(1e-4), "1/s")
-    assert list(JOINT.estimates()) == ["A0", "gamma"]
-
-
-def test_unknown_parameter_is_an_error() -> None:
-    """A name that was not estimated raises."""
-    with pytest.raises(ValueError):
-        JOINT["beta"]
-
-
-def test_rounding_below_zero_variance_is_no_uncertainty() -> None:
-    """A variance that rounding made negative counts as 0."""
-    assert Joint(("x",), np.array([1.0]), np.array([[-1e-30]]), ("",))["x"].u == 0.0
-
-
 def test_estimates_calculate_with_their_uncertainties() -> None:
     """Sums, products, ratios and powers on either side of a number, an array or another estimate, by first order."""
     a, b = Estimate(3.0, 0.03, "m"), Estimate(2.0, 0.04, "s")
@@ -156,14 +121,6 @@ def test_an_estimate_is_one_variable_and_an_exact_one_is_a_number() -> None:
 def test_an_estimate_shows_its_uncertainty_in_brackets(value: float, u: float, unit: str, text: str) -> None:
     """The short form of a physics text, with two digits of u."""
     assert repr(Estimate(value, u, unit)) == text
-
-
-def test_correlations_of_joint_parameters() -> None:
-    """Covariance over both uncertainties; what is exact goes with nothing else."""
-    joint = Joint(
-        ("a", "b", "c"), np.ones(3), np.array([[4.0, -3.0, 0.0], [-3.0, 9.0, 0.0], [0.0, 0.0, 0.0]]), ("",) * 3
-    )
-    np.testing.assert_allclose(joint.correlation, [[1.0, -0.5, 0.0], [-0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def test_a_replaced_value_calculates_as_what_it_says() -> None:

@@ -11,7 +11,6 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from pipeline.analyse import analyse
 from pipeline.damping.laws.of_function import make_law
-from pipeline.errors import AnalysisError
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
 from pipeline.track import Track
@@ -53,14 +52,6 @@ def test_an_analysis_runs_on_one_thread() -> None:
     seen.clear()
     analyse(Track.from_arrays(T, Y), options=Options(laws=(law,)))
     assert seen == [{1}]
-    assert pools() == {2}
-
-
-@pytest.mark.usefixtures("two_threads")
-def test_the_pool_is_put_back_after_an_error() -> None:
-    """A record that is refused leaves the pool as it was."""
-    with pytest.raises(AnalysisError):
-        analyse(Track.from_arrays(T, np.full(T.size, np.nan)))
     assert pools() == {2}
 
 

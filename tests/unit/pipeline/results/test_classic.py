@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
-from pipeline.results.classic import classic, sliding_amplitude
+from pipeline.results.classic import classic
 from pipeline.track import Track
 
 
@@ -67,16 +65,6 @@ def test_period_and_amplitude_are_the_naive_ones(synthetic: ModuleType, sigma_m:
     np.testing.assert_allclose(found.window_amplitude, amplitudes, atol=1e-15)
 
 
-@pytest.mark.parametrize("window_s", [0.01, 0.5, 9.99])
-def test_sliding_amplitude_of_any_width(synthetic: ModuleType, window_s: float) -> None:
-    """Windows of two samples up to the whole record equal plain loops."""
-    track = record(synthetic, 10.0, 1e-3, 4)
-    starts, amplitudes = naive_sliding(track.t.tolist(), track.y.tolist(), window_s)
-    t, amplitude = sliding_amplitude(track.t, track.y, window_s)
-    np.testing.assert_allclose(t, starts, atol=1e-12)
-    np.testing.assert_allclose(amplitude, amplitudes, atol=1e-15)
-
-
 def test_exponential_is_scipys_with_the_start_fixed(synthetic: ModuleType) -> None:
     """Gamma and its formal uncertainty are curve_fit's for A0 e^(-gamma t), A0 held at the first amplitude."""
     found = classic(record(synthetic, 60.0, 2.39e-3, 5, gamma=0.01463))
@@ -108,30 +96,6 @@ def test_amplitude_is_biased_outward(synthetic: ModuleType, sigma_m: float, bias
     """Extremes of noisy samples lie outside the motion, by as much as the docstring says."""
     bias = [classic(record(synthetic, 10.0, sigma_m, s)).estimates["amplitude"].value - 0.05 for s in range(40)]
     assert np.mean(bias) == pytest.approx(bias_m, rel=0.1)
-
-
-def test_frequency_and_spring_constant_follow(synthetic: ModuleType) -> None:
-    """f = 1/T, omega = 2 pi f, k = omega^2 m, with relative uncertainties added as the report adds them."""
-    scene = Scene.from_mapping({"bob": {"mass_kg": {"value": 0.2007, "u": 0.00005}}})
-    found = classic(record(synthetic, 10.0, 3e-4, 7), scene).estimates
-    period = found["period"]
-    assert found["frequency"].value == pytest.approx(1 / period.value)
-    assert found["frequency"].u == pytest.approx(period.u / period.value**2)
-    assert found["angular_frequency"].value == pytest.approx(2 * math.pi / period.value)
-    k = found["spring_constant"]
-    assert k.value == pytest.approx(4 * math.pi**2 / period.value**2 * 0.2007)
-    assert k.u / k.value == pytest.approx(math.hypot(2 * period.u / period.value, 0.00005 / 0.2007))
-
-
-def test_missing_samples_are_passed_over(synthetic: ModuleType) -> None:
-    """NaN and flagged samples are left out and stop nothing."""
-    track = record(synthetic, 10.0, 3e-4, 8)
-    y = track.y.copy()
-    y[[7, 500]] = np.nan
-    flags = track.flags.copy()
-    flags[900] = 4
-    found = classic(replace(track, y=y, flags=flags)).estimates
-    assert found["period"].value == pytest.approx(0.757, abs=0.01)
 
 
 @pytest.mark.parametrize(("seconds", "words"), [(3.0, "8 maxima"), (1.0, "maxima")])

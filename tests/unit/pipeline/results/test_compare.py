@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,7 +19,6 @@ DISC_OMEGA = Estimate(2 * math.pi * 7 / 5.08, 2 * math.pi * 7 / 5.08**2 * 0.01, 
 BARE_KG, DISC_KG = Estimate(0.2007, 0.00005, "kg"), Estimate(0.2176, 0.00005, "kg")
 # The report's own numbers: periods of 5.27 s and 5.08 s over seven, masses of 200.7 g and 217.6 g.
 REPORT = [SpringRun("undamped", BARE_OMEGA, BARE_KG), SpringRun("damped", DISC_OMEGA, DISC_KG)]
-SWAPPED = [SpringRun("undamped", DISC_OMEGA, BARE_KG), SpringRun("damped", BARE_OMEGA, DISC_KG)]
 
 
 def massless(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> Comparison:
@@ -54,15 +52,6 @@ def test_the_reports_exchange_is_named() -> None:
     ]
 
 
-def test_the_right_way_round_they_agree() -> None:
-    """Put right, the two runs agree on 15.1 N/m and nothing is exchanged."""
-    result = massless(SWAPPED)
-    assert result.agree
-    assert result.exchanged == ()
-    assert result.largest_deviation < 1.5
-    assert result.spring_constant.value == pytest.approx(15.10, abs=0.06)
-
-
 def test_common_clock_widens_the_mean_and_not_the_test() -> None:
     """A clock that all runs share shifts all constants alike."""
     runs = [spring("a", 14.0, 0.2), spring("b", 14.005, 0.22)]
@@ -92,39 +81,6 @@ def test_mean_is_that_of_generalised_least_squares() -> None:
     assert [e.value for e in found.each] == [pytest.approx(x) for x in k]
 
 
-def test_shared_mass_is_no_disagreement() -> None:
-    """A share of the spring's mass that nobody counted parts the runs; stated with its error it unites them."""
-    masses = (0.10, 0.25)
-    runs = [
-        SpringRun(n, Estimate(math.sqrt(14.0 / (m + 0.0033)), 1e-4), Estimate(m, 2e-5))
-        for n, m in zip("ab", masses, strict=True)
-    ]
-    assert not massless(runs).agree
-    assert compare_springs(runs, spring_mass_kg=Estimate(0.0099, 0.0006, "kg")).agree
-    assert compare_springs(runs, spring_mass_kg=Estimate(0.0090, 0.0009, "kg")).agree
-
-
-@pytest.mark.parametrize("pair", list(itertools.combinations(range(3), 2)))
-def test_of_three_runs_the_two_exchanged_are_named(pair: tuple[int, int]) -> None:
-    """Whichever two of three records were mixed up, those two are named."""
-    masses = [0.20, 0.22, 0.25]
-    right = [spring(name, 14.0, m) for name, m in zip("abc", masses, strict=True)]
-    i, j = pair
-    mixed = list(right)
-    mixed[i] = SpringRun(right[i].name, right[j].angular_frequency, right[i].mass_kg)
-    mixed[j] = SpringRun(right[j].name, right[i].angular_frequency, right[j].mass_kg)
-    result = massless(mixed)
-    assert not result.agree
-    assert result.exchanged == (right[i].name, right[j].name)
-
-
-def test_another_spring_is_not_called_an_exchange() -> None:
-    """A run with another spring disagrees, and exchanging masses does not excuse it."""
-    result = massless([spring("a", 14.0, 0.20), spring("b", 14.0, 0.22), spring("other", 20.0, 0.21)])
-    assert not result.agree
-    assert result.exchanged == ()
-
-
 def test_agreement_is_as_frequent_as_stated() -> None:
     """Of 1000 pairs of runs that are truly one spring's, 99.7 % agree."""
     rng = np.random.default_rng(1)
@@ -139,17 +95,6 @@ def test_agreement_is_as_frequent_as_stated() -> None:
             runs.append(SpringRun(name, omega, Estimate(rng.normal(mass, 2e-5), 2e-5)))
         agreed += massless(runs).agree
     assert agreed >= 990
-
-
-def test_clocks_of_two_sensors_do_not_cancel() -> None:
-    """Two clocks, each known to 30 ppm, part two constants by 2 sqrt(2) 30 ppm of k; one clock by nothing."""
-    runs = [spring("a", 14.0, 0.2, 1e-9), spring("b", 14.0, 0.2, 1e-9)]
-    runs = [replace(run, u_clock=3e-5, mass_kg=Estimate(run.mass_kg.value, 0.0)) for run in runs]
-    runs[1] = replace(runs[1], angular_frequency=Estimate(runs[1].angular_frequency.value * (1 + 3e-5), 1e-9))
-    apart = massless([replace(runs[0], clock="device"), replace(runs[1], clock="nominal")])
-    assert apart.largest_deviation == pytest.approx(6e-5 / (6e-5 * math.sqrt(2)), rel=1e-3)
-    assert apart.agree
-    assert not massless(runs).agree
 
 
 def test_one_balance_moves_all_masses_alike() -> None:
@@ -204,11 +149,3 @@ def test_three_runs_test_what_they_solve_for() -> None:
     wrong = replace(runs[1], mass_kg=Estimate(0.206, 2e-5))
     result = compare_springs([runs[0], wrong, runs[2]])
     assert not result.agree
-
-
-def test_alike_bobs_do_not_tell_the_springs_mass() -> None:
-    """Two runs of one bob agree, and the constant is as uncertain as an unweighed spring makes it."""
-    result = compare_springs([hung("a", 15.0, 0.02, 0.2), hung("b", 15.0, 0.02, 0.2)])
-    assert result.agree
-    assert result.dof == 1
-    assert result.spring_constant.u == pytest.approx(15.0 * 0.3 / 3**1.5, rel=0.05)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -45,15 +44,6 @@ def bare() -> dict[str, Effect]:
     return table({})
 
 
-def test_every_effect_is_listed(bench: dict[str, Effect], bare: dict[str, Effect]) -> None:
-    """Whatever the scene states, the same effects are in the table, with finite sizes or none."""
-    assert list(bench) == list(bare)
-    for effect in (*bench.values(), *bare.values()):
-        assert effect.why
-        for size in (effect.predicted, effect.measured):
-            assert size is None or math.isfinite(size)
-
-
 def test_masses_by_hand(bench: dict[str, Effect], bare: dict[str, Effect]) -> None:
     """A third of 10 g and a little is 1.54 % of the bob, 0.43 g of air 0.196 %; without a bob nothing is predicted."""
     assert bench["spring_mass"].predicted == pytest.approx(0.01 / 3 / 0.2176 + (0.01 / 0.2176) ** 2 / 45, rel=1e-4)
@@ -78,40 +68,6 @@ def test_drag_by_hand(bench: dict[str, Effect], bare: dict[str, Effect]) -> None
     assert bench["quadratic_drag"].included
 
 
-def test_clock(bare: dict[str, Effect]) -> None:
-    """The clock's uncertainty is always in the model; a correction is measured."""
-    assert (bare["clock_rate"].included, bare["clock_rate"].measured) == (True, None)
-    assert bare["clock_rate"].predicted == pytest.approx(50e-6 / math.sqrt(3.0))
-    corrected = table({}, clock="device", rate_error=2e-3, u_rate_error=1e-6)["clock_rate"]
-    assert corrected.measured == pytest.approx(0.002)
-
-
-def test_speed_of_sound(bench: dict[str, Effect], bare: dict[str, Effect]) -> None:
-    """At 20 degC dry sound is 0.19 % slower than 344 m/s, or compared with the speed that the recording states."""
-    assert bench["speed_of_sound"].predicted == pytest.approx(343.37 / 344.0 - 1.0, abs=1e-4)
-    assert bench["speed_of_sound"].included
-    known = table(BENCH, clock="device", speed_of_sound_m_per_s=340.0)["speed_of_sound"]
-    assert known.predicted == pytest.approx(343.37 / 340.0 - 1.0, abs=1e-4)
-    assert (bare["speed_of_sound"].predicted, bare["speed_of_sound"].included) == (None, False)
-
-
 def test_buoyancy_by_hand(bench: dict[str, Effect]) -> None:
     """A steel bob is lifted by rho / rho_steel g / omega^2 = 23 um."""
     assert bench["buoyancy"].predicted == pytest.approx(1.2041 / 7850 * 9.81 / 64, rel=1e-2)
-
-
-def test_frequency_that_depends_on_amplitude(synthetic: ModuleType) -> None:
-    """The shift between rest and first amplitude, kappa A0^2 / omega, is measured, and the effect is in."""
-    truth = synthetic.Truth(gamma=0.0065, beta=0.2, kappa=-4.3)
-    t = synthetic.times(120)
-    found = {e.name: e for e in analyse(Track.from_arrays(t, synthetic.noisy(truth, t, 1e-3, 1))).effects}
-    effect = found["amplitude_dependent_frequency"]
-    assert effect.included
-    assert effect.measured == pytest.approx(-4.3 * 0.05**2 / 8.3, rel=0.05)
-
-
-def test_share_of_the_uncertainty_decides() -> None:
-    """The same spring is in where the bob is weighed well and out where it is weighed badly."""
-    for u, included in ((1e-5, True), (0.01, False)):
-        tables = BENCH | {"bob": {"mass_kg": {"value": 0.2, "u": u}}, "spring": {"mass_kg": 1e-3}}
-        assert table(tables)["spring_mass"].included == included

@@ -10,7 +10,7 @@ import pytest
 
 import springmass as sm
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.results.classic import CYCLES, classic
+from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Note, Panel, Series, decoded, to_json
@@ -135,12 +135,6 @@ def test_motion_and_phase(charts: dict[str, Drawn], damped: Analysis) -> None:
     assert np.nanmax(np.abs(v)) / np.nanmax(np.abs(x)) == pytest.approx(1e-3 * omega, rel=0.02)
     turns = np.ptp(np.unwrap(np.arctan2(1e3 * v, omega * x))) / (2 * np.pi)
     assert turns == pytest.approx(np.ptp(damped.track.t) / damped.estimates["period"].value, abs=1.0)
-
-
-def test_classic_method(charts: dict[str, Drawn], damped: Analysis) -> None:
-    """The picked maxima are seven of its periods apart."""
-    t, _ = charts["classic"].xy("picked maxima")
-    assert np.ptp(t) == pytest.approx(CYCLES * classic(damped.track, damped.scene).estimates["period"].value)
 
 
 def test_several_runs(damped: Analysis, motion: Oscillation) -> None:

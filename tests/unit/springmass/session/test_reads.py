@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from acquisition.block import Block, Flag, concatenate
+from acquisition.block import Flag, concatenate
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
@@ -90,21 +90,6 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
     assert b"".join(data for _, _, data in log.taken) == data
     assert log.events == [f'0 {12 * STEP_NS} lost {{"why": "cable"}}']
     assert tee.gone == {0: "cable"}
-
-
-def test_what_is_asked_for_is_all_that_was_read() -> None:
-    """Asked for after each read, or once for many, and the same bits."""
-    often, seldom = Tee([chain()]), Tee([chain()])
-    found: list[list[Block]] = [[], []]
-    for i in range(1000):
-        for tee, blocks in zip((often, seldom), found, strict=True):
-            tee.reads([(0, i * STEP_NS, frame(i))])
-            if tee is often or i % 100 == 99:
-                blocks += [block for _, block in tee.blocks()]
-                assert sum(map(len, blocks)) == i + 1
-    whole, parts = (concatenate(blocks) for blocks in found)
-    for name in ("t", "distance", "flags", "host_ns"):
-        assert getattr(parts, name).tobytes() == getattr(whole, name).tobytes()
 
 
 def test_samples_that_nobody_asks_for_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
