@@ -149,16 +149,6 @@ def test_an_absent_port_is_named_with_those_that_are_there(cli: Callable, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.trials
-def test_another_sensor_is_recognised_by_its_bytes(cli: Callable, tmp_path: Path) -> None:
-    """Bytes of another family: the last line names it, exit code 4."""
-    with speaking("ffhls") as sensor:
-        sensor.start()
-        done = cli("record", "--port", sensor.path, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
-    assert done.code == 4
-    assert "FF" in done.err.splitlines()[-1]
-
-
 def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
     """Several sensors in one run: one log, a run file each, both complete."""
     with speaking("line-protocol") as one, speaking("ffhls") as other:
@@ -288,17 +278,6 @@ def test_two_distances_by_the_ruler_set_offset_and_scale(
     np.testing.assert_allclose(load(tmp_path / "run.h5").loaded.samples.distance[-10:], 0.4, atol=0.002)
 
 
-def test_several_distances_need_somebody_who_presses_enter(
-    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With the standard input closed the second distance cannot be waited for: one line, exit code 2, no run."""
-    hands = Hands([0.2])
-    monkeypatch.setattr(sys, "stdin", hands)
-    done = rulered(cli, tmp_path, hands, "0.2", "0.6")
-    assert done.code == 2
-    assert not (tmp_path / "run.wire").exists()
-
-
 def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """--still, --ruler and --trigger work without hardware: the ruler's distance is the rest, the run its motion."""
     done = cli(
@@ -421,9 +400,7 @@ def test_lines_of_a_sketch_are_recorded(
 ) -> None:
     """As they are, or with the options that the refusal names; every digit is there, and nothing is found wrong."""
     finder = VirtualRangefinder(
-        lambda t: 0.4 + 0.05 * np.cos(OMEGA * t),
-        VirtualSensor(rate_hz=50.0, noise_m=3e-4),
-        np.random.default_rng(5),
+        lambda t: 0.4 + 0.05 * np.cos(OMEGA * t), VirtualSensor(rate_hz=50.0, noise_m=3e-4), np.random.default_rng(5)
     )
     family = replace(get_family("text-lines"), encoder=lambda: Sketch(template))
     with VirtualPort(family, finder, SystemClock(), seconds=20.0) as port:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import h5py
 import numpy as np
@@ -139,15 +137,6 @@ def test_h5py_finds_texts_dimensions_and_plain_filters(path: Path) -> None:
         assert flags == {str(flag.name).lower(): flag.value for flag in Flag}
 
 
-def test_no_external_links(path: Path) -> None:
-    """The file stands alone: every name in it is a hard link."""
-    links: list[Any] = []
-    with h5py.File(path) as file:
-        file.visit_links(lambda name: links.append(file.get(name, getlink=True)))
-    assert links
-    assert {type(link) for link in links} == {h5py.HardLink}
-
-
 def test_netcdf_reads_it(path: Path) -> None:
     """netCDF's own library sees variables on a dimension, with missing samples masked."""
     netcdf = pytest.importorskip("netCDF4")
@@ -158,14 +147,6 @@ def test_netcdf_reads_it(path: Path) -> None:
         assert result.dimensions == ("time",)
         np.testing.assert_array_equal(np.ma.filled(result[:], np.nan), distance)
         assert file["entry/instrument/kind"][...] == file.kind
-
-
-@pytest.mark.skipif(shutil.which("ncdump") is None, reason="ncdump is not installed")
-def test_ncdump_lists_it(path: Path) -> None:
-    """The header that ncdump prints names the signal and its unit."""
-    listed = subprocess.run(["ncdump", "-h", str(path)], check=True, capture_output=True, text=True).stdout
-    assert "double distance(time)" in listed
-    assert 'distance:units = "m"' in listed
 
 
 @pytest.mark.parametrize("full", [True, False])

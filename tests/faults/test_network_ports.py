@@ -22,7 +22,6 @@ from acquisition.simulated.pseudo_terminal import VirtualPort
 from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from springmass.cli import main
 from storage.run_file.reading import open_run
-from tests.faults.test_ports import on_a_terminal, us100
 
 # pyserial 3.5 starts its reading thread in the old way.
 pytestmark = pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\) is deprecated:DeprecationWarning")
@@ -144,16 +143,6 @@ def test_a_sensor_behind_rfc2217_is_recorded_like_one_on_a_cable(tmp_path: Path)
     np.testing.assert_allclose(samples.distance, 0.4, atol=0.06)
     # A bob that swings is met a little sooner or later after each ping.
     np.testing.assert_allclose(np.diff(samples.t), 0.01, atol=1e-4)
-
-
-@pytest.mark.trials
-def test_a_polled_sensor_behind_rfc2217_is_asked(tmp_path: Path) -> None:
-    """Requests go out and replies come back; how many do so in time depends on how busy the machine is."""
-    with on_a_terminal(us100, polled=True) as port, bridged(port) as bridge:
-        samples = recorded(bridge, "us100", tmp_path / "run.h5")
-    known = samples.distance[np.isfinite(samples.distance)]
-    assert known.size >= 8
-    np.testing.assert_allclose(np.diff(known), 0.001, atol=1e-9)
 
 
 def hang_up_while_it_records(bridge: Bridge, log: Path) -> None:

@@ -1,20 +1,17 @@
 """Decoders under random bytes: never an exception, never a distance that no frame in the bytes vouches for.
 
 What vouches is told by :data:`ORACLES`, which look for frames anywhere in the bytes, slowly and with none of the
-decoders' code. Three hunters use the same check: hypothesis, a mutator of the family's own stream that always runs,
-and a coverage-guided fuzzer where one is installed.
+decoders' code. Two hunters use the same check: hypothesis, and a mutator of the family's own stream.
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import math
 import random
 import re
 from collections.abc import Callable, Iterable
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -24,7 +21,6 @@ from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.readings import Reading
 from tests.encoders import ENCODERS
-from tests.hunt import hunt
 
 FAMILIES = {family.name: family for family in families()}
 MOST_PENDING = 512
@@ -235,23 +231,3 @@ def test_describing_bytes_never_fails_and_takes_one_line(data: bytes) -> None:
     assert "\n" not in line
     assert line.isprintable()
     assert all(name in FAMILIES for name in probe(data))
-
-
-def target(data: bytes) -> None:
-    """What a hunt guided by coverage calls: two bytes say the family and where to cut, the others are the stream."""
-    if len(data) > 2:
-        names, body = sorted(FAMILIES), data[2:]
-        check(names[data[0] % len(names)], body, [min(data[1], len(body))])
-
-
-@pytest.mark.trials
-@pytest.mark.skipif(
-    importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
-)
-def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
-    """Some thousand inputs, grown from sound streams towards code not yet reached; bounded in number and seconds."""
-    names = sorted(FAMILIES)
-    seeds = {name: bytes([i, 40]) + b"".join(own_stream(FAMILIES[name], 0, 3)) for i, name in enumerate(names)}
-    imports = "import acquisition.decoders.registry as r; r.families()"
-    bounds = {"runs": 12_000, "seconds": 6, "longest": 300}
-    assert hunt(__name__, "acquisition", imports, seeds, tmp_path, **bounds) >= 100

@@ -21,29 +21,6 @@ def beaten_to(path: Path) -> None:
         path.write_text("another's")
 
 
-@pytest.mark.parametrize(("data", "stored"), [(b"\x00\r\n", b"\x00\r\n"), ("Träger\n", "Träger\n".encode())])
-def test_content_is_written_exactly(tmp_path: Path, data: bytes | str, stored: bytes) -> None:
-    """Bytes stay as they are, text becomes UTF-8 with its own line ends."""
-    path = write_whole(tmp_path / "results.json", data)
-    assert path.read_bytes() == stored
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_standing_file_is_replaced_by_default(tmp_path: Path) -> None:
-    """Results may be made again."""
-    path = write_whole(tmp_path / "a", "old")
-    assert write_whole(path, "new").read_text() == "new"
-
-
-def test_a_standing_file_is_kept_when_asked(tmp_path: Path) -> None:
-    """Without leave to overwrite the old content stands, and the error names the file in one line."""
-    path = write_whole(tmp_path / "a", "old")
-    with pytest.raises(RunExists, match=r"a: already exists; ") as caught:
-        write_whole(path, "new", overwrite=False)
-    assert "\n" not in str(caught.value)
-    assert path.read_text() == "old"
-
-
 def test_a_file_that_comes_meanwhile_is_kept(tmp_path: Path) -> None:
     """Putting in place itself refuses a file that was not there when the work began."""
     path = tmp_path / "a"
@@ -149,18 +126,6 @@ def test_hdf5_is_written_whole_too(tmp_path: Path) -> None:
         half()
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_name_of_the_longest_length_is_no_obstacle(tmp_path: Path) -> None:
-    """The temporary name stays within what file systems allow."""
-    assert write_whole(tmp_path / ("a" * 255), "x").read_text() == "x"
-
-
-@pytest.mark.skipif(os.name == "nt", reason="permissions are POSIX")
-def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
-    """Others may read what the umask lets them, not only the owner."""
-    (tmp_path / "usual").write_text("x")
-    assert write_whole(tmp_path / "a", "x").stat().st_mode == (tmp_path / "usual").stat().st_mode
 
 
 def test_what_a_killed_writer_left_is_written_over(tmp_path: Path) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
-from acquisition.errors import FormatError, NeedsAnswer, UnknownFormat
+from acquisition.errors import UnknownFormat
 from acquisition.recordings.identify import open_recording, sniff
 
 ROWS = "".join(f"{i / 100:.3f}\t{20 + i / 8:.3f}\t0.239\r\n" for i in range(12))
@@ -49,45 +48,3 @@ def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, head: bytes, 
     assert title in caught.value.problem
     assert caught.value.remedy
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("text", ["0.1 0.2\n0.2 0.3\n0.3 0.4\n", "0,1\t2,5\n0,2\t2,7\n0,3\t2,9\n"])
-def test_the_unit_of_bare_numbers_is_never_guessed(tmp_path: Path, text: str) -> None:
-    """It is asked for, and what was given is said."""
-    path = tmp_path / "run.txt"
-    path.write_text(text)
-    with pytest.raises(NeedsAnswer) as caught:
-        open_recording(path)
-    assert caught.value.question.examples == {"unit": "m"}
-    recording = open_recording(path, unit="cm")
-    assert {"unit_assumed", "nominal_clock"} <= {trap.code for trap in recording.traps}
-    assert recording.info.rate_hz == 10.0
-
-
-@pytest.mark.parametrize("content", [b"", bytes(range(256)) * 20, b"Dear diary,\ntoday we hung a mass.\n", b"x" * 9000])
-def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes) -> None:
-    """One line with the file's name: an empty file, bytes that are no text, prose, a line without end."""
-    path = tmp_path / "run.txt"
-    path.write_bytes(content)
-    with pytest.raises(FormatError) as caught:
-        open_recording(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert "\n" not in str(caught.value)
-
-
-def test_absent_files_and_directories_are_refused(tmp_path: Path) -> None:
-    """The system's error becomes one line."""
-    with pytest.raises(FormatError, match=r"absent\.txt"):
-        open_recording(tmp_path / "absent.txt")
-    with pytest.raises(FormatError, match="directory"):
-        open_recording(tmp_path)
-    with pytest.raises(FormatError, match=r"a\\?.0*b"):
-        open_recording("a\0b")
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
-    """Opening it would wait for a writer that never comes."""
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(FormatError, match="pipe"):
-        open_recording(tmp_path / "pipe")

@@ -65,15 +65,6 @@ def test_what_unpacks_to_more_than_it_may_is_refused() -> None:
         ZIP.read("run.zip", bomb)
 
 
-def test_an_encrypted_archive_is_refused_in_one_line() -> None:
-    """The bit that says so is set in both headers."""
-    data = bytearray(packed({"run.csv": b"t (s),y (m)\n0,1\n1,2\n2,3\n"}))
-    data[6] |= 1
-    data[data.index(b"PK\x01\x02") + 8] |= 1
-    with pytest.raises(FormatError, match="encrypted"):
-        ZIP.read("run.zip", bytes(data))
-
-
 def test_an_archive_of_several_runs_asks_which() -> None:
     """Pictures are passed over and named; each file is read as what it is."""
     csv, picture = b"Time (s),Position (m)\n0.0,0.1\n0.1,0.2\n0.2,0.4\n0.3,0.1\n", b"\x89PNG" + bytes(99)
