@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from acquisition.block import Block, concatenate
-from acquisition.errors import SourceError
+from acquisition.errors import PortError
 from acquisition.recordings.recording import Original, Trap
 from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunClosed, RunDamaged, RunExists, RunOpen, WriteFailed
@@ -97,21 +97,9 @@ def test_a_closed_run_says_so(path: Path) -> None:
         next(blocks)
     run.close()
     assert run.title == "Träger 3"
-    for read in (run.samples, run.originals, run.verify, run.dataset):
+    for read in (run.samples, run.originals, run.verify):
         with pytest.raises(RunClosed, match="closed"):
             read()
-
-
-def test_the_loaded_dataset_leaves_no_handle_open(path: Path) -> None:
-    """Others may open the file for writing while the dataset lives, and its values stay."""
-    with open_run(path) as run:
-        dataset = run.dataset()
-        distance = run.samples().distance
-    edit(path, lambda file: file.attrs.create("x", 1))
-    np.testing.assert_array_equal(dataset.distance.values, distance)
-    assert dataset.distance.dims == ("time",)
-    assert (dataset.time.attrs["units"], dataset.distance.attrs["units"]) == ("s", "m")
-    assert (dataset.attrs["kind"], dataset.attrs["rate_hz"], dataset.attrs["clock"]) == ("live", 100.0, "device")
 
 
 def test_a_standing_run_is_not_overwritten_unasked(path: Path) -> None:
@@ -130,7 +118,7 @@ def test_a_standing_run_is_not_overwritten_unasked(path: Path) -> None:
         assert len(run) == 4
 
 
-@pytest.mark.parametrize("error", [SourceError("unplugged"), KeyboardInterrupt()])
+@pytest.mark.parametrize("error", [PortError("unplugged"), KeyboardInterrupt()])
 @pytest.mark.parametrize("samples", [10, 2 * CHUNK])
 def test_a_failing_source_leaves_nothing(tmp_path: Path, error: BaseException, samples: int) -> None:
     """A failure between blocks passes through as it is and leaves neither the file nor a part of it."""
@@ -232,7 +220,7 @@ def test_an_edited_sample_is_found(path: Path, name: str) -> None:
 
     edit(path, bump)
     with open_run(path) as run:
-        for read in (run.samples, run.dataset, run.verify, lambda: list(run.blocks(64))):
+        for read in (run.samples, run.verify, lambda: list(run.blocks(64))):
             with pytest.raises(RunDamaged, match=f"the column '{name}' is damaged"):
                 read()
 
