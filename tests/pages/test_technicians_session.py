@@ -8,8 +8,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -189,48 +187,3 @@ def watch_on_two_phones(browser: Browser, address: str) -> None:
         if number == 0:
             look_at(page, "5-viewer")
         context.close()
-
-
-BUSY = "while True: pass"
-AGES = """(seconds) => new Promise((done) => {
-  let worst = 0, seen = 0;
-  const unmarked = [], turns = {}, start = performance.now();
-  const timer = setInterval(() => {
-    for (const group of document.querySelectorAll("#estimates > div")) {
-      const age = now_s() - Number(group.dataset.t);
-      seen += 1;
-      worst = Math.max(worst, age);
-      const marked = group.classList.contains("stale") && /old/.test(group.querySelector(".age").textContent);
-      // A page that was kept from running marks at its next turn, which may come after this one.
-      turns[group.dataset.name] = age > 2.5 && !marked ? (turns[group.dataset.name] || 0) + 1 : 0;
-      if (turns[group.dataset.name] > 4) unmarked.push([group.dataset.name, age]);
-    }
-    if (performance.now() - start > 1e3 * seconds) { clearInterval(timer); done({ worst, seen, unmarked }); }
-  }, 100);
-})"""
-
-
-@pytest.mark.trials
-def test_no_old_number_is_without_its_age(record: Callable[..., Any], context: BrowserContext) -> None:
-    """With four busy processes during the recording, and after the page's process is stopped."""
-    program = record()
-    page = context.new_page()
-    page.goto(program.address)
-    page.wait_for_function(FITTED)
-    busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(4)]
-    try:
-        ages = page.evaluate(AGES, 8)
-    finally:
-        for each in busy:
-            each.kill()
-            each.wait()
-    print(f"oldest number with four busy processes: {ages['worst']:.1f} s")
-    assert ages["seen"] > 100
-    assert ages["unmarked"] == []
-    page.evaluate("socket.onclose = null; socket.close()")
-    page.wait_for_selector("#estimates .stale")
-    ages = page.evaluate(AGES, 3)
-    assert ages["worst"] > 3.0
-    assert ages["unmarked"] == []
-    assert "no samples for" in page.inner_text("#clock")
-    program.end()

@@ -134,3 +134,30 @@ def test_disc_drag_falls_with_amplitude() -> None:
     assert float(np.interp(0.015, curve.x, curve.y)) == pytest.approx(7.8, abs=1.5)
     law = np.interp(curve.x_points, curve.x, curve.y)
     assert np.mean(np.abs(curve.y_points - law) < 2 * curve.u_points) > 0.8
+
+
+def codes(result: Analysis) -> set[str]:
+    """Return the codes of all findings."""
+    return {finding.code for finding in result.findings}
+
+
+def test_large_disc_rejects_constant_coefficients() -> None:
+    """At 71 mm every law is rejected, that of both drags by its misfit."""
+    damping = motion_of(analysed_capstone()).damping
+    assert damping.admissible == ()
+    mixed = damping.fits["linear+quadratic"]
+    assert 50.0 < mixed.reduced_chi2 < 200.0
+    assert 0.009 < mixed.joint["gamma"].value < 0.013
+    assert 0.44 < mixed.joint["beta"].value < 0.60
+    assert damping.fits["power"].joint["n"].value == pytest.approx(1.54, abs=0.05)
+    errors = [finding.code for finding in analysed_capstone().findings if finding.severity == "error"]
+    assert errors == []
+    assert "no_law_fits" in codes(analysed_capstone())
+
+
+def test_disc_without_its_swing_rejects_each_drag_alone() -> None:
+    """Without the sideways mode of 0.96 mm the amplitudes of the disc run contradict each drag alone."""
+    motion = motion_of(analysed(DISC))
+    assert mode_of(analysed(DISC)).values["amplitude_m"] == pytest.approx(9.6e-4, rel=0.05)
+    assert motion.damping.fits["linear"].reduced_chi2 > 30
+    assert motion.damping.fits["quadratic"].reduced_chi2 > 30

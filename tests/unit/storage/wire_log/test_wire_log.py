@@ -109,27 +109,6 @@ def test_a_log_that_cannot_be_made_says_why(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("trouble", "words"), [(errno.ENOSPC, "No space left"), (0, "bytes were written")])
-def test_a_full_disk_keeps_what_was_written(trouble: int, words: str) -> None:
-    """The error names what is kept, every later append raises it again, and the log reads up to there."""
-    disk = Disk(room=1000, trouble=trouble)
-    log = WireLogWriter("run.wire", HEADER, open_file=disk)
-    while disk.room - len(disk.data) >= HEAD_BYTES + 6:
-        append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    with pytest.raises(WriteFailed, match=words) as caught:
-        append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    survivors = log.written.records
-    assert f"{survivors} records ({log.written.bytes} bytes) are kept" in str(caught.value)
-    disk.room = 1 << 30
-    with pytest.raises(WriteFailed, match=words):
-        append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    contents = parse_log(bytes(disk.data))
-    assert len(list(contents)) == survivors
-    assert contents.damage.tail_bytes == 1000 - log.written.bytes
-    log.sync()
-    assert log.synced.records == survivors
-
-
 def test_a_failed_sync_is_never_taken_back() -> None:
     """After one failed sync nothing more counts as safe: the kernel forgets which pages it could not write."""
     disk = Disk()
