@@ -89,15 +89,6 @@ def test_a_simulated_run_becomes_a_run_file_with_its_truth(recorded: Path) -> No
     assert not recorded.with_suffix(".wire").exists()
 
 
-def test_without_a_scene_an_example_bench_is_simulated(cli: Callable, tmp_path: Path) -> None:
-    """The run has the scene of that bench, so that its analysis gives the constant of its spring."""
-    done = cli("record", "--simulate", "--seconds", "3", "-o", tmp_path / "run.h5")
-    assert done.code == 0, done.err
-    assert load(tmp_path / "run.h5").loaded.info.kind == "simulated"
-    k = analyse(tmp_path / "run.h5")["spring_constant"]
-    assert abs(k.value - 14.0) < 5.0 * k.u
-
-
 def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Callable, tmp_path: Path, recorded: Path) -> None:
     """The log that travels inside a run gives the same samples through the same decoders."""
     with open_run(recorded) as run:
@@ -139,14 +130,6 @@ def test_a_place_that_cannot_hold_the_run_is_refused_before_the_recording(
         done = cli("record", "--simulate", "--scene", scene, "--seconds", "1", "-o", out)
         assert (done.code, len(done.err.splitlines())) == (2, 1)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.toml", "run.h5"]
-
-
-def test_an_absent_port_is_named_with_those_that_are_there(cli: Callable, tmp_path: Path) -> None:
-    """A port that does not exist: one line, exit code 4, no file."""
-    done = cli("record", "--port", "/dev/ttyNONE7", "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
-    assert done.code == 4
-    assert "/dev/ttyNONE7" in done.complaint
-    assert not list(tmp_path.iterdir())
 
 
 def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Decoders under random bytes: never an exception, never a distance that no frame in the bytes vouches for.
 
 What vouches is told by :data:`ORACLES`, which look for frames anywhere in the bytes, slowly and with none of the
-decoders' code. Two hunters use the same check: hypothesis, and a mutator of the family's own stream.
+decoders' code.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from tests.encoders import ENCODERS
 
 FAMILIES = {family.name: family for family in families()}
 MOST_PENDING = 512
-MUTANTS = 150
 every_family = pytest.mark.parametrize("name", FAMILIES)
 
 
@@ -203,24 +202,6 @@ def test_its_own_stream_spoiled_is_back_in_step_within_two_frames(
     wanted = len(after) - 2
     assert len(tail) >= wanted
     assert [repr(each[3:5]) for each in tail[-wanted:]] == [repr(each[3:5]) for each in clean[-wanted:]]
-
-
-@every_family
-def test_mutants_of_its_own_stream_give_no_distance_without_a_frame(name: str) -> None:
-    """Seeded mutants, each of the last that was of use: a fuzzer that needs nothing installed."""
-    rng = random.Random(f"springmass {name}")
-    pool = [b"".join(own_stream(FAMILIES[name], seed)) for seed in range(4)]
-    kinds = ["flip", "drop", "insert", "repeat", "cut"]
-    outcomes = set()
-    for _ in range(MUTANTS):
-        faults = [(rng.choice(kinds), rng.random(), rng.randbytes(rng.randint(1, 9))) for _ in range(rng.randint(1, 4))]
-        mutant = spoil(rng.choice(pool), faults)[:600]
-        readings = check(name, mutant, [rng.randint(0, len(mutant)) for _ in range(rng.randint(0, 5))])
-        outcome = (len(readings), sum(math.isnan(each.echo_us) and math.isnan(each.distance_m) for each in readings))
-        if outcome not in outcomes:  # something new happened in the decoder: breed from it
-            outcomes.add(outcome)
-            pool.append(mutant)
-    assert len(outcomes) > 5
 
 
 @given(data=st.binary(max_size=400))

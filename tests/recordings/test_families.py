@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition.block import Flag, concatenate
-from acquisition.errors import AcquisitionError, NeedsAnswer
-from acquisition.recordings.identify import formats, inspect, open_recording, sniff
-from acquisition.recordings.questions import Missing
+from acquisition.recordings.identify import inspect, open_recording, sniff
 
 PANDHI = "AyushPandhi__Pandhi_Ayush_PHY224"
 MATTIA = "Mattia04__Smorzamento/Oscillazioni pretensionata_cd_5e7masse.csv"
@@ -173,55 +171,6 @@ def test_a_real_file_is_read_as_it_was_counted(recordings: Path, row: Row) -> No
     assert joined.distance.tobytes() == samples.distance.tobytes()
     stated = {(each.channel, each.unit) for each in inspect(path).surveys}
     assert any(row.channel in (None, name) and unit == row.unit for name, unit in stated)
-
-
-@pytest.mark.trials
-def test_a_dialect_met_in_public_opens_or_is_refused_in_one_line(recordings: Path) -> None:
-    """Every file under wild/ gives samples whose times rise, or one line of words; what it lacks is never guessed."""
-    opened, refused = {}, {}
-    for path in sorted(p for p in (recordings / "wild").iterdir() if p.suffix != ".md"):
-        try:
-            opened[path.name] = open_recording(path).samples
-        except AcquisitionError as error:
-            refused[path.name] = str(error)
-    for name, words in refused.items():
-        assert "\n" not in words, name
-        assert name in words, name
-    for name, samples in opened.items():
-        t = samples.t[np.isfinite(samples.t)]
-        assert t.size > 1, name
-        assert np.all(np.diff(t) > 0), name
-    assert opened
-
-
-@pytest.mark.parametrize("path", sorted({row.path for row in TABLE}))
-def test_a_real_file_is_of_one_family_alone(recordings: Path, path: str) -> None:
-    """No second format lays claim to it, but for the one that takes any table and is asked last."""
-    head = (recordings / path).read_bytes()[:8192]
-    claims = [each.name for each in formats() if each.recognises(head) and each.name != "table"]
-    assert claims == [sniff(recordings / path)]
-
-
-@pytest.mark.parametrize(
-    ("path", "missing", "choices"),
-    [
-        (MATTIA, (Missing.RUN, Missing.RATE_HZ), ("Run #1", "Run #2")),
-        (FILO, (Missing.CHANNEL, Missing.UNIT), ("position", "velocity", "acceleration")),
-        (SHM, (Missing.CHANNEL,), ("Acceleration_1", "Acceleration_0", "Untitled")),
-        (TDMS, (Missing.CHANNEL, Missing.UNIT), ("Amplitude sweep", "Phase sweep")),
-        (PHYPHOX, (Missing.CHANNEL,), ("Gyroscope x", "Gyroscope z")),
-        (TRACKER, (Missing.CHANNEL, Missing.UNIT), ("x", "y", "rad")),
-    ],
-)
-def test_what_a_real_file_leaves_open_is_asked_for(
-    recordings: Path, path: str, missing: tuple[Missing, ...], choices: tuple[str, ...]
-) -> None:
-    """Several runs or channels, or no unit: one line that lists them."""
-    with pytest.raises(NeedsAnswer) as caught:
-        open_recording(recordings / path)
-    assert caught.value.question.missing == missing
-    assert caught.value.question.needs[0].choices[: len(choices)] == choices
-    assert "\n" not in str(caught.value)
 
 
 def test_a_channel_of_volts_is_a_voltage_unless_it_is_counted_as_a_length(recordings: Path) -> None:

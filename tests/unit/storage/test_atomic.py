@@ -6,12 +6,10 @@ import os
 import threading
 from pathlib import Path
 
-import h5py
 import pytest
 
 from storage.atomic import whole_file, write_whole
 from storage.errors import RunExists, WriteFailed
-from storage.hdf5 import whole_h5
 
 
 def beaten_to(path: Path) -> None:
@@ -104,27 +102,6 @@ def test_a_failing_sync_fails_the_write(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(WriteFailed, match="No space left on device"):
         write_whole(path, "new")
     assert path.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_hdf5_is_written_whole_too(tmp_path: Path) -> None:
-    """The HDF5 file comes into being complete, or not at all."""
-    path = tmp_path / "analysis.h5"
-    with whole_h5(path, overwrite=True) as file:
-        file["a"] = 1
-        assert not path.exists()
-    with h5py.File(path) as file:
-        assert file["a"][()] == 1
-    before = path.read_bytes()
-
-    def half() -> None:
-        with whole_h5(path, overwrite=True) as file:
-            file["b"] = 1
-            raise RuntimeError("in the middle")
-
-    with pytest.raises(RuntimeError, match="in the middle"):
-        half()
-    assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
 
