@@ -85,14 +85,6 @@ def test_from_and_to_cut_the_record(cli: Cli, recording: Path) -> None:
     assert (result["provenance"]["parameters"]["from_s"], result["provenance"]["parameters"]["to_s"]) == (2.0, 6.5)
 
 
-@pytest.mark.parametrize("window", [("--from", "20"), ("--to", "-1"), ("--from", "5", "--to", "4")])
-def test_seconds_outside_the_record_are_a_usage_error(cli: Cli, recording: Path, window: tuple[str, ...]) -> None:
-    """The line says what the record spans."""
-    done = cli("analyse", "--json", recording, *window)
-    assert (done.code, done.out) == (2, "")
-    assert "9.99" in done.complaint
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -89,24 +89,6 @@ def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, capsys: pytest.C
     assert "damped_simulated_position" in (out / "report.html").read_text("utf-8")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ([BARE], "compare"),
-        ([BARE, DISC], "--scene"),
-        ([BARE, DISC, BARE, *("--scene", BARE_SCENE) * 2], "--scene"),
-        ([BARE, DISC, "--scene", "nowhere.toml"], "nowhere.toml"),
-    ],
-)
-def test_what_is_missing_is_named(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Too few runs, no mass, scenes that do not match the runs: exit code 2 and one line with what to do."""
-    assert main(["compare", *arguments]) == 2
-    output = capsys.readouterr()
-    assert output.out == ""
-    assert words in output.err
-    assert output.err.count("\n") == 1
-
-
 def test_a_run_that_does_not_oscillate_cannot_be_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A bob at rest has no spring constant: exit code 3 and its name."""
     still = written_run(tmp_path / "still.txt", omega=8.0, amplitude_m=1e-9, seconds=10.0)

@@ -148,27 +148,6 @@ def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
         assert np.nanmin(loaded.samples.distance) > 0.3
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--option", "colour=red"), "colour"),
-        (("--ruler", "0.4"), "--still"),
-        (("--pre", "1"), "--trigger"),
-        (("--port", "/dev/ttyUSB0"), "--simulate"),
-    ],
-)
-def test_options_that_would_do_nothing_are_refused(
-    cli: Callable, tmp_path: Path, scene: Path, options: tuple[str, str], message: str
-) -> None:
-    """An option that no sensor takes, or that needs another: one line, exit code 2, nothing recorded."""
-    done = cli(
-        "record", "--simulate", "--scene", scene, "--sensor", "line-protocol", *options, "-o", tmp_path / "run.h5"
-    )
-    assert done.code == 2
-    assert message in done.complaint
-    assert not (tmp_path / "run.h5").exists()
-
-
 def test_a_disk_nearly_full_is_told_before_a_run_starts(
     cli: Callable, tmp_path: Path, scene: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

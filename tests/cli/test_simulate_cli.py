@@ -75,28 +75,6 @@ def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("--method", "leapfrog"), "forward-euler"),
-        (("--dt", "0"), "--dt"),
-        (("--tolerance", "-1"), "-1"),
-        (("--method", "verlet", "--tolerance", "1e-12"), "1e-12"),
-        (("--method", "exact"), "exact"),
-        (("--seconds", "1e9"), "steps"),
-        (("--seconds", "0.001"), "steps"),
-        (("--dt", "1e-200", "--seconds", "1e-199"), "1e-200"),
-    ],
-)
-def test_bad_input_is_one_line_with_code_two(
-    cli: Callable, scene: Path, arguments: tuple[str, ...], message: str
-) -> None:
-    """What cannot be is said before anything is written."""
-    done = cli("simulate", "--scene", scene, "--json", *arguments)
-    assert (done.code, done.out) == (2, "")
-    assert message in done.complaint
-
-
-@pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ("mass_kg = 0.2", "mass_kg = -0.2", "mass_kg"),
