@@ -45,8 +45,8 @@ golden: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.golden
 
 trials: $(VENV)/.installed-dev
-	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_ENDS=200 SPRINGMASS_UNPLUGS=20 \
-	SPRINGMASS_EXAMPLES=nightly $(BIN)/python -m pytest -m trials -n $(WORKERS) --dist loadfile
+	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_EXAMPLES=nightly \
+	$(BIN)/python -m pytest -m trials -n $(WORKERS) --dist loadfile
 
 nightly: $(VENV)/.installed-dev
 	bash .ci/nightly

@@ -85,10 +85,6 @@ class NeedsAnswer(FormatError):
         return partial(type(self), self.question, self.remedy, line=self.line), (), self.__dict__
 
 
-class SourceError(AcquisitionError):
-    """A source failed during delivery; the blocks delivered before the failure are valid."""
-
-
 class SensorError(AcquisitionError):
     """An unknown family of rangefinders, or an option that the family lacks."""
 

@@ -32,8 +32,6 @@ class VirtualSensor:
     cluster follows such a turning point."""
     dead_time_s: float = 0.85e-3
     """Minimum time of flight; an earlier echo gives a reading without a target."""
-    crystal_ppm: float = 0.0
-    """Relative rate by which the sensor's clock runs faster than true time."""
     speed_of_sound_m_per_s: float = 344.0
 
     def __post_init__(self) -> None:
@@ -50,7 +48,7 @@ class Shot:
     """One reading of the simulated sensor; echo time and distance are NaN for no target."""
 
     true_s: float
-    """Time of the reading since the start, in true time."""
+    """Time of the reading since the start."""
     sequence: int
     device_us: int
     """Time by the sensor's clock, which wraps at 2^32."""
@@ -73,7 +71,7 @@ class VirtualRangefinder:
     def shot(self, sequence: int) -> Shot:
         """Take the reading with a given sequence number; the numbers of successive calls must not decrease."""
         sensor = self.sensor
-        true_s = sequence / sensor.rate_hz / (1.0 + sensor.crystal_ppm * 1e-6)
+        true_s = sequence / sensor.rate_hz
         # The sound is reflected by the bob half the time of flight later.
         met_s = true_s + self._position(true_s) / sensor.speed_of_sound_m_per_s
         distance_m = self._position(met_s) + self._false_echo(true_s) + self._rng.normal(0.0, sensor.noise_m)
@@ -86,10 +84,9 @@ class VirtualRangefinder:
         return Shot(true_s, sequence, device_us, echo_us, distance)
 
     def block(self, seconds: float) -> Block:
-        """Return the readings of the first ``seconds`` of true time, for :class:`acquisition.replay.Replay`."""
-        true_rate_hz = self.sensor.rate_hz * (1.0 + self.sensor.crystal_ppm * 1e-6)
+        """Return the readings of the first ``seconds``, for :class:`acquisition.replay.Replay`."""
         # The product is rounded, so that 0.07 s at 100 Hz give seven samples: it is 7.000000000000001.
-        shots = [self.shot(sequence) for sequence in range(math.ceil(round(seconds * true_rate_hz, 6)))]
+        shots = [self.shot(sequence) for sequence in range(math.ceil(round(seconds * self.sensor.rate_hz, 6)))]
         distance = np.array([shot.distance_m for shot in shots], np.float64)
         flags = np.isnan(distance) * np.uint8(Flag.MISSING)
         host_ns = np.array([round(shot.true_s * 1e9) for shot in shots], np.int64)

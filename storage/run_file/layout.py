@@ -99,13 +99,14 @@ def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None
 def attributes(header: Header) -> dict[str, dict[str, Any]]:
     """Return the attributes for other tools, by the path of their group or array."""
     info = header.info
+    texts = {name: getattr(header, name) for name in ("title", "channel", "format")}
     plot: dict[str, Any] = {"NX_class": "NXdata", "signal": "distance", "axes": ("time",)}
     if "velocity" in header.columns:
         plot["auxiliary_signals"] = ("velocity",)
     tree: dict[str, dict[str, Any]] = {
         "/": {"Conventions": "CF-1.11", "NX_class": "NXroot", "default": "entry", "kind": info.kind},
         "/entry": {"NX_class": "NXentry", "default": "signal"},
-        SIGNAL: signal_attributes(header) | plot,
+        SIGNAL: {"kind": info.kind} | {name: text for name, text in texts.items() if text} | plot,
         INSTRUMENT: {"NX_class": "NXinstrument"},
         "/entry/provenance": {"NX_class": "NXprocess", **_provenance(header)},
         "/raw": {"NX_class": "NXcollection"},
@@ -115,19 +116,13 @@ def attributes(header: Header) -> dict[str, dict[str, Any]]:
     if header.originals:
         names = tuple(entry.name for entry in header.originals)
         tree[WIRE] = {"NX_class": "NXcollection", "content": "files", "record_name": names}
-    tree |= {BY_NAME[name].path: column_attributes(BY_NAME[name], header) for name in header.columns}
+    tree |= {BY_NAME[name].path: _column_attributes(BY_NAME[name], header) for name in header.columns}
     units = {"hz": "Hz", "m": "m"}
     named = {path: units.get(path.rpartition("_")[2]) for path in fields(header)}
     return tree | {path: {"units": unit} for path, unit in named.items() if unit}
 
 
-def signal_attributes(header: Header) -> dict[str, Any]:
-    """Return the attributes of the signal, which a dataset of the samples has too."""
-    texts = {name: getattr(header, name) for name in ("title", "channel", "format")}
-    return {"kind": header.info.kind} | {name: text for name, text in texts.items() if text}
-
-
-def column_attributes(column: Column, header: Header) -> dict[str, Any]:
+def _column_attributes(column: Column, header: Header) -> dict[str, Any]:
     """Return a column's attributes in this run."""
     attributes = dict(column.attributes)
     if column.name == "time":

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from numpy.typing import NDArray
 
@@ -27,9 +27,6 @@ from storage.run_file import layout
 from storage.run_file.header import FileEntry, Header
 from storage.run_file.layout import CHUNK
 from storage.schema import ValueRefused, plain
-
-if TYPE_CHECKING:
-    import xarray
 
 _BLOCK_COLUMNS = {
     "time": "t",
@@ -58,20 +55,9 @@ class Run:
     ``sha256`` is the digest of the header, which contains the digests of all arrays and original files. Two files with
     the same content therefore have the same ``sha256``, even if their bytes differ.
 
-    Parameters
-    ----------
-    path : str or PathLike
-    unverified : bool
-        Whether to return data even if their digest differs; :meth:`differences` lists the differences.
-
-    Raises
-    ------
-    NotARun
-        If the file does not exist or is not a run file.
-    RunDamaged
-        If the file cannot be read, or its header is damaged or has a value that is not allowed.
-    RunOpen
-        If another program has the file open for writing.
+    With ``unverified``, data are returned even if their digest differs; :meth:`differences` lists the differences.
+    Raises NotARun if the file is missing or no run file, RunDamaged if it cannot be read, and RunOpen if another
+    program has it open for writing.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, unverified: bool = False) -> None:
@@ -168,21 +154,6 @@ class Run:
         for block in self.blocks(max(len(self), 1)):
             return block
         return _block(self.header, 0, self._rows(0, 0))
-
-    def dataset(self) -> xarray.Dataset:
-        """Return the samples as a checked dataset in memory, independent of the file."""
-        import xarray as xr
-
-        header, values = self.header, layout.arrays(self.samples(), self.header.info.sigma_m)
-        variables = {}
-        for column in layout.COLUMNS:
-            if column.path.startswith(layout.SIGNAL) and column.name in header.columns:
-                attributes = layout.column_attributes(column, header)
-                attributes.pop("_FillValue", None)  # xarray stores it in the encoding
-                variables[column.name] = ("time", values[column.name], attributes)
-        fields = layout.fields(header).items()
-        instrument = {path.rpartition("/")[2]: value for path, value in fields if path.startswith(layout.INSTRUMENT)}
-        return xr.Dataset(variables, attrs=instrument | layout.signal_attributes(header))
 
     def originals(self) -> tuple[Original, ...]:
         """Return the original files, bit for bit; an empty tuple if there are none."""

@@ -19,15 +19,7 @@ COLUMNS = b"Time (s)\tDistance (cm)\tDist Error (cm)"
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What a command did.
-
-    Parameters
-    ----------
-    code : int
-        Its exit code.
-    out, err : str
-        What it wrote on stdout and stderr.
-    """
+    """What a command did: its exit code, and what it wrote on stdout and stderr."""
 
     code: int
     out: str

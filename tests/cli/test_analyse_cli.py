@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -56,38 +54,11 @@ def test_a_stated_mass_changes_no_distance(cli: Cli, tmp_path: Path) -> None:
     assert u("--scene", scene) == pytest.approx(0.25 * 0.0055, rel=0.02)
 
 
-def test_a_missing_mass_of_the_spring_comes_first(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """It is the first warning, and with --full the budget of k names it, by the classic method too."""
-    for options in ((), ("--method", "classic")):
-        out = cli("analyse", recording, "--mass-kg", "0.2", "--full", "-o", tmp_path, *options).out
-        assert re.search(r"(warning|ERROR) +(\w+):", out)[2] == "spring_mass_missing"  # type: ignore[index]
-        assert re.search(r"spring constant +mass of the spring, which was not stated", out)
-
-
-def test_a_given_scene_replaces_that_of_the_notes(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """No line says that a scene was read from the notes if another one is used."""
-    scene = tmp_path / "bench.toml"
-    scene.write_text("[bob]\nmass_kg = 0.3\n")
-    assert cli("scene", recording, "--scene", scene).code == 0
-    assert "its scene" in cli("analyse", recording, "--no-report").err
-    assert "its scene" not in cli("analyse", recording, "--no-report", "--scene", scene).err
-
-
 def test_a_bad_input_does_not_keep_the_others_from_theirs(cli: Cli, recording: Path, tmp_path: Path) -> None:
     """One of three cannot be read: two results, one line on stderr, exit code 1."""
     done = cli("analyse", "--json", recording, tmp_path / "absent.txt", recording)
     assert (done.code, [each["input"]["path"] for each in done.results]) == (1, [str(recording)] * 2)
     assert "absent.txt" in done.complaint
-
-
-def test_seconds_that_one_input_lacks_do_not_keep_the_others_from_theirs(
-    cli: Cli, write: Callable[..., Path], rows: list[bytes]
-) -> None:
-    """A window past the end of one record fails that one."""
-    short, long = write(rows[:300], "short.txt"), write(rows, "long.txt")
-    done = cli("analyse", "--json", "--from", "4", short, long)
-    assert (done.code, [r["input"]["path"] for r in done.results]) == (1, [str(long)])
-    assert "short.txt" in done.complaint
 
 
 def test_a_run_file_with_an_impossible_scene_fails_alone(cli: Cli, recording: Path, tmp_path: Path) -> None:
@@ -114,14 +85,6 @@ def test_from_and_to_cut_the_record(cli: Cli, recording: Path) -> None:
     assert (result["provenance"]["parameters"]["from_s"], result["provenance"]["parameters"]["to_s"]) == (2.0, 6.5)
 
 
-@pytest.mark.parametrize("window", [("--from", "20"), ("--to", "-1"), ("--from", "5", "--to", "4")])
-def test_seconds_outside_the_record_are_a_usage_error(cli: Cli, recording: Path, window: tuple[str, ...]) -> None:
-    """The line says what the record spans."""
-    done = cli("analyse", "--json", recording, *window)
-    assert (done.code, done.out) == (2, "")
-    assert "9.99" in done.complaint
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -131,6 +94,10 @@ def test_seconds_outside_the_record_are_a_usage_error(cli: Cli, recording: Path,
         ("[weight]\nmass_kg = 0.2\n", ("weight",)),
         ("[sensor]\nposition = 'left'\n", ("position", "left")),
         ("[bob\n", ("line 1",)),
+        ("a = " + "[" * 20_000, ()),
+        ("[bob]\nmass_kg = '" + "x" * 1_000_000 + "'\n", ()),
+        ("[bob]\nmass_kg = " + "9" * 5000 + "\n", ()),
+        ('["\\u001b[31m"]\na = 1\n', ()),
         ("# H\udcf6he\n", ()),
     ],
 )
@@ -143,6 +110,8 @@ def test_an_impossible_scene_is_one_line(
     done = cli("analyse", "--json", recording, "--scene", scene)
     assert (done.code, done.out) == (2, "")
     assert all(word in done.complaint for word in (str(scene), *words))
+    assert done.complaint.isprintable()
+    assert len(done.complaint) < 1000
 
 
 def test_json_writes_no_files(cli: Cli, recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -173,25 +142,6 @@ def test_the_module_runs_as_a_program(recording: Path, tmp_path: Path) -> None:
     assert json.loads(done.stdout)["estimates"]["period"]["value"] == pytest.approx(0.7585, abs=5e-4)
     assert done.stderr.startswith("springmass: absent.txt: cannot be opened")
     assert len(done.stderr.splitlines()) == 1
-
-
-@pytest.mark.trials
-def test_both_streams_come_in_their_order_in_one_file(recording: Path, tmp_path: Path) -> None:
-    """Into one log (`> log 2>&1`) the table comes before the line that names the report, buffered or not."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    command = [sys.executable, "-m", "springmass", "analyse", str(recording), "--output", "results"]
-    done = subprocess.run(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=True,
-        cwd=tmp_path,
-        env=environment,
-    )
-    lines = done.stdout.splitlines()
-    assert lines[0].startswith("quantity")
-    assert lines[-1].startswith("report: ")
 
 
 def test_nothing_steers_the_terminal(cli: Cli, recording: Path, tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ import pytest
 
 import springmass
 from acquisition.block import Flag
-from tests.sampling import sampled
 
 Cli = Callable[..., Any]
 Write = Callable[..., Path]
@@ -158,48 +157,3 @@ def test_other_ways_to_write_the_same_numbers_are_read(
     other.write_bytes(change(recording.read_bytes()))
     sound, result = analysed(cli, recording), analysed(cli, other)
     assert (result["quality"], result["estimates"]) == (sound["quality"], sound["estimates"])
-
-
-def test_semicolons_make_any_table_of_it(cli: Cli, recording: Path, tmp_path: Path) -> None:
-    """MotionSensor.vi writes tabs; another program's copy is a table with the same motion."""
-    other = tmp_path / "other.txt"
-    other.write_bytes(recording.read_bytes().replace(b"\t", b";"))
-    sound, result = analysed(cli, recording)["estimates"], analysed(cli, other)["estimates"]
-    for name in ("period", "amplitude", "offset"):
-        assert abs(result[name]["value"] - sound[name]["value"]) < 0.1 * sound[name]["u"]
-
-
-@pytest.mark.parametrize("cut", [20, 3000])
-def test_a_cut_run_file_is_refused(cli: Cli, recording: Path, tmp_path: Path, cut: int) -> None:
-    """A copy that ended early says what to do."""
-    path = tmp_path / "run.h5"
-    assert cli("convert", recording, path).code == 0
-    path.write_bytes(path.read_bytes()[:-cut])
-    refused(cli("analyse", "--json", path), path)
-
-
-@pytest.mark.parametrize("seed", sampled(range(30), 4))
-def test_mangled_files_never_raise(cli: Cli, write: Write, rows: list[bytes], seed: int) -> None:
-    """After random damage a file is refused in one line or analysed, and the period is the true one or not told."""
-    rng = np.random.default_rng(seed)
-    path = write(rows[:400])
-    content = bytearray(path.read_bytes())
-    for _ in range(int(rng.integers(1, 6))):
-        at, length = int(rng.integers(len(content))), int(rng.integers(1, 200))
-        match rng.integers(4):
-            case 0:
-                del content[at : at + length]
-            case 1:
-                content[at : at + length] = rng.bytes(length)
-            case 2:
-                content[at:at] = content[: length * 3]
-            case _:
-                del content[-length:]
-    path.write_bytes(content)
-    done = cli("analyse", "--json", path)
-    assert done.code in (0, 3)
-    if done.code == 3:
-        assert str(path) in done.complaint
-    for result in done.results:
-        if period := result["estimates"].get("period"):
-            assert abs(period["value"] - 0.7585) < 0.01

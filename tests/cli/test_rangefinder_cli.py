@@ -36,12 +36,7 @@ def line(body: str) -> bytes:
 class Board:
     """Speaks as the firmware does, on a pseudo-terminal: silent until it is asked what it is, as after a reset.
 
-    Parameters
-    ----------
-    version : str
-        Of its firmware.
-    letter : str
-        Status of every reading.
+    Every reading has the status ``letter``.
     """
 
     def __init__(self, version: str = VERSION, letter: str = "E") -> None:
@@ -160,15 +155,6 @@ def avrdude(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, baud: int) -> Path:
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     return log
-
-
-def test_wiring_and_both_speeds_are_shown(cli: Callable) -> None:
-    """They stand beside the path of the firmware, which is there."""
-    done = cli("firmware")
-    assert done.code == 0
-    for words in ("D9", "TRIG", "D8", "ECHO", "-b 115200", "-b 57600", str(HEX)):
-        assert words in done.out
-    assert HEX.read_text(encoding="ascii").splitlines()[-1] == ":00000001FF"
 
 
 def test_a_bootloader_is_found_at_its_speed_or_not_at_all(

@@ -89,15 +89,6 @@ def test_a_simulated_run_becomes_a_run_file_with_its_truth(recorded: Path) -> No
     assert not recorded.with_suffix(".wire").exists()
 
 
-def test_without_a_scene_an_example_bench_is_simulated(cli: Callable, tmp_path: Path) -> None:
-    """The run has the scene of that bench, so that its analysis gives the constant of its spring."""
-    done = cli("record", "--simulate", "--seconds", "3", "-o", tmp_path / "run.h5")
-    assert done.code == 0, done.err
-    assert load(tmp_path / "run.h5").loaded.info.kind == "simulated"
-    k = analyse(tmp_path / "run.h5")["spring_constant"]
-    assert abs(k.value - 14.0) < 5.0 * k.u
-
-
 def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Callable, tmp_path: Path, recorded: Path) -> None:
     """The log that travels inside a run gives the same samples through the same decoders."""
     with open_run(recorded) as run:
@@ -141,24 +132,6 @@ def test_a_place_that_cannot_hold_the_run_is_refused_before_the_recording(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.toml", "run.h5"]
 
 
-def test_an_absent_port_is_named_with_those_that_are_there(cli: Callable, tmp_path: Path) -> None:
-    """A port that does not exist: one line, exit code 4, no file."""
-    done = cli("record", "--port", "/dev/ttyNONE7", "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
-    assert done.code == 4
-    assert "/dev/ttyNONE7" in done.complaint
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.trials
-def test_another_sensor_is_recognised_by_its_bytes(cli: Callable, tmp_path: Path) -> None:
-    """Bytes of another family: the last line names it, exit code 4."""
-    with speaking("ffhls") as sensor:
-        sensor.start()
-        done = cli("record", "--port", sensor.path, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
-    assert done.code == 4
-    assert "FF" in done.err.splitlines()[-1]
-
-
 def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
     """Several sensors in one run: one log, a run file each, both complete."""
     with speaking("line-protocol") as one, speaking("ffhls") as other:
@@ -173,27 +146,6 @@ def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
         loaded = load(tmp_path / f"run.{channel}.h5").loaded
         assert len(loaded.samples) >= 20, family  # a hundred where the machine has time
         assert np.nanmin(loaded.samples.distance) > 0.3
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--option", "colour=red"), "colour"),
-        (("--ruler", "0.4"), "--still"),
-        (("--pre", "1"), "--trigger"),
-        (("--port", "/dev/ttyUSB0"), "--simulate"),
-    ],
-)
-def test_options_that_would_do_nothing_are_refused(
-    cli: Callable, tmp_path: Path, scene: Path, options: tuple[str, str], message: str
-) -> None:
-    """An option that no sensor takes, or that needs another: one line, exit code 2, nothing recorded."""
-    done = cli(
-        "record", "--simulate", "--scene", scene, "--sensor", "line-protocol", *options, "-o", tmp_path / "run.h5"
-    )
-    assert done.code == 2
-    assert message in done.complaint
-    assert not (tmp_path / "run.h5").exists()
 
 
 def test_a_disk_nearly_full_is_told_before_a_run_starts(
@@ -286,17 +238,6 @@ def test_two_distances_by_the_ruler_set_offset_and_scale(
     done = rulered(cli, tmp_path, hands, "0.2", "0.6")
     assert done.code == 0, done.err
     np.testing.assert_allclose(load(tmp_path / "run.h5").loaded.samples.distance[-10:], 0.4, atol=0.002)
-
-
-def test_several_distances_need_somebody_who_presses_enter(
-    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With the standard input closed the second distance cannot be waited for: one line, exit code 2, no run."""
-    hands = Hands([0.2])
-    monkeypatch.setattr(sys, "stdin", hands)
-    done = rulered(cli, tmp_path, hands, "0.2", "0.6")
-    assert done.code == 2
-    assert not (tmp_path / "run.wire").exists()
 
 
 def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable, tmp_path: Path, scene: Path) -> None:
@@ -421,9 +362,7 @@ def test_lines_of_a_sketch_are_recorded(
 ) -> None:
     """As they are, or with the options that the refusal names; every digit is there, and nothing is found wrong."""
     finder = VirtualRangefinder(
-        lambda t: 0.4 + 0.05 * np.cos(OMEGA * t),
-        VirtualSensor(rate_hz=50.0, noise_m=3e-4),
-        np.random.default_rng(5),
+        lambda t: 0.4 + 0.05 * np.cos(OMEGA * t), VirtualSensor(rate_hz=50.0, noise_m=3e-4), np.random.default_rng(5)
     )
     family = replace(get_family("text-lines"), encoder=lambda: Sketch(template))
     with VirtualPort(family, finder, SystemClock(), seconds=20.0) as port:

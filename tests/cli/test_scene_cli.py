@@ -74,22 +74,6 @@ def test_values_of_the_bench_on_the_command_line_stand_for_a_scene(cli: Cli, run
     assert amended["provenance"]["parameters"]["scene"]["disc"] == filed["provenance"]["parameters"]["scene"]["disc"]
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--mass-kg", "200 g"), "--mass-kg"),
-        (("--mass-kg", "0.2+/--0.1"), "--mass-kg"),
-        (("--set", "bob.mass=0.2"), "mass_kg"),
-        (("--set", "mass_kg"), "--set"),
-        (("--mass-kg", "-1"), "mass_kg"),
-    ],
-)
-def test_impossible_values_are_refused(cli: Cli, run: Path, options: tuple[str, ...], words: str) -> None:
-    """Exit code 2 and one line."""
-    done = cli("analyse", run, "--json", *options)
-    assert (done.code, words in done.complaint) == (2, True)
-
-
 def test_what_is_noted_beside_a_recording_is_used_and_said(cli: Cli, run: Path, data: Path) -> None:
     """Scene, remarks and marks outlive the command; a given scene goes before; the recording stays as it was."""
     before = run.read_bytes()

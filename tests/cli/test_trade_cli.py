@@ -32,6 +32,7 @@ def test_a_recording_has_its_own_trade(cli: Cli, data: Path) -> None:
     assert (found["motion"]["law"], round(found["motion"]["seconds"])) == ("linear+quadratic", 120)
     best = min(row["error"] for row in found["integrators"] if row["method"] == "auto 1e-09")
     assert best < 1e-8
+<<<<<<< HEAD
 
 
 def test_a_scene_has_its_own_trade(cli: Cli, tmp_path: Path) -> None:
@@ -58,3 +59,5 @@ def test_a_recording_that_does_not_oscillate_has_no_trade(cli: Cli, tmp_path: Pa
     still.write_text("time (s),distance (m)\n" + "".join(f"{i / 100:.2f},0.2\n" for i in range(1000)))
     done = cli("trade", still)
     assert (done.code, done.out, "still.csv" in done.complaint) == (3, "", True)
+=======
+>>>>>>> dietA

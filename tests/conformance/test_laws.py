@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.damping import select as damping
-from pipeline.damping.laws import LAWS, Drag, Law, in_units
-from pipeline.damping.laws.drag import amplitudes
-from pipeline.windows.demodulate import Demodulated
+from pipeline.damping.laws import LAWS, Drag, Law
 from springmass.testing import check
 
 # Rows of coefficients; a law takes those that its parameters name.
@@ -85,31 +82,6 @@ def test_amplitude_solves_its_differential_equation(law: Law, bench: dict[str, f
     np.testing.assert_allclose(result, integrated(law, bench), rtol=1e-10, atol=1e-10 * bench["A0"])
 
 
-@pytest.mark.parametrize("bench", [*BENCHES, *STOPPING])
-def test_rate_is_the_equation(law: Law, bench: dict[str, float]) -> None:
-    """The rate is the equation's right side, zero where there is no amplitude."""
-    a = np.array([0.0, 0.001, 0.02, 0.05])
-    rate = law.rate(a, theta_of(law, bench))
-    assert rate.shape == a.shape
-    assert rate[0] == 0.0
-    np.testing.assert_allclose(-rate[1:], np.broadcast_to(fall(law, bench)(a), a.shape)[1:], rtol=1e-12)
-
-
-@pytest.mark.parametrize("length_m", [1e9, 1.0, 1e-5])
-def test_uncertainty_scales_with_the_units(law: Law, length_m: float, windows: Callable[..., Demodulated]) -> None:
-    """Stated uncertainties are the inverse of the information in the points, whatever the unit of length."""
-    theta = in_units(law, theta_of(law, BENCHES[0]), length_m=length_m)
-    t = 0.4 + 0.75 * np.arange(160)
-    u_m = 1e-3 * theta[0]
-    result = damping.fit_laws(windows(t, amplitude_of(law, t, theta), u=(u_m, 1e-4, u_m)), 0.0, (law.name,))
-    jacobian = law.curve(t, theta)[1] / u_m
-    scale = np.linalg.norm(jacobian, axis=0)
-    expected = np.sqrt(np.diag(np.linalg.inv((jacobian / scale).T @ (jacobian / scale)))) / scale
-    # What the smooth curve leaves of clean points is all pattern, so they count as fewer.
-    stated = np.sqrt(np.diag(result.fits[law.name].joint.covariance) / result.scatter.correlation)
-    np.testing.assert_allclose(stated, expected, rtol=2e-3)
-
-
 @pytest.mark.parametrize("size", [1e-300, 1e-100, 1e-20, 1e-14])
 def test_vanishing_coefficient_is_none(law: Law, size: float) -> None:
     """Amplitude and Jacobian go over into those of a coefficient that is exactly 0."""
@@ -179,13 +151,3 @@ def test_growing_amplitudes_end_at_a_pole() -> None:
         assert np.isinf(result[-1])
     assert np.isinf(amplitude_of(LAWS["quadratic+friction"], t, np.array([0.05, -0.5, -1e-4]))[-1])
     assert np.isinf(amplitude_of(LAWS["power"], t, np.array([0.05, -0.5, 2.0]))[-1])
-
-
-def test_several_motions_are_each_what_its_law_gives() -> None:
-    """Amplitudes of many rows of coefficients together equal those of each row, to rounding."""
-    drags = [law for law in LAWS.values() if isinstance(law, Drag)]
-    for bench in (*BENCHES, *STOPPING):
-        rows = [[bench[n] if n in law.parameters else 0.0 for n in ("A0", "mu", "gamma", "beta")] for law in drags]
-        values = amplitudes(T, np.array(rows))
-        for row, law in zip(values, drags, strict=True):
-            np.testing.assert_allclose(row, amplitude_of(law, T, theta_of(law, bench)), rtol=1e-13)

@@ -99,19 +99,6 @@ def test_it_takes_the_clock_time_of_its_pace_and_no_real_time(name: str) -> None
 
 
 @every_source
-def test_info_is_known_before_the_first_sample(name: str) -> None:
-    """Kind, name and rate are there, and stay as they are."""
-    source = SOURCES[name](VirtualClock())
-    before = source.info
-    with source:
-        next(iter(source))
-        assert source.info == before
-    assert before.kind in ("live", "replay", "simulated")
-    assert before.rate_hz == RATE_HZ
-    assert before.name
-
-
-@every_source
 def test_leaving_ends_the_iteration(name: str) -> None:
     """After the ``with``, nothing is delivered any more; leaving twice does no harm."""
     source = SOURCES[name](VirtualClock())
@@ -123,15 +110,6 @@ def test_leaving_ends_the_iteration(name: str) -> None:
 
 
 @every_source
-def test_entering_again_starts_again(name: str) -> None:
-    """A second ``with`` delivers the run from its first sample."""
-    source = SOURCES[name](VirtualClock())
-    for _ in range(2):
-        with source:
-            assert next(iter(source)).first == 0
-
-
-@every_source
 def test_consumers_cannot_change_what_others_get(name: str) -> None:
     """The run handed in is as it was after it was delivered."""
     with SOURCES[name](VirtualClock()) as source:
@@ -139,15 +117,3 @@ def test_consumers_cannot_change_what_others_get(name: str) -> None:
     with source:
         second = concatenate(source)
     assert first.distance.tobytes() == second.distance.tobytes()
-
-
-@every_source
-def test_missing_samples_are_flagged_and_no_others_lack_a_distance(name: str) -> None:
-    """A distance is NaN exactly where the flag says so, and times never step back."""
-    with SOURCES[name](VirtualClock()) as source:
-        joined = concatenate(source)
-    missing = (joined.flags & Flag.MISSING) != 0
-    assert missing.any()
-    np.testing.assert_array_equal(np.isnan(joined.distance), missing)
-    assert np.all(np.diff(joined.t) > 0)
-    assert len(joined) == SECONDS * RATE_HZ

@@ -31,10 +31,9 @@ LIMIT_S = 180.0
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def line_of(number: int, *, heard: bool = True) -> bytes:
+def line_of(number: int) -> bytes:
     """Return a reading whose echo time encodes its number, in the form of docs/reference/line-protocol.md."""
-    echo = f"{FIRST_US + STEP_US * number:.2f}" if heard else ""
-    body = f"R1,{number},{number * 10_000},{echo},2000,{'E' if heard else 'N'}".encode("ascii")
+    body = f"R1,{number},{number * 10_000},{FIRST_US + STEP_US * number:.2f},2000,E".encode("ascii")
     return b"$%s*%04X\n" % (body, binascii.crc_hqx(body, 0xFFFF))
 
 
@@ -47,17 +46,11 @@ def usual_signals() -> None:
 class Feeder:
     """Sends a hundred readings a second into a pseudo-terminal until it is stopped or unplugged.
 
-    Parameters
-    ----------
-    folder : Path
-        Where the port's name stands.
-    heard : callable
-        Tells of a reading's number whether the sensor heard its echo.
+    The port's name stands in ``folder``.
     """
 
-    def __init__(self, folder: Path, heard: Callable[[int], bool] = lambda _: True) -> None:
+    def __init__(self, folder: Path) -> None:
         self.port = folder / "port"
-        self._heard = heard
         self._stop = threading.Event()
         self._mute = threading.Event()
         self._unplug = threading.Event()
@@ -96,7 +89,7 @@ class Feeder:
                 self._stop.wait(STEP_S)
                 continue
             with contextlib.suppress(BlockingIOError):  # nobody reads: a sensor's bytes are lost then
-                os.write(self._master, line_of(self.sent, heard=self._heard(self.sent)))
+                os.write(self._master, line_of(self.sent))
             self.sent += 1
 
     def _pull(self) -> None:
@@ -177,7 +170,7 @@ def demand_whole(numbers: Sequence[int]) -> None:
 class Bench:
     """What a test of this folder needs."""
 
-    feeder: Callable[..., Feeder]
+    feeder: Callable[[], Feeder]
     record: Callable[..., Recording]
     numbers: Callable[[Path], list[int]]
     demand_whole: Callable[[Sequence[int]], None]
@@ -193,10 +186,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
         started.append(start_recording(*arguments, **options))
         return started[-1]
 
-    def feeder(*arguments: Any, **options: Any) -> Feeder:
-        return Feeder(tmp_path, *arguments, **options)
-
-    yield Bench(feeder, record, numbers_of, demand_whole, line_of)
+    yield Bench(lambda: Feeder(tmp_path), record, numbers_of, demand_whole, line_of)
     for recording in started:
         if recording.process.poll() is None:
             recording.process.kill()

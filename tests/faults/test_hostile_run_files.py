@@ -160,28 +160,6 @@ def test_a_changed_run_file_is_refused_in_one_line(
     assert not (tmp_path / "out.txt").exists()
 
 
-def test_an_array_that_was_written_anew_with_its_values_is_read(sound: Path, tmp_path: Path) -> None:
-    """What refuses the others is their content, not how the harm was done."""
-    path = tmp_path / "run.h5"
-    shutil.copy(sound, path)
-    with h5py.File(path, "r+") as file:
-        put(DISTANCE, lambda values: values)(file, tmp_path)
-    assert main(["analyse", str(path), "--json"]) == 0
-
-
-@pytest.mark.parametrize("size", [0, 8, 1000, -1])
-def test_a_cut_run_file_is_refused_in_one_line(
-    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], size: int
-) -> None:
-    """Whatever of its end is missing."""
-    path = tmp_path / "run.h5"
-    path.write_bytes(sound.read_bytes()[:size])
-    capsys.readouterr()
-    assert main(["analyse", str(path), "--json"]) == 3
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"springmass: {path}: ")
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
 @pytest.mark.parametrize("kind", ["pipe", "socket", "device", "directory"])
 def test_what_is_no_regular_file_is_refused_at_once(

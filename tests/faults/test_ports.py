@@ -190,15 +190,6 @@ def test_a_bad_cable_gives_no_wrong_value(bench: Any, tmp_path: Path, kind: str)
     assert sum(gap["lost"] for gap in decoding["gaps"]) == span - len(numbers)
 
 
-def test_a_short_reply_does_not_shift_those_after_it(tmp_path: Path) -> None:
-    """Of replies without a header one in five loses a byte: no distance is made of halves of two."""
-    with on_a_terminal(lambda number: us100(0)[number % 5 == 4 :], polled=True) as port:
-        samples = recorded(port, "us100", tmp_path / "run.h5", 1.5)
-    known = samples.distance[np.isfinite(samples.distance)]
-    assert known.size >= 4
-    np.testing.assert_allclose(known, 1e-3 * FIRST_MM, atol=1e-9)
-
-
 def test_a_polled_sensor_is_asked_on_after_a_silence(tmp_path: Path) -> None:
     """Requests without a reply are events of the run, and the distances go on."""
     with on_a_terminal(lambda number: b"" if 5 <= number < 8 else us100(number), polled=True) as port:

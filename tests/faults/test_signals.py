@@ -134,30 +134,6 @@ def test_a_signal_in_an_import_waits_for_its_end(tmp_path: Path) -> None:
     assert not (tmp_path / "out.h5").exists()
 
 
-@pytest.mark.trials
-@pytest.mark.parametrize("command", ["convert", "recover"])
-def test_a_signal_at_any_moment_of_the_program(tmp_path: Path, command: str) -> None:
-    """The same from the first line of the program to its end, with all that it imports."""
-    words = inputs(tmp_path, 2000)[command]
-    out = tmp_path / "out.h5"
-    rng = np.random.default_rng(TRIALS)
-    took_s = 0.0
-    for trial in range(TRIALS + 1):
-        out.unlink(missing_ok=True)
-        program = started(words, "")
-        start = time.monotonic()
-        if trial:
-            threading.Event().wait(took_s * rng.random())
-            program.send_signal(SIGNALS[trial % 3])
-        said = program.communicate(timeout=LIMIT_S)[1]
-        took_s = took_s or time.monotonic() - start
-        assert "Traceback" not in said
-        assert "Exception ignored" not in said
-        assert program.returncode in (0, 130), said
-        if state_of(out) == "absent":
-            assert program.returncode == 130
-
-
 HUNG = """
 import io, pathlib, threading
 class Hung(io.FileIO):

@@ -5,17 +5,15 @@ from __future__ import annotations
 import re
 import subprocess
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from acquisition.decoders.family import Identity
-from acquisition.decoders.line_protocol import FAMILY, LONGEST, LineProtocolDecoder
-from acquisition.live.firmware import HEX, MODEL, VERSION, WIRING
-from docs.figures import wiring
+from acquisition.decoders.line_protocol import LONGEST, LineProtocolDecoder
+from acquisition.live.firmware import HEX, MODEL, VERSION
 
-from .conftest import ROOT, Built, Emulate, Emulated
+from .conftest import Built, Emulate, Emulated
 
 pytestmark = pytest.mark.trials
 
@@ -67,11 +65,7 @@ def test_counters_wrap_and_the_timer_s_overflows_are_all_counted(emulate: Emulat
 
 @pytest.mark.parametrize(
     ("trouble", "seen", "least"),
-    [
-        ({"lost": 0.05}, "ENB", 0.6),
-        ({"lost": 0.05, "retriggers": True}, "EN", 0.85),
-        ({"late": 0.05}, "ENB", 0.8),
-    ],
+    [({"lost": 0.05}, "ENB", 0.6), ({"lost": 0.05, "retriggers": True}, "EN", 0.85), ({"late": 0.05}, "ENB", 0.8)],
     ids=str,
 )
 def test_pings_without_an_echo_are_coded(emulate: Emulate, trouble: dict[str, object], seen: str, least: float) -> None:
@@ -188,11 +182,6 @@ def test_a_thermometer_that_has_not_measured_is_not_believed(emulate: Emulate) -
     assert {row[3] for row in emulate(4.0, temperature=85.0).readings()} == {b""}
 
 
-def test_random_commands_do_no_harm(emulate: Emulate) -> None:
-    """A hundredth of a million bytes; `make trials` sends them all."""
-    demand_unharmed(emulate(3.0, random_bytes="0.5,10000"), 3.0)
-
-
 def demand_unharmed(run: Emulated, seconds: float) -> None:
     """Demand that the readings went on without a gap, and that it still knows what it is."""
     assert run.all_sent
@@ -233,30 +222,3 @@ def test_the_firmware_is_small_and_leaves_the_watchdog_alone(built: Built, emula
 def test_the_hex_that_travels_is_what_the_source_makes(built: Built) -> None:
     """Byte for byte, wherever it is built; `make firmware` brings it up to date."""
     assert built.hex.read_bytes() == HEX.read_bytes()
-
-
-def test_the_sketch_is_one_file_that_needs_no_library() -> None:
-    """What one click in the Arduino IDE builds: a folder of the file's own name, headers of avr-libc alone."""
-    folder = ROOT / "firmware" / "springmass_rangefinder"
-    assert [path.name for path in folder.iterdir()] == [f"{folder.name}.ino"]
-    included = re.findall(r"#include [<\"](.*?)[>\"]", (folder / f"{folder.name}.ino").read_text(encoding="utf-8"))
-    assert all(re.fullmatch(r"(avr|util)/\w+\.h|std\w+\.h|string\.h", name) for name in included)
-
-
-def test_what_the_family_says_is_what_the_firmware_does(emulate: Emulate) -> None:
-    """Rate and step, as `springmass ports` prints them."""
-    run = emulate(3.0)
-    device_us = np.array([row[1] for row in run.readings()])
-    assert set(1e6 / np.diff(device_us)) == {FAMILY.rate_hz}
-    steps = {round(float(row[2]) / 0.25, 6) % 1 for row in run.readings()}
-    assert steps == {0.0}
-    assert pytest.approx(0.25e-6 * 343 / 2, rel=0.01) == FAMILY.resolution_m
-
-
-def test_the_wiring_is_drawn_by_its_script_and_names_the_pins_of_the_firmware(tmp_path: Path) -> None:
-    """The drawing on the page is what docs/figures/wiring.py draws."""
-    drawn = wiring.main(tmp_path).read_text(encoding="utf-8")
-    assert drawn == (ROOT / "docs" / "figures" / "wiring.svg").read_text(encoding="utf-8")
-    for pin in ("D8", "D9", "D2", "TRIG", "ECHO", "4.7 k"):
-        assert pin in drawn
-        assert pin in WIRING

@@ -15,13 +15,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, BrowserContext, Page
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from storage.run_file.reading import open_run
-from tests.pages.bench import FITTED, LIMIT_S, MOVES, PHASE, SEEN, STAGES, Client, answer, press
+from tests.pages.bench import LIMIT_S, MOVES, PHASE, SEEN, STAGES, Client, answer, press
 
 LOST_ONCE = """() => {
   const trouble = document.getElementById('trouble');
@@ -253,72 +252,6 @@ def kill_page_of(program: Any) -> None:
     command = f"springmass page --recorder.* {program.out.with_suffix('.wire')}"
     found = subprocess.run(["pgrep", "-f", command], capture_output=True, text=True)
     os.kill(int(found.stdout), signal.SIGKILL)
-
-
-@pytest.mark.trials
-@pytest.mark.parametrize(("width", "scheme"), [(1366, "light"), (390, "dark")])
-def test_everybody_can_read_a_bench(
-    record: Callable[..., Any], context: BrowserContext, width: int, scheme: Any
-) -> None:
-    """While it records: no violation of the accessibility rules, nothing wider than the screen."""
-    program = record()
-    page = context.new_page()
-    page.emulate_media(color_scheme=scheme)
-    page.set_viewport_size({"width": width, "height": 844})
-    page.goto(program.address)
-    page.wait_for_function(SEEN.format(count=600))
-    page.wait_for_function("() => motion && motion.omega")
-    found = Axe().run(page)
-    assert found.violations_count == 0, found.generate_report()
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
-    if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
-        page.screenshot(path=Path(folder) / f"live-{width}-{scheme}.png", full_page=True)
-
-
-@pytest.mark.trials
-def test_the_first_minute(bench: tuple[Any, Page]) -> None:
-    """From opening to the report in five actions: zero, record, stop, yes, report."""
-    program, page = bench
-    page.wait_for_function(SEEN.format(count=100))
-    press(page, "z")
-    page.wait_for_function("() => bench().phase === 'ready' && bench().rest_m")
-    assert page.evaluate("bench().rest_m") == pytest.approx(0.25, abs=1e-3)
-    assert page.evaluate("position.panel.label") == "displacement / mm"
-    press(page, "r")
-    page.wait_for_function(PHASE.format(phase="recording"))
-    page.wait_for_function(FITTED)
-    page.wait_for_function(
-        "() => [phase, spectrum].every((chart) => chart.panel.series.length && chart.panel.series[0].x.length > 50)"
-    )
-    ids = page.evaluate("[...document.querySelectorAll('[id]')].map((e) => e.id)")
-    assert len(set(ids)) == len(ids)
-    press(page, "s")
-    answer(page)
-    page.wait_for_function(PHASE.format(phase="built"))
-    press(page, "o")
-    page.wait_for_url("**/v2/report")
-    assert "period" in page.inner_text("body").lower()
-    page.go_back()
-    press(page, "q")
-    answer(page)
-    assert program.ended() == 0
-    with open_run(program.out) as run:
-        assert "still" in [event["kind"] for event in run.provenance["events"]]
-    assert (program.out.parent / "run.results" / "report.html").is_file()
-
-
-@pytest.mark.trials
-def test_a_trigger_is_disarmed_and_record_ends_the_wait(bench: tuple[Any, Page]) -> None:
-    """T again goes back to ready; Record, pressed once while armed, begins the recording."""
-    program, page = bench
-    for key, phase in (("t", "ready"), ("r", "recording")):
-        press(page, "t")
-        answer(page, "500", "2")
-        page.wait_for_function(PHASE.format(phase="armed"))
-        page.evaluate("ask_server({ type: 'stop' })")  # nothing is recorded: there is nothing to stop
-        press(page, key)
-        page.wait_for_function(PHASE.format(phase=phase))
-    program.end()
 
 
 @pytest.mark.trials

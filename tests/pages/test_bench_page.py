@@ -68,18 +68,6 @@ def test_what_is_in_view_is_saved(replay: Page, tmp_path: Path) -> None:
     np.testing.assert_array_equal([float(row[0]) for row in rows[1:]], recorded.t)
 
 
-def test_by_night_the_same_charts_are_drawn(replay: Page) -> None:
-    """Where the run was shown anew, a change of colours draws its charts again and none of those before them."""
-    replay.evaluate("begin_anew()")
-    replay.emulate_media(color_scheme="dark")
-    replay.wait_for_function("() => position.plot.axes[0].stroke() === '#e4e8ec'")
-    for chart in ("position", "amplitude", "phase", "spectrum"):
-        assert replay.locator(f"div#{chart} .uplot").count() == 1
-        assert replay.evaluate(f"{chart}.plot.root === document.querySelector('div#{chart} .uplot')")
-    for label in ("sampling rate", "drop-outs"):
-        assert label in replay.inner_text("#estimates")
-
-
 def test_two_hours_are_drawn_by_least_and_greatest(replay: Page) -> None:
     """720,000 samples become as many points as the screen can show, and no spike among them is lost."""
     points, least, greatest, gaps = replay.evaluate("""() => {
@@ -142,27 +130,6 @@ def test_the_cursor_and_a_part_by_the_keyboard(replay: Page) -> None:
     assert replay.inner_text("#cursor") == ""
     replay.keyboard.press("ArrowLeft")
     assert replay.evaluate("play_time") == pytest.approx(replay.evaluate("samples[0].t[samples[0].count - 1]") - 1.0)
-
-
-def test_keys_and_buttons_do_the_same(replay: Page) -> None:
-    """Freeze and fixed axes are pressed or not, and the window goes round."""
-    for key, button in (("f", "freeze"), ("a", "axes")):
-        replay.keyboard.press(key)
-        assert replay.get_attribute(f"#{button}", "aria-pressed") == "true"
-        replay.locator(f"#{button}").click()
-        assert replay.get_attribute(f"#{button}", "aria-pressed") == "false"
-    before = replay.inner_text("#window")
-    replay.keyboard.press("w")
-    assert replay.inner_text("#window") != before
-
-
-def test_a_forecast_counts_down_and_disappears(replay: Page) -> None:
-    """By the age of its analysis; over, it is left out."""
-    forecast = "(age) => stopping({ ...motion.stop, more_s: 20, u_clock_s: 0, wanted_u_s: 1e-5 }, age)"
-    shown = [replay.evaluate(forecast, age) for age in (0, 5, 21)]
-    assert "20 s" in shown[0]
-    assert "15 s" in shown[1]
-    assert "more for" not in shown[2]
 
 
 @pytest.mark.parametrize(("width", "scheme"), sampled([(1366, "light"), (390, "dark"), (390, "light"), (1366, "dark")]))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -97,29 +96,6 @@ def test_a_chart_zooms_moves_and_shows_a_value(page: Page, show: Show, page_of: 
     page.wait_for_function(f"() => {drawn} !== window.before")
 
 
-def test_the_amplitude_has_a_logarithmic_axis(page: Page, show: Show, page_of: PageOf) -> None:
-    """On which linear drag is a straight line."""
-    show(page_of("analyse"), "laptop")
-    figure = page.locator("#figure-amplitude-0")
-    button = figure.get_by_role("button", name="Log axis")
-    button.click()
-    assert button.get_attribute("aria-pressed") == "true"
-    assert page.evaluate("DRAWN.get(document.querySelector('#figure-amplitude-0')).panels[0].plot.scales.y.distr") == 3
-
-
-def test_a_figure_is_saved_with_four_times_the_pixels(page: Page, show: Show, page_of: PageOf, tmp_path: Path) -> None:
-    """As PNG, with its legend."""
-    show(page_of("analyse"), "laptop")
-    with page.expect_download() as saved:
-        page.locator("#figure-amplitude-0").get_by_role("button", name="Save figure").click()
-    assert saved.value.suggested_filename == "amplitude.png"
-    saved.value.save_as(tmp_path / "amplitude.png")
-    data = (tmp_path / "amplitude.png").read_bytes()
-    width, height = struct.unpack(">II", data[16:24])
-    assert width == 4 * 720
-    assert height > 4 * 300
-
-
 def test_without_scripts_the_page_says_so(browser: Browser, page_of: PageOf) -> None:
     """It names the option with which a report has pictures."""
     context = browser.new_context(java_script_enabled=False)
@@ -138,14 +114,6 @@ def test_a_link_of_a_warning_opens_its_figure(page: Page, show: Show, page_of: P
     page.evaluate("location.hash = '#figure-phase-0'")
     page.wait_for_function("() => document.querySelector('#figure-phase-0 canvas')")
     assert page.evaluate(SHOWN, "#figure-phase-0 canvas")
-
-
-def test_table_1_is_copied(page: Page, show: Show, page_of: PageOf) -> None:
-    """As cells for a spreadsheet."""
-    show(page_of("analyse"), "laptop")
-    page.evaluate("window.setTimeout = () => 0")  # the answer stays on the button
-    page.get_by_role("button", name="Copy as cells").click()
-    page.get_by_role("button", name="Copied").wait_for()
 
 
 def test_the_script_runs_under_the_policy_of_a_served_report(page: Page, page_of: PageOf, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A technician's session: zero, trigger, marks, selection, reload, phone, report, and the same run again.
+"""A technician's session: zero, trigger, marks, selection, reload, report, and the same run again.
 
 With ``SPRINGMASS_SCREENSHOTS`` naming a folder, every step leaves pictures there, in three widths, light and dark.
 """
@@ -8,18 +8,16 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import BrowserContext, Page
 
 from springmass.runs.run import Run
-from tests.pages.bench import FITTED, LIMIT_S, PHASE, SEEN, STAGES, answer, press
+from tests.pages.bench import FITTED, PHASE, SEEN, STAGES, answer, press
 
 WIDTHS = {1366: 768, 768: 1024, 390: 844}
 WHOLE = "() => motion && motion.accuracy === 'standard' && motion.estimates"
@@ -31,7 +29,6 @@ NOT_WHILE_BUSY = """() => {
   request('arm', { type: 'arm', threshold_m: 0.01, keep_s: 1 });
   return !document.querySelector('#ask[open]') && document.getElementById('told').textContent.includes('Not done');
 }"""
-SHOWN = "[...document.querySelectorAll('#estimates > div')].map((e) => e.getClientRects().length > 0)"
 NUMBERS = "Object.fromEntries(Object.entries(motion.estimates).map(([name, e]) => [name, [e.value, e.u]]))"
 
 
@@ -71,7 +68,7 @@ def select(page: Page, left: float, right: float) -> None:
 
 @pytest.mark.trials
 def test_a_session_from_the_first_minute_to_the_report(
-    record: Callable[..., Any], start: Callable[..., Any], context: BrowserContext, browser: Browser
+    record: Callable[..., Any], start: Callable[..., Any], context: BrowserContext
 ) -> None:
     """Each number is the same on the page, in the report, by ``analyse`` and on the page of the saved run."""
     program = record("--ready", "--lan")
@@ -122,7 +119,6 @@ def test_a_session_from_the_first_minute_to_the_report(
     assert page.evaluate("rate_hz()") == pytest.approx(100.0, abs=5.0)
     assert "lamp on" in page.inner_text("#marks")
     assert page.evaluate("position.panel.label") == "displacement / mm"
-    watch_on_two_phones(browser, page.evaluate("run.share"))
 
     press(page, "s")
     answer(page)
@@ -161,76 +157,3 @@ def test_a_session_from_the_first_minute_to_the_report(
     page.locator("#time").fill("0.6")
     look_at(page, "4-replay")
     again.end()
-
-
-def watch_on_two_phones(browser: Browser, address: str) -> None:
-    """On 390 pixels: the chart, three numbers, the rest folded; no action that changes anything."""
-    for number in range(2):
-        context = browser.new_context(viewport={"width": 390, "height": 844})
-        context.set_default_timeout(LIMIT_S * 1e3)
-        page = context.new_page()
-        page.goto(address)
-        page.wait_for_function(FITTED)
-        page.wait_for_selector("#estimates dd")
-        tops = [page.locator(each).bounding_box() for each in ("#position", "#estimates")]
-        assert tops[0] is not None
-        assert tops[1] is not None
-        assert tops[0]["y"] < 150 < tops[1]["y"] < 844
-        shown = page.evaluate(SHOWN)
-        assert shown == [i < 3 for i in range(len(shown))]
-        for folded in ("#amplitude", "#phase", "#spectrum", "#marks", "#freeze"):
-            assert page.is_hidden(folded)
-        assert page.is_hidden("#stop")
-        page.locator("#unfold").click()
-        page.locator("#more").click()
-        assert all(page.evaluate(SHOWN))
-        for opened in ("#amplitude", "#phase", "#spectrum", "#freeze"):
-            assert page.is_visible(opened)
-        if number == 0:
-            look_at(page, "5-viewer")
-        context.close()
-
-
-BUSY = "while True: pass"
-AGES = """(seconds) => new Promise((done) => {
-  let worst = 0, seen = 0;
-  const unmarked = [], turns = {}, start = performance.now();
-  const timer = setInterval(() => {
-    for (const group of document.querySelectorAll("#estimates > div")) {
-      const age = now_s() - Number(group.dataset.t);
-      seen += 1;
-      worst = Math.max(worst, age);
-      const marked = group.classList.contains("stale") && /old/.test(group.querySelector(".age").textContent);
-      // A page that was kept from running marks at its next turn, which may come after this one.
-      turns[group.dataset.name] = age > 2.5 && !marked ? (turns[group.dataset.name] || 0) + 1 : 0;
-      if (turns[group.dataset.name] > 4) unmarked.push([group.dataset.name, age]);
-    }
-    if (performance.now() - start > 1e3 * seconds) { clearInterval(timer); done({ worst, seen, unmarked }); }
-  }, 100);
-})"""
-
-
-@pytest.mark.trials
-def test_no_old_number_is_without_its_age(record: Callable[..., Any], context: BrowserContext) -> None:
-    """With four busy processes during the recording, and after the page's process is stopped."""
-    program = record()
-    page = context.new_page()
-    page.goto(program.address)
-    page.wait_for_function(FITTED)
-    busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(4)]
-    try:
-        ages = page.evaluate(AGES, 8)
-    finally:
-        for each in busy:
-            each.kill()
-            each.wait()
-    print(f"oldest number with four busy processes: {ages['worst']:.1f} s")
-    assert ages["seen"] > 100
-    assert ages["unmarked"] == []
-    page.evaluate("socket.onclose = null; socket.close()")
-    page.wait_for_selector("#estimates .stale")
-    ages = page.evaluate(AGES, 3)
-    assert ages["worst"] > 3.0
-    assert ages["unmarked"] == []
-    assert "no samples for" in page.inner_text("#clock")
-    program.end()

@@ -1,4 +1,4 @@
-"""Tables at random: of the dialects that people have nearly all open right or ask, and no other table gives a period.
+"""Tables at random: of the dialects that people have nearly all open right or ask.
 
 Numbers are drawn with seeds; what a table holds is known because it was written here.
 """
@@ -6,7 +6,6 @@ Numbers are drawn with seeds; what a table holds is known because it was written
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -168,54 +167,3 @@ def test_tables_of_the_dialects_open_right_or_ask(tmp_path: Path, tables: int) -
     bad = {seed: words for seed, words in found.items() if words}
     assert len(bad) <= 2, bad
     assert not {seed: words for seed, words in bad.items() if words.startswith(("times", "values"))}
-
-
-def lengths_and_periods(draw: random.Random) -> str:
-    """Write a table of pendulums, one a row."""
-    lengths = sorted(draw.uniform(0.1, 1.5) for _ in range(draw.randint(5, 30)))
-    head = draw.choice(
-        ("Length (m),Period (s)", "L,T", "length_m,T_s", "Länge (cm),Schwingungsdauer (s)", "l [m],10 T [s]", "")
-    )
-    rows = [f"{each:.3f},{2.006 * each**0.5:.3f}" for each in lengths]
-    return "\n".join([*([head] if head else []), *rows])
-
-
-def periods_first(draw: random.Random) -> str:
-    """Write periods before the masses that made them."""
-    masses = sorted(draw.uniform(0.05, 0.5) for _ in range(draw.randint(5, 30)))
-    head = draw.choice(("T (s);m (kg)", "Period (s);Extension (m)", "mean period [s];length [m]"))
-    return "\n".join([head, *(f"{2 * each**0.5:.3f};{each:.3f}" for each in masses)])
-
-
-def statistics(draw: random.Random) -> str:
-    """Write names with their mean and spread."""
-    rows = [f"{draw.choice('abcdef')}{i},{draw.gauss(3, 1):.3f},{abs(draw.gauss(0, 1)):.3f}" for i in range(20)]
-    return "\n".join(["run,mean,std", *rows])
-
-
-def spectrum(draw: random.Random) -> str:
-    """Write amplitudes over frequencies."""
-    rows = [f"{i * 0.5:.2f}\t{abs(draw.gauss(0, 1)):.4f}" for i in range(60)]
-    return "\n".join([draw.choice(("Frequency (Hz)\tAmplitude (m)", "f\tA", "freq [Hz]\tX (cm)")), *rows])
-
-
-def calibration(draw: random.Random) -> str:
-    """Write readings over distances of a ruler."""
-    rows = [f"{5 + i} {5.1 + 1.02 * i + draw.gauss(0, 0.01):.3f}" for i in range(25)]
-    return "\n".join([draw.choice(("ruler_cm reading_cm", "# mass_kg extension_m", "true measured")), *rows])
-
-
-KINDS = (lengths_and_periods, periods_first, statistics, spectrum, calibration)
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_a_table_that_is_no_recording_is_not_opened_unasked(
-    tmp_path: Path, kind: Callable[[random.Random], str]
-) -> None:
-    """Sixteen of each kind, eighty in all: each is asked about, so that none gives a period by itself."""
-    for seed in range(16):
-        path = tmp_path / "table.txt"
-        path.write_text(kind(random.Random(seed)), encoding="utf-8")
-        with pytest.raises(FormatError) as caught:
-            open_recording(path)
-        assert "\n" not in str(caught.value)

@@ -1,20 +1,17 @@
 """Decoders under random bytes: never an exception, never a distance that no frame in the bytes vouches for.
 
 What vouches is told by :data:`ORACLES`, which look for frames anywhere in the bytes, slowly and with none of the
-decoders' code. Three hunters use the same check: hypothesis, a mutator of the family's own stream that always runs,
-and a coverage-guided fuzzer where one is installed.
+decoders' code.
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import math
 import random
 import re
 from collections.abc import Callable, Iterable
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -24,11 +21,9 @@ from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.readings import Reading
 from tests.encoders import ENCODERS
-from tests.hunt import hunt
 
 FAMILIES = {family.name: family for family in families()}
 MOST_PENDING = 512
-MUTANTS = 150
 every_family = pytest.mark.parametrize("name", FAMILIES)
 
 
@@ -209,24 +204,6 @@ def test_its_own_stream_spoiled_is_back_in_step_within_two_frames(
     assert [repr(each[3:5]) for each in tail[-wanted:]] == [repr(each[3:5]) for each in clean[-wanted:]]
 
 
-@every_family
-def test_mutants_of_its_own_stream_give_no_distance_without_a_frame(name: str) -> None:
-    """Seeded mutants, each of the last that was of use: a fuzzer that needs nothing installed."""
-    rng = random.Random(f"springmass {name}")
-    pool = [b"".join(own_stream(FAMILIES[name], seed)) for seed in range(4)]
-    kinds = ["flip", "drop", "insert", "repeat", "cut"]
-    outcomes = set()
-    for _ in range(MUTANTS):
-        faults = [(rng.choice(kinds), rng.random(), rng.randbytes(rng.randint(1, 9))) for _ in range(rng.randint(1, 4))]
-        mutant = spoil(rng.choice(pool), faults)[:600]
-        readings = check(name, mutant, [rng.randint(0, len(mutant)) for _ in range(rng.randint(0, 5))])
-        outcome = (len(readings), sum(math.isnan(each.echo_us) and math.isnan(each.distance_m) for each in readings))
-        if outcome not in outcomes:  # something new happened in the decoder: breed from it
-            outcomes.add(outcome)
-            pool.append(mutant)
-    assert len(outcomes) > 5
-
-
 @given(data=st.binary(max_size=400))
 def test_describing_bytes_never_fails_and_takes_one_line(data: bytes) -> None:
     """Whatever a port has to offer; bytes without structure are no family's."""
@@ -235,23 +212,3 @@ def test_describing_bytes_never_fails_and_takes_one_line(data: bytes) -> None:
     assert "\n" not in line
     assert line.isprintable()
     assert all(name in FAMILIES for name in probe(data))
-
-
-def target(data: bytes) -> None:
-    """What a hunt guided by coverage calls: two bytes say the family and where to cut, the others are the stream."""
-    if len(data) > 2:
-        names, body = sorted(FAMILIES), data[2:]
-        check(names[data[0] % len(names)], body, [min(data[1], len(body))])
-
-
-@pytest.mark.trials
-@pytest.mark.skipif(
-    importlib.util.find_spec("atheris") is None, reason="atheris, the coverage-guided fuzzer, is absent"
-)
-def test_a_coverage_guided_hunt_finds_nothing(tmp_path: Path) -> None:
-    """Some thousand inputs, grown from sound streams towards code not yet reached; bounded in number and seconds."""
-    names = sorted(FAMILIES)
-    seeds = {name: bytes([i, 40]) + b"".join(own_stream(FAMILIES[name], 0, 3)) for i, name in enumerate(names)}
-    imports = "import acquisition.decoders.registry as r; r.families()"
-    bounds = {"runs": 12_000, "seconds": 6, "longest": 300}
-    assert hunt(__name__, "acquisition", imports, seeds, tmp_path, **bounds) >= 100

@@ -32,36 +32,16 @@ def ride(rng: np.random.Generator, t: F8) -> F8:
     )
 
 
-def way(rng: np.random.Generator, t: F8) -> F8:
-    """Return the way that such a ride takes."""
-    pushes = ride(rng, t)
-    return np.asarray(np.cumsum(np.cumsum(pushes - pushes.mean())) * float(t[1]) ** 2)
-
-
 def fall(rng: np.random.Generator, t: F8) -> F8:
     """Return the height of a thing that is let go and lies still."""
     since = np.maximum(t - rng.uniform(0.1, 0.7) * t[-1], 0.0)
     return np.asarray(np.maximum(rng.uniform(0.5, 2.0) - 4.905 * since**2, 0.0) + rng.normal(0, 1e-3, t.size))
 
 
-def weightless(rng: np.random.Generator, t: F8) -> F8:
-    """Return the acceleration that a telephone feels which falls and hits the ground."""
-    start = rng.uniform(0.1, 0.7) * t[-1]
-    felt = np.where((t > start) & (t < start + 0.5), 0.0, 9.81)
-    felt[np.searchsorted(t, start + 0.5) :][:5] += rng.uniform(20.0, 80.0)
-    return np.asarray(felt + rng.normal(0, 0.05, t.size))
-
-
 def switching(rng: np.random.Generator, t: F8) -> F8:
     """Return a signal that is switched on and off at random."""
     turns = np.cumsum(rng.exponential(rng.uniform(0.5, 2.0), t.size))
     return np.asarray(rng.uniform(1, 5) * (np.searchsorted(turns, t) % 2) + rng.normal(0, 0.01, t.size))
-
-
-def square(rng: np.random.Generator, t: F8) -> F8:
-    """Return one that is switched by a clock."""
-    turn = t / rng.uniform(0.5, 3.0) + rng.uniform()
-    return np.asarray(rng.uniform(1, 5) * (turn % 1 < rng.uniform(0.3, 0.7)) + rng.normal(0, 0.01, t.size))
 
 
 def walk(rng: np.random.Generator, t: F8) -> F8:
@@ -73,11 +53,6 @@ def remembering(rng: np.random.Generator, t: F8) -> F8:
     """Return noise whose power falls with the frequency."""
     spectrum = rng.normal(size=t.size) + 1j * rng.normal(size=t.size)
     return np.fft.irfft(spectrum[: t.size // 2 + 1] / np.sqrt(np.arange(t.size // 2 + 1) + 1.0), t.size)
-
-
-def white(rng: np.random.Generator, t: F8) -> F8:
-    """Return white noise."""
-    return rng.normal(0, 1, t.size)
 
 
 def double_pendulum(rng: np.random.Generator, t: F8) -> F8:
@@ -94,7 +69,7 @@ def double_pendulum(rng: np.random.Generator, t: F8) -> F8:
     return np.asarray(turned + rng.normal(0, 0.005, t.size))
 
 
-KINDS = (ride, way, fall, weightless, switching, square, walk, remembering, white, double_pendulum)
+KINDS = (ride, fall, switching, walk, remembering, double_pendulum)
 
 
 @pytest.mark.trials

@@ -118,16 +118,3 @@ def test_the_unit_that_is_answered_changes_no_time_and_no_flag(tmp_path: Path, s
         np.testing.assert_allclose(found[unit].distance, factor * found["m"].distance, rtol=1e-12)
     flagged = np.flatnonzero(found["m"].flags & Flag.FALSE_ECHO.value)
     assert flagged.tolist() == (list(range(300, 330)) if lost else [])
-
-
-@pytest.mark.trials
-def test_a_computed_start_that_is_no_swing_spoils_nothing() -> None:
-    """A ramp, a rest of exactly nothing, then an oscillation without noise: its period, however large the numbers."""
-    t = np.arange(3500) / 10.0
-    swing = 0.8 * np.exp(-0.025 * (t - 20.0)) * np.cos(t - 20.0)
-    y = np.where(t < 2.3, -t, np.where(t < 20.0, 0.0, swing))
-    for factor in (1.0, 1e6):
-        found = analyse(Track.from_arrays(t, factor * y))
-        period, amplitude = found.estimates["period"], found.estimates["amplitude"]
-        assert abs(period.value - 2.0 * np.pi) < 5.0 * period.u < 0.02
-        assert abs(amplitude.value) < 3.0 * factor

@@ -46,11 +46,3 @@ def test_a_pair(recordings: Path, position: str, velocity: str, second: float) -
     assert pair.info.quantum_m == pytest.approx(alone.info.quantum_m)
     assert {trap.code for trap in pair.traps} == {"nominal_clock", "stated_error_is_not_noise"}
     assert len(pair.originals) == 2
-
-
-def test_files_of_two_runs_are_no_pair(recordings: Path) -> None:
-    """The velocities of another run are noticed."""
-    pair = open_recording(
-        recordings / f"{PANDHI}/damped position.txt", velocity_path=recordings / f"{PANDHI}/velocity data.txt"
-    )
-    assert "pair_mismatch" in {trap.code for trap in pair.traps}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ import pytest
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.findings.finding import Finding
-from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.track import Track
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
@@ -24,7 +22,6 @@ OTHERS = (
     "pankaj9um__PHY224/undamped_point_data_set2.txt",
     "kamjha__PHY224/position_osc.txt",
 )
-FRICTION = "caspar__PhysicsLab/Q1.txt"
 TICK_M = 4.3e-5
 
 pytestmark = pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/recordings")
@@ -55,55 +52,10 @@ def motion_of(result: Analysis) -> Oscillation:
     return result.motion
 
 
-def codes(result: Analysis) -> set[str]:
-    """Return the codes of all findings."""
-    return {finding.code for finding in result.findings}
-
-
 def mode_of(result: Analysis) -> Finding:
     """Return the finding on the mode beside the main oscillation."""
     (found,) = (finding for finding in result.findings if finding.code == "sideways_mode")
     return found
-
-
-def test_bare_bob() -> None:
-    """A bob without a disc, 7 s: T = 0.7226 s, A = 51.4 mm, noise under 0.25 mm, where the file states 2.39 mm."""
-    result = analysed(BARE)
-    found = result.estimates
-    assert found["period"].value == pytest.approx(0.7226, abs=5e-4)
-    assert found["amplitude"].value == pytest.approx(0.0514, abs=3e-4)
-    assert found["noise"].value < 2.5e-4
-    assert found["period"].u < 2e-4
-    assert result.quality["used"] > 700
-    assert "stated_error_is_not_noise" in codes(result)
-
-
-def test_short_bare_run_does_not_tell_laws_apart() -> None:
-    """Ten periods admit linear and quadratic drag together."""
-    result = analysed(BARE)
-    assert {"linear", "quadratic"} <= set(motion_of(result).damping.admissible)
-    assert "laws_not_separable" in codes(result)
-
-
-def test_bob_with_disc() -> None:
-    """Two minutes with a disc: T = 0.7526 s, slower than without, as a heavier bob must be."""
-    result = analysed(DISC)
-    assert result.estimates["period"].value == pytest.approx(0.7526, abs=5e-4)
-    assert result.estimates["period"].value > analysed(BARE).estimates["period"].value
-    assert result.quality["used"] > 0.9 * len(result.track)
-    assert result.quality["clipped"] == 0
-
-
-def test_disc_drags_both_ways() -> None:
-    """A lone exponential is rejected; both drags together are admissible, gamma near 0.0065 and beta near 0.2."""
-    damping = motion_of(analysed(DISC)).damping
-    assert damping.fits["linear"].rejected
-    assert damping.fits["none"].rejected
-    assert "linear+quadratic" in damping.admissible
-    joint = damping.fits["linear+quadratic"].joint
-    assert 0.0055 <= joint["gamma"].value <= 0.0075
-    assert 0.17 <= joint["beta"].value <= 0.23
-    assert "law_rejected" in codes(analysed(DISC))
 
 
 def test_mixed_drag_on_every_disc_run_of_two_minutes() -> None:
@@ -113,67 +65,6 @@ def test_mixed_drag_on_every_disc_run_of_two_minutes() -> None:
         mixed = fits["linear+quadratic"]
         assert all(mixed.joint[name].value > 5.0 * mixed.joint[name].u for name in ("gamma", "beta"))
         assert all(fits[name].bic > mixed.bic + 100.0 for name in ("linear", "quadratic", "friction"))
-
-
-def test_large_disc_rejects_constant_coefficients() -> None:
-    """At 71 mm every law is rejected, that of both drags by its misfit."""
-    damping = motion_of(analysed_capstone()).damping
-    assert damping.admissible == ()
-    mixed = damping.fits["linear+quadratic"]
-    assert 50.0 < mixed.reduced_chi2 < 200.0
-    assert 0.009 < mixed.joint["gamma"].value < 0.013
-    assert 0.44 < mixed.joint["beta"].value < 0.60
-    assert damping.fits["power"].joint["n"].value == pytest.approx(1.54, abs=0.05)
-    errors = [finding.code for finding in analysed_capstone().findings if finding.severity == "error"]
-    assert errors == []
-    assert "no_law_fits" in codes(analysed_capstone())
-
-
-def test_large_discs_drag_changes_with_amplitude() -> None:
-    """From 34 mm on the misfit is a fourteenth of the whole run's and beta half as large again: it is no transient."""
-    whole, later = (
-        motion_of(each).damping.fits["linear+quadratic"] for each in (analysed_capstone(), analysed_capstone(21.0))
-    )
-    assert later.reduced_chi2 < whole.reduced_chi2 / 5.0
-    assert later.joint["beta"].value - whole.joint["beta"].value > 3.0 * whole.joint["beta"].u
-    assert later.joint["gamma"].value < whole.joint["gamma"].value
-
-
-def test_disc_shows_what_simulations_lack() -> None:
-    """Its frequency rises as the amplitude falls, the model leaves more than noise, and both are reported."""
-    result = analysed(DISC)
-    assert {"amplitude_dependent_frequency", "model_misfit"} <= codes(result)
-    (bent,) = (finding for finding in result.findings if finding.code == "amplitude_dependent_frequency")
-    assert bent.values["relative_shift"] < 0
-    # The interval of the mean covers the bend: tens of times what white residuals would give.
-    assert motion_of(result).derived.statistical["period"].u > 1e-5
-
-
-@pytest.mark.parametrize(
-    ("name", "period_s", "amplitude_m"),
-    [
-        ("pankaj9um__PHY224/undamped_point_data.txt", 0.6933, 0.0310),
-        ("pankaj9um__PHY224/undamped_point_data_set2.txt", 0.6931, 0.0072),
-        ("kamjha__PHY224/position_osc.txt", 0.6891, 0.0412),
-    ],
-)
-def test_other_bare_bobs(name: str, period_s: float, amplitude_m: float) -> None:
-    """Other benches of the same laboratory give periods near 0.69 s, quiet noise and weak damping."""
-    result = analysed(name)
-    found = result.estimates
-    assert found["period"].value == pytest.approx(period_s, abs=5e-4)
-    assert found["amplitude"].value == pytest.approx(amplitude_m, abs=3e-4)
-    assert found["noise"].value < 2.5e-4
-    assert 0.0 < found["damping_rate"].value < 0.01
-    assert found["quality_factor"].value > 500
-    assert result.quality["used"] > 0.9 * len(result.track)
-    assert not any(finding.severity == "error" for finding in result.findings)
-
-
-def test_same_bench_same_period() -> None:
-    """The two runs of one bench, 31 and 7 mm of amplitude, agree on the period to a quarter of a part in a thousand."""
-    large, small = (analysed(name).estimates["period"].value for name in OTHERS[:2])
-    assert large == pytest.approx(small, rel=2.5e-4)
 
 
 @pytest.mark.parametrize("name", [BARE, DISC, *OTHERS])
@@ -197,14 +88,6 @@ def test_every_bob_swings_sideways(name: str) -> None:
     frequency = mode.values["frequency_hz"]
     assert 0.58 < frequency / main < 0.61
     assert 0.33 < 9.81 / (2 * np.pi * frequency) ** 2 < 0.40
-
-
-def test_disc_without_its_swing_rejects_each_drag_alone() -> None:
-    """Without the sideways mode of 0.96 mm the amplitudes of the disc run contradict each drag alone."""
-    motion = motion_of(analysed(DISC))
-    assert mode_of(analysed(DISC)).values["amplitude_m"] == pytest.approx(9.6e-4, rel=0.05)
-    assert motion.damping.fits["linear"].reduced_chi2 > 30
-    assert motion.damping.fits["quadratic"].reduced_chi2 > 30
 
 
 @pytest.mark.parametrize("name", [BARE, *OTHERS])
@@ -241,35 +124,6 @@ REPORT_DISC = REPORT_BARE | {
 }
 
 
-def compared(named: dict[str, dict[str, Any]]) -> Comparison:
-    """Analyse recordings, each in its scene, and compare their springs."""
-    runs = []
-    for name, scene in named.items():
-        derived = motion_of(analyse(analysed(name).track, Scene.from_mapping(scene))).derived
-        runs.append(SpringRun.of(name, derived, clock="nominal"))
-    return compare_springs(runs, spring_mass_kg=Scene.from_mapping(scene).spring_mass_kg)
-
-
-def test_bare_and_disc_agree_on_the_spring() -> None:
-    """With the masses of the report both runs of one bench give one k to a part in a thousand; exchanged not."""
-    right = compared({BARE: REPORT_BARE, DISC: REPORT_DISC})
-    assert right.agree
-    low, high = (k.value for k in right.each)
-    assert low == pytest.approx(high, rel=1e-3)
-    assert 15.2 < right.spring_constant.value < 15.7
-    wrong = compared({BARE: REPORT_DISC, DISC: REPORT_BARE})
-    assert not wrong.agree
-    assert wrong.exchanged == (BARE, DISC)
-
-
-def test_two_runs_of_one_bob_agree_on_the_spring() -> None:
-    """31 and 7 mm of amplitude under 200 g on another bench give one spring constant."""
-    scene = {"bob": {"mass_kg": {"value": 0.2, "u": 5e-5}}}
-    found = compared(dict.fromkeys(OTHERS[:2], scene))
-    assert found.agree
-    assert found.spring_constant.value == pytest.approx(0.2 * (2 * np.pi / 0.6932) ** 2, rel=1e-3)
-
-
 def test_disc_drag_falls_with_amplitude() -> None:
     """The disc's drag coefficient is near 4 at 50 mm and near 8 at 15 mm, by the law and by slopes without one."""
     scene = Scene.from_mapping(REPORT_DISC | {"air": {"temperature_c": {"value": 21.0, "u": 2.0}}})
@@ -282,11 +136,28 @@ def test_disc_drag_falls_with_amplitude() -> None:
     assert np.mean(np.abs(curve.y_points - law) < 2 * curve.u_points) > 0.8
 
 
-def test_a_pendulum_that_friction_stops() -> None:
-    """Six periods in volts, counted as metres: friction by the equation of motion, T = 9.20 s."""
-    rows = [line.split("\t") for line in (RECORDINGS / FRICTION).read_text("utf-8").splitlines()]
-    t, y = np.array([[float(cell) for cell in row] for row in rows if len(row) == 2 and row[0][:1].isdigit()]).T
-    result = analyse(Track.from_arrays(t, y))
-    assert motion_of(result).damping.selected == "friction"
-    assert "strongly_damped" in codes(result)
-    assert result.estimates["period"].value == pytest.approx(9.2004, abs=0.008)
+def codes(result: Analysis) -> set[str]:
+    """Return the codes of all findings."""
+    return {finding.code for finding in result.findings}
+
+
+def test_large_disc_rejects_constant_coefficients() -> None:
+    """At 71 mm every law is rejected, that of both drags by its misfit."""
+    damping = motion_of(analysed_capstone()).damping
+    assert damping.admissible == ()
+    mixed = damping.fits["linear+quadratic"]
+    assert 50.0 < mixed.reduced_chi2 < 200.0
+    assert 0.009 < mixed.joint["gamma"].value < 0.013
+    assert 0.44 < mixed.joint["beta"].value < 0.60
+    assert damping.fits["power"].joint["n"].value == pytest.approx(1.54, abs=0.05)
+    errors = [finding.code for finding in analysed_capstone().findings if finding.severity == "error"]
+    assert errors == []
+    assert "no_law_fits" in codes(analysed_capstone())
+
+
+def test_disc_without_its_swing_rejects_each_drag_alone() -> None:
+    """Without the sideways mode of 0.96 mm the amplitudes of the disc run contradict each drag alone."""
+    motion = motion_of(analysed(DISC))
+    assert mode_of(analysed(DISC)).values["amplitude_m"] == pytest.approx(9.6e-4, rel=0.05)
+    assert motion.damping.fits["linear"].reduced_chi2 > 30
+    assert motion.damping.fits["quadratic"].reduced_chi2 > 30

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.identify import inspect, open_recording
+from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
 from pipeline.analyse import analyse
 from pipeline.track import UNUSABLE
@@ -245,14 +245,6 @@ def test_what_a_dialect_leaves_out_is_asked_in_one_line(recordings: Path, row: R
     assert set(caught.value.question.missing) == set(row.asks)
 
 
-@pytest.mark.parametrize("row", sampled(TABLE, 5), ids=lambda row: f"{row.start}:{row.channel}")
-def test_a_dialect_can_be_surveyed(recordings: Path, row: Row) -> None:
-    """What a file holds is told without a question, the channel among it."""
-    found = inspect(only(recordings, row.start))
-    assert found.format == row.family
-    assert row.channel in {each.channel for each in found.surveys}
-
-
 def test_a_workbook_of_results_is_no_recording(recordings: Path) -> None:
     """Row numbers are no times: a table of results by hand is answered as such, unless a rate is stated."""
     with pytest.raises(FormatError, match="not a recording"):
@@ -367,40 +359,6 @@ def test_what_oscillates_unevenly_has_the_period_of_its_crossings(recordings: Pa
     expected = crossing_period(recording.samples.t[used], recording.samples.distance[used], period.value)
     assert abs(period.value - expected) < 3.0 * period.u + 2e-4 * expected
     assert period.u < 1.5e-2 * period.value
-
-
-@pytest.mark.parametrize("row", sampled([each for each in TABLE if UNIT in each.asks]), ids=lambda row: row.start)
-def test_the_unit_that_is_answered_changes_no_time(recordings: Path, row: Row) -> None:
-    """Nor what is flagged: a unit says how large values are, and no more."""
-    path = only(recordings, row.start)
-    read = [
-        open_recording(path, **(row.given | {"unit": unit})).samples for unit in ("m", "mm", "deg", "rad/s", "V", "1")
-    ]
-    for each in read[1:]:
-        np.testing.assert_array_equal(each.t, read[0].t)
-        np.testing.assert_array_equal(each.flags, read[0].flags)
-
-
-STEADY = ("coupled", "heidelberg", "Pos A", "Pos B", "tracker", "trkerr", "xyerr")
-
-
-@pytest.mark.trials
-@pytest.mark.parametrize("row", of(STEADY), ids=lambda row: f"{row.start}:{row.channel}")
-def test_the_unit_that_is_answered_changes_no_period(recordings: Path, row: Row) -> None:
-    """No threshold of the analysis is in metres."""
-    periods = []
-    for unit in ("m", "mm", "V"):
-        recording = open_recording(only(recordings, row.start), **(row.given | {"unit": unit}))
-        periods.append(analyse(to_track(recording.samples, recording.info)).estimates["period"].value)
-    assert periods == pytest.approx([periods[0]] * 3, rel=1e-9)
-
-
-def test_a_neighbours_motion_of_four_steps_is_doubted(recordings: Path) -> None:
-    """A pendulum set going by the other and stopped: a period, if any, stands beside a warning of its laws."""
-    (row,) = of(("Pos A",))
-    recording = open_recording(only(recordings, row.start), **row.given)
-    found = analyse(to_track(recording.samples, recording.info))
-    assert "period" not in found.estimates or "no_law_fits" in {each.code for each in found.findings}
 
 
 @pytest.mark.parametrize("row", of(STROKES), ids=lambda row: f"{row.start}:{row.channel}")

@@ -14,28 +14,6 @@ def block(first: int = 0, count: int = 4, **more: np.ndarray) -> Block:
     return Block(first, t, 0.2 + t, np.zeros(count, np.uint8), **more)
 
 
-def test_a_slice_takes_every_column_along() -> None:
-    """Host times and velocities are cut like the rest."""
-    part = block(host_ns=np.arange(4), velocity=np.arange(4.0))[2:]
-    assert part.host_ns is not None
-    assert part.velocity is not None
-    assert (part.host_ns.tolist(), part.velocity.tolist()) == ([2, 3], [2.0, 3.0])
-
-
-def test_a_slice_with_a_step_is_refused() -> None:
-    """Samples of a block are consecutive."""
-    with pytest.raises(ValueError, match="step 1, got step 2"):
-        block()[::2]
-
-
-def test_concatenate_gives_back_what_was_cut() -> None:
-    """Slices joined are the block."""
-    whole = block(velocity=np.arange(4.0))
-    joined = concatenate([whole[:1], whole[1:3], whole[3:]])
-    for name in ("t", "distance", "flags", "velocity"):
-        np.testing.assert_array_equal(getattr(joined, name), getattr(whole, name))
-
-
 def test_concatenate_fills_columns_that_some_blocks_lack() -> None:
     """Velocity is NaN and host time -1 where nobody stated them."""
     joined = concatenate([block(count=1), block(1, 1, host_ns=np.array([5]), velocity=np.array([2.0]))])

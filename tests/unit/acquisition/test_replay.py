@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from acquisition.block import Block, Flag, concatenate
+from acquisition.block import Block, Flag
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from acquisition.source import SourceInfo
@@ -27,14 +27,6 @@ def test_blocks_are_due_with_their_last_sample() -> None:
     replay = Replay([run()], clock, info=INFO, speed=2.0, block_samples=25)
     seen = [(block.first, clock.now_ns() - 7) for block in replay]
     assert seen == [(0, 120_000_000), (25, 245_000_000), (50, 370_000_000), (75, 495_000_000)]
-
-
-@pytest.mark.parametrize("speed", [None, math.inf])
-def test_as_fast_as_possible_never_sleeps(speed: float | None) -> None:
-    """Nothing is asked of the clock but its time."""
-    clock = VirtualClock()
-    assert len(concatenate(Replay([run()], clock, info=INFO, speed=speed))) == 100
-    assert clock.now_ns() == 0
 
 
 def test_a_slow_consumer_is_not_given_a_drift() -> None:
@@ -80,16 +72,6 @@ def test_a_loop_has_a_gap_before_each_further_turn() -> None:
         assert not block.flags[1:].any()
 
 
-def test_times_that_run_back_wait_for_nothing() -> None:
-    """A faulty clock in the record delays no sample and drops none."""
-    whole = run(6)
-    whole.t[3] = 0.0
-    clock = VirtualClock()
-    joined = concatenate(Replay([whole], clock, info=INFO, block_samples=1))
-    np.testing.assert_array_equal(joined.t, whole.t)
-    assert clock.now_ns() == 50_000_000
-
-
 def test_kind_travels_with_the_data() -> None:
     """Simulated data stay simulated; all else is a replay."""
     simulated = SourceInfo("simulated", "s", 100.0)
@@ -102,10 +84,3 @@ def test_a_speed_that_is_not_positive_is_refused(speed: float) -> None:
     """Time does not stand still or run back."""
     with pytest.raises(ValueError, match="speed must be positive"):
         Replay([run()], VirtualClock(), info=INFO, speed=speed)
-
-
-def test_a_run_without_samples_plays_nothing() -> None:
-    """A replay without blocks ends immediately, also in a loop."""
-    with Replay([], VirtualClock(), info=INFO, loop=True) as replay:
-        replay.seek(1.0)
-        assert list(replay) == []

@@ -6,12 +6,10 @@ import os
 import threading
 from pathlib import Path
 
-import h5py
 import pytest
 
 from storage.atomic import whole_file, write_whole
 from storage.errors import RunExists, WriteFailed
-from storage.hdf5 import whole_h5
 
 
 def beaten_to(path: Path) -> None:
@@ -19,29 +17,6 @@ def beaten_to(path: Path) -> None:
     with whole_file(path, overwrite=False) as temporary:
         temporary.write_text("mine")
         path.write_text("another's")
-
-
-@pytest.mark.parametrize(("data", "stored"), [(b"\x00\r\n", b"\x00\r\n"), ("Träger\n", "Träger\n".encode())])
-def test_content_is_written_exactly(tmp_path: Path, data: bytes | str, stored: bytes) -> None:
-    """Bytes stay as they are, text becomes UTF-8 with its own line ends."""
-    path = write_whole(tmp_path / "results.json", data)
-    assert path.read_bytes() == stored
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_standing_file_is_replaced_by_default(tmp_path: Path) -> None:
-    """Results may be made again."""
-    path = write_whole(tmp_path / "a", "old")
-    assert write_whole(path, "new").read_text() == "new"
-
-
-def test_a_standing_file_is_kept_when_asked(tmp_path: Path) -> None:
-    """Without leave to overwrite the old content stands, and the error names the file in one line."""
-    path = write_whole(tmp_path / "a", "old")
-    with pytest.raises(RunExists, match=r"a: already exists; ") as caught:
-        write_whole(path, "new", overwrite=False)
-    assert "\n" not in str(caught.value)
-    assert path.read_text() == "old"
 
 
 def test_a_file_that_comes_meanwhile_is_kept(tmp_path: Path) -> None:
@@ -128,39 +103,6 @@ def test_a_failing_sync_fails_the_write(tmp_path: Path, monkeypatch: pytest.Monk
         write_whole(path, "new")
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_hdf5_is_written_whole_too(tmp_path: Path) -> None:
-    """The HDF5 file comes into being complete, or not at all."""
-    path = tmp_path / "analysis.h5"
-    with whole_h5(path, overwrite=True) as file:
-        file["a"] = 1
-        assert not path.exists()
-    with h5py.File(path) as file:
-        assert file["a"][()] == 1
-    before = path.read_bytes()
-
-    def half() -> None:
-        with whole_h5(path, overwrite=True) as file:
-            file["b"] = 1
-            raise RuntimeError("in the middle")
-
-    with pytest.raises(RuntimeError, match="in the middle"):
-        half()
-    assert path.read_bytes() == before
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_name_of_the_longest_length_is_no_obstacle(tmp_path: Path) -> None:
-    """The temporary name stays within what file systems allow."""
-    assert write_whole(tmp_path / ("a" * 255), "x").read_text() == "x"
-
-
-@pytest.mark.skipif(os.name == "nt", reason="permissions are POSIX")
-def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
-    """Others may read what the umask lets them, not only the owner."""
-    (tmp_path / "usual").write_text("x")
-    assert write_whole(tmp_path / "a", "x").stat().st_mode == (tmp_path / "usual").stat().st_mode
 
 
 def test_what_a_killed_writer_left_is_written_over(tmp_path: Path) -> None:

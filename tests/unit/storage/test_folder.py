@@ -67,14 +67,6 @@ def test_what_others_put_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert held(folder.resolve()) == {"page": "2", "table": "2"} | ({} if inside else {"notes.txt": "mine"})
 
 
-def test_the_longest_name_is_a_name(tmp_path: Path) -> None:
-    """What is built beside it has a shorter one."""
-    folder = tmp_path / ("b" * 255)
-    make(folder, "1")
-    make(folder, "2")
-    assert held(folder) == {"page": "2", "table": "2"}
-
-
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     """A file stands where a folder above should be."""
     (tmp_path / "file").write_text("")

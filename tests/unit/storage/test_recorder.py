@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import errno
-import shutil
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from acquisition.clock import VirtualClock
 from acquisition.live.reader import Sink
-from storage.disk import check_disk
-from storage.errors import DiskNearlyFull, RunExists, WriteFailed
+from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
-from storage.wire_log.log_file import LogFile, open_log_file
+from storage.wire_log.log_file import LogFile
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.wire import json_of, parse_log
@@ -71,20 +68,10 @@ class Disk:
             assert gate.wait(WAIT_S)
 
 
-def recorder(
-    disk: Disk,
-    *,
-    sync_every_s: float = HOUR_S,
-    queue_bytes: int = 1 << 20,
-) -> Recorder:
+def recorder(disk: Disk, *, sync_every_s: float = HOUR_S, queue_bytes: int = 1 << 20) -> Recorder:
     """Return a recorder to a file in memory."""
     return Recorder(
-        "run.wire",
-        HEADER,
-        VirtualClock(7),
-        sync_every_s=sync_every_s,
-        queue_bytes=queue_bytes,
-        open_file=disk,
+        "run.wire", HEADER, VirtualClock(7), sync_every_s=sync_every_s, queue_bytes=queue_bytes, open_file=disk
     )
 
 
@@ -119,48 +106,6 @@ def test_a_recording_is_never_written_over(tmp_path: Path) -> None:
     assert set(threading.enumerate()) <= before
 
 
-def test_putting_never_waits_for_the_disk() -> None:
-    """While a write hangs, everything goes into the queue; it is written when the disk comes back."""
-    disk = Disk()
-    recording = recorder(disk)
-    disk.writes_pass.clear()
-    recording.put(0, 0, b"first")
-    assert disk.held.wait(WAIT_S)
-    for number in range(100):
-        recording.put(0, number, b"x")
-    assert (recording.status.queued_records, recording.status.records) == (100, 1)
-    disk.writes_pass.set()
-    status = recording.drain()
-    assert (status.queued_records, status.records, status.dropped_records) == (0, 102, 0)
-    recording.close()
-    assert disk.threads["write"] == {"MainThread", "springmass-log"}  # the header and the end; all else
-
-
-def test_what_waits_is_appended_with_one_write() -> None:
-    """Records that came while a write hung go to the disk together, and a mark among them keeps its place."""
-    disk = Disk()
-    recording = recorder(disk)
-    disk.writes_pass.clear()
-    recording.put(0, 0, b"first")
-    assert disk.held.wait(WAIT_S)
-    writes = 0
-
-    def count() -> None:
-        nonlocal writes
-        writes += 1
-
-    disk.takes = count
-    recording.reads([(0, number, b"x") for number in range(10)])
-    recording.mark("let go")
-    recording.put(0, 10, b"last")
-    disk.writes_pass.set()
-    recording.drain()
-    assert writes == 2  # the one that hung, and all that waited
-    recording.close()
-    kinds = [record.kind for record in parse_log(bytes(disk.data))]
-    assert kinds == [Kind.HEADER, *[Kind.DATA] * 11, Kind.MARK, Kind.DATA, Kind.END]
-
-
 def test_a_slow_sync_holds_up_no_write() -> None:
     """Records are appended while fdatasync hangs, so a kill in that time loses none of them."""
     disk = Disk()
@@ -177,28 +122,6 @@ def test_a_slow_sync_holds_up_no_write() -> None:
     assert recording.status.synced_records == recording.status.records == 103
     assert "springmass-sync" in disk.threads["sync"]
     assert "springmass-log" not in disk.threads["sync"]
-
-
-def test_syncs_come_by_themselves() -> None:
-    """Nobody asks: the records are on the disk after the interval."""
-    disk = Disk()
-    recording = recorder(disk, sync_every_s=1e-3)
-    recording.drain()
-    disk.syncs_pass.clear()
-    recording.put(0, 0, b"x")
-    assert disk.held.wait(WAIT_S)  # the syncer has come
-    disk.syncs_pass.set()
-    recording.close()
-
-
-def test_closing_does_not_wait_for_the_next_sync() -> None:
-    """The interval is an hour, but the test ends immediately."""
-    recording = recorder(Disk())
-    recording.put(0, 0, b"x")
-    assert recording.drain(sync=True).synced_records == 2
-    recording.close()
-    recording.close()
-    assert (recording.status.closed, recording.status.error) == (True, "")
 
 
 def test_an_overflow_is_told_where_it_happened() -> None:
@@ -253,17 +176,6 @@ def test_events_and_marks_outlast_an_overflow() -> None:
     assert recorded + overflow["facts"]["records"] == 19 == recorded + recording.status.dropped_records
 
 
-def test_a_read_that_is_larger_than_the_queue_is_an_overflow_at_once() -> None:
-    """Nothing else need come: its event is in the log when the queue has been drained."""
-    disk = Disk()
-    recording = recorder(disk, queue_bytes=100)
-    recording.put(1, 5, bytes(200))
-    assert recording.drain().dropped_bytes == 200
-    *_, last = list(parse_log(bytes(disk.data)))
-    assert (last.channel, json_of(last)["facts"]) == (1, {"records": 1, "bytes": 200, "first_ns": 5})
-    recording.close()
-
-
 def test_reads_that_a_hanging_disk_has_not_taken_are_counted() -> None:
     """The count has the write that hangs and those that wait, but no marks; the user sees it when leaving."""
     disk = Disk()
@@ -288,26 +200,6 @@ def test_a_read_longer_than_a_record_is_divided() -> None:
     records = [record for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA]
     assert b"".join(record.payload for record in records) == long
     assert {(record.channel, record.mono_ns) for record in records} == {(1, 5)}
-
-
-def test_a_full_disk_stops_the_recording_and_says_so() -> None:
-    """The status shows the error immediately, further puts do no harm, closing raises it, and the log is whole."""
-    disk = Disk()
-    recording = recorder(disk)
-    disk.room = len(disk.data) + 1000
-    for number in range(200):
-        recording.put(0, number, b"R%04d\r" % number)
-    status = recording.drain()
-    assert "run.wire: the wire log could not be continued (No space left on device)" in status.error
-    recording.put(0, 200, b"late")
-    before = recording.status
-    assert (before.queued_records, before.records + before.dropped_records) == (0, 1 + 200 + 1)
-    with pytest.raises(WriteFailed, match=r"No space left on device\); .*30 rec"):
-        recording.close()
-    recording.close()
-    contents = parse_log(bytes(disk.data))
-    assert [r.payload for r in contents if r.kind is Kind.DATA] == [b"R%04d\r" % n for n in range(29)]
-    assert recording.status.synced_records == recording.status.records == 30
 
 
 def test_what_a_full_disk_took_is_synced_at_once() -> None:
@@ -362,35 +254,3 @@ def test_putting_after_the_end_is_counted() -> None:
     recording.close()
     recording.put(0, 0, b"late")
     assert (recording.status.dropped_records, recording.status.dropped_bytes) == (1, 4)
-
-
-def test_many_threads_may_put(tmp_path: Path) -> None:
-    """A thread per port where the system needs one: every record of each is there, in its order."""
-    recording = Recorder(tmp_path / "run.wire", HEADER, VirtualClock(), open_file=open_log_file)
-
-    def feed(channel: int) -> None:
-        for number in range(300):
-            recording.put(channel, number, b"%d" % number)
-
-    threads = [threading.Thread(target=feed, args=(channel,)) for channel in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    recording.close()
-    records = [record for record in read_log(tmp_path / "run.wire") if record.kind is Kind.DATA]
-    for channel in range(8):
-        mine = [int(record.payload) for record in records if record.channel == channel]
-        assert mine == list(range(300))
-
-
-def test_room_is_looked_at_before_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Too little, or no folder, is one line."""
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=5_000_000))
-    check_disk(tmp_path / "run.wire", 5_000_000)
-    with pytest.raises(DiskNearlyFull, match=r"run\.wire: .* 5\.1 MB, .* 5\.0 MB are free; "):
-        check_disk(tmp_path / "run.wire", 5_100_000)
-    monkeypatch.undo()
-    check_disk(tmp_path / "run.wire", 1)
-    with pytest.raises(WriteFailed, match=r"\(No such file or directory\); make the folder first"):
-        check_disk(tmp_path / "none" / "run.wire", 1)

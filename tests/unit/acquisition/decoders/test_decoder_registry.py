@@ -64,27 +64,6 @@ def test_an_option_without_sense_is_refused_in_one_line(options: dict[str, objec
 
 
 @pytest.mark.parametrize(
-    ("options", "line", "distance"),
-    [
-        ({}, b"12.5", 0.125),
-        ({}, b"12.5cm", 0.125),
-        ({}, b"+1.25e1", 0.125),
-        ({"column": 1}, b"512, 12.5", 0.125),
-        ({"column": "Distance"}, b"Distance: 12.5 cm", 0.125),
-        ({"column": "d", "unit": "m"}, b"dd=1 d=0.125", 0.125),
-        ({"unit": "in"}, b"10", 0.254),
-        ({}, b"0", math.nan),
-        ({}, b"99999", math.nan),
-    ],
-    ids=str,
-)
-def test_text_lines_of_many_sketches_are_read(options: dict[str, object], line: bytes, distance: float) -> None:
-    """Numbers as sketches print them; no target is missing."""
-    readings = get_family("text-lines").decoder(**options).feed(0, b"begun before\n" + line + b"\r\n")
-    np.testing.assert_allclose(readings.distance_m, [distance], rtol=1e-12)
-
-
-@pytest.mark.parametrize(
     ("options", "line"),
     [
         ({}, b"nan"),

@@ -122,15 +122,6 @@ def test_a_device_that_starts_again_is_joined_by_the_host_clock(column: str, sil
     np.testing.assert_allclose(np.diff(t[10:]), 0.01, atol=1e-12)
 
 
-def test_a_host_that_slept_moves_no_reading() -> None:
-    """Readings that waited in the port for six seconds keep the device's time."""
-    host = np.arange(20) * SECOND_NS // 100
-    host[10:] += 6 * SECOND_NS
-    t, flags, base = pushed(readings(device_us=np.arange(20) * STEP_US, host_ns=host))
-    np.testing.assert_allclose(t, np.arange(20) / RATE_HZ, atol=1e-12)
-    assert (base.restarts, flags.any()) == (0, False)
-
-
 STEPS = st.lists(
     st.one_of(
         st.just(STEP_US),
@@ -164,14 +155,6 @@ def test_a_rate_is_of_a_range(rate_hz: Any) -> None:
     """Any other rate, or what is no number, is refused with the range and its value."""
     with pytest.raises(SensorError, match=r"rate_hz of a sensor must be a number from 1e-06 to 1e\+09, got"):
         Timebase(rate_hz)
-
-
-def test_a_silence_that_loses_readings_is_a_gap_and_flags_nothing_behind_it() -> None:
-    """Where the readings behind a silence come in their time, their stamps are theirs."""
-    host = 7 * SECOND_NS + np.arange(40) * SECOND_NS // 100
-    host[10:] += 5 * SECOND_NS
-    _, flags, _ = pushed(readings(host_ns=host))
-    assert np.flatnonzero(flags).tolist() == [10]
 
 
 def test_a_stall_that_lost_a_few_readings_is_no_restart() -> None:

@@ -54,10 +54,7 @@ HEADINGS: dict[str, tuple[str, str, float, Said]] = {
         "X,CH1,Start,Increment,\nSequence,Volt,0.000000e+00,5.000000e-02\n" + rows("{i},{x:.4e},"),
         *("CH1", V, {}),
     ),
-    "Rigol, t0": (
-        "Time(s),CH1(V),t0 = 0.0e+00, tInc = 5.000000e-02\n" + rows("{t:.4e},{x:.4e},,"),
-        *("CH1", V, {}),
-    ),
+    "Rigol, t0": ("Time(s),CH1(V),t0 = 0.0e+00, tInc = 5.000000e-02\n" + rows("{t:.4e},{x:.4e},,"), *("CH1", V, {})),
     "Siglent": (
         "Record Length,Analog:60\nSample Interval,Analog:0.05\nVertical Units,CH1:V\nModel Number,SDS1104X-E\n"
         "Source,CH1\nSecond,Volt\n" + rows("{t:.8f},{x:.5f}"),

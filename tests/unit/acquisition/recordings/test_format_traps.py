@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import io
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition.recordings.identify import get_format, open_recording
+from acquisition.recordings.identify import get_format
 from acquisition.recordings.recording import Recording
 
 HEAD = ["LabVIEW Measurement", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tOne"]
@@ -30,16 +29,6 @@ def lvm(*lines: str, mark: str = "\t", encoding: str = "utf-8", **options: str) 
 def codes(recording: Recording) -> set[str]:
     """Return what was seen."""
     return {trap.code for trap in recording.traps}
-
-
-def test_lvm_of_several_headers_is_several_runs() -> None:
-    """Multi_Headings Yes: each further header begins a separate segment, which is chosen by name."""
-    first = segment("X_Value\tPosition", "Delta_X\t0.01", "X0\t0")
-    second = segment("X_Value\tPosition", "Delta_X\t0.02", "X0\t5")
-    lines = [*HEAD, "Multi_Headings\tYes", END, *first, "0.00\t1.5", "0.01\t1.6", *second, "5.00\t2.5", "5.02\t2.6"]
-    a, b = (lvm(*lines, run=f"Segment {i}") for i in (1, 2))
-    assert (a.samples.distance.tolist(), a.info.rate_hz) == ([1.5, 1.6], 100)
-    assert (b.samples.distance.tolist(), b.info.rate_hz, b.samples.t.tolist()) == ([2.5, 2.6], 50, [5.0, 5.02])
 
 
 @pytest.mark.parametrize(("declared", "present"), [(8192, 16384), (1_050_000, 3941)])
@@ -120,17 +109,3 @@ def test_capstone_decides_decimal_mark_and_exponent_cell_by_cell() -> None:
     data = f'\ufeff"Time (s) Run #1";"Position (m) Run #1"\r\n{rows}'.encode()
     recording = get_format("capstone").read("run.csv", data)
     assert recording.samples.distance.tolist() == [0.10, -8.90e-4, 0.12, 0.13, 0.14]
-
-
-@pytest.mark.parametrize(
-    ("headings", "unit"),
-    [("Tempo (s)\tPosizione (mm)", "mm"), ("Zeit (s)\tAbstand (cm)", "cm"), ("时间 (秒)\t位置 (厘米)", "cm")],
-)
-def test_headings_may_be_italian_german_or_chinese(tmp_path: Path, headings: str, unit: str) -> None:
-    """Time and unit are known in the user's language."""
-    data = f"{headings}\n0.00\t12.5\n0.01\t12.6\n0.02\t12.7\n".encode()
-    per_metre = {"mm": 1000, "cm": 100}[unit]
-    path = tmp_path / "run.txt"
-    path.write_bytes(data)
-    distance = open_recording(path).samples.distance
-    assert distance.tolist() == [x / per_metre for x in (12.5, 12.6, 12.7)]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
-from acquisition.errors import FormatError, NeedsAnswer, UnknownFormat
+from acquisition.errors import UnknownFormat
 from acquisition.recordings.identify import open_recording, sniff
 
 ROWS = "".join(f"{i / 100:.3f}\t{20 + i / 8:.3f}\t0.239\r\n" for i in range(12))
@@ -49,6 +48,7 @@ def test_what_is_not_read_is_named_with_what_to_do(tmp_path: Path, head: bytes, 
     assert title in caught.value.problem
     assert caught.value.remedy
     assert "\n" not in str(caught.value)
+<<<<<<< HEAD
 
 
 @pytest.mark.parametrize("text", ["0.1 0.2\n0.2 0.3\n0.3 0.4\n", "0,1\t2,5\n0,2\t2,7\n0,3\t2,9\n"])
@@ -91,3 +91,5 @@ def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(FormatError, match="pipe"):
         open_recording(tmp_path / "pipe")
+=======
+>>>>>>> dietA

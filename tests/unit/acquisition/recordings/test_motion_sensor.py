@@ -62,57 +62,12 @@ def test_header_variants(header: list[str], newline: str) -> None:
     assert FORMAT.recognises(newline.join([*header, *position_rows()]).encode())
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252"])
-def test_encodings(encoding: str) -> None:
-    """Byte order marks, UTF-16 without one and 8-bit titles are read alike."""
-    title = "Motion Sensor Data File 20 °C"
-    recording = FORMAT.read("run.txt", "\r\n".join([title, POSITION, *position_rows()]).encode(encoding))
-    check_position(recording)
-    assert recording.title == title
-
-
-def test_decimal_commas() -> None:
-    """A comma is a decimal mark, in all cells or in some."""
-    rows = [row.replace(".", ",") for row in position_rows()]
-    check_position(read(TITLE, POSITION, *rows))
-    check_position(read(TITLE, POSITION, *position_rows()[:5], *rows[5:]))
-
-
-@pytest.mark.parametrize("rate", [60.0, 100.0, 125.0])
-@pytest.mark.parametrize("start", [0, 504])
-def test_times_are_put_back_on_their_grid(rate: float, start: int) -> None:
-    """The rate is inferred, the rounding of times undone, and a cropped start kept."""
-    recording = read(TITLE, POSITION, *position_rows(rate=rate, start=start))
-    assert recording.info.rate_hz == rate
-    assert recording.info.clock == "nominal"
-    assert recording.samples.t.tolist() == [(start + i) / rate for i in range(12)]
-
-
 def test_a_single_time_that_shoots_ahead_is_the_wrong_one() -> None:
     """One damaged digit must not condemn all that follows it."""
     rows = position_rows()
     rows[3] = "9.030\t20.375\t0.239"
     flags = read(TITLE, POSITION, *rows).samples.flags
     assert np.flatnonzero(flags & Flag.NON_MONOTONIC_TIME.value).tolist() == [3]
-
-
-@pytest.mark.parametrize(
-    ("data", "line"),
-    [
-        (TITLE, 1),
-        (f"{TITLE}\n{POSITION}\n", 3),
-        (f"{POSITION}\n0.000\t20.000\t0.239", None),
-        (f"{POSITION}\n0.000\tNaN\t0.239\n0.010\tNaN\t0.239\n", 2),
-        (f"{POSITION}\n0.000\t20.000\n0.010\t20.000\n", 2),
-        (f"{POSITION}\nhello\nworld\n", 2),
-    ],
-)
-def test_files_without_a_run_are_refused(data: str, line: int | None) -> None:
-    """Header only, one row, all NaN: one clear line each, with the line of the file where there is one."""
-    with pytest.raises(FormatError) as caught:
-        FORMAT.read("run.txt", data.encode())
-    assert caught.value.line == line
-    assert "\n" not in str(caught.value)
 
 
 def test_two_columns_that_nothing_names_are_any_table() -> None:

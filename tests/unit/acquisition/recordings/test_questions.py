@@ -67,39 +67,3 @@ def test_all_examples_together_answer_a_question(tmp_path: Path, name: str) -> N
         open_recording(path)
     answers: dict[str, Any] = caught.value.question.examples
     assert len(open_recording(path, **answers).samples) == 60
-
-
-def test_a_question_lists_what_the_file_holds(tmp_path: Path) -> None:
-    """Columns, times, channels, units and the column of times that would do in place of a rate are there as data."""
-    path = tmp_path / "run.txt"
-    path.write_text(FILES["units"], encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as caught:
-        open_recording(path)
-    question = caught.value.question
-    channel, unit = question.needs
-    assert (question.path, question.columns) == (str(path), ("x", "y", "z"))
-    assert (channel.what, channel.choices, channel.example) == (Missing.CHANNEL, ("x", "y", "z"), "x")
-    assert (unit.what, unit.of, unit.example) == (Missing.UNIT, "x", "m")
-    assert {"m", "rad", "V", "1"} < set(unit.choices)
-    path.write_text(FILES["no times"], encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as caught:
-        open_recording(path, channel="x", unit="m")
-    (rate,) = caught.value.question.needs
-    assert rate.what is Missing.RATE_HZ
-    assert rate.instead is not None
-    assert (rate.instead.what, rate.instead.choices) == (Missing.TIME, ("y", "z", "a"))
-
-
-def test_an_answer_that_fits_nothing_is_asked_again(tmp_path: Path) -> None:
-    """A channel, a run and a column of times that are not there list those that are."""
-    path = tmp_path / "run.txt"
-    path.write_text(FILES["units"], encoding="utf-8")
-    for what, given in ((Missing.CHANNEL, {"channel": "w"}), (Missing.TIME, {"channel": "x", "time": "w"})):
-        with pytest.raises(NeedsAnswer) as caught:
-            open_recording(path, **given)
-        assert caught.value.question.missing == (what,)
-        assert "y" in caught.value.question.needs[0].choices
-    path.write_text(FILES["runs"], encoding="utf-8")
-    with pytest.raises(NeedsAnswer) as caught:
-        open_recording(path, run="7")
-    assert caught.value.question.needs[0].choices == ("Run #1", "Run #2")

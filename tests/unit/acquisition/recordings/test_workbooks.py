@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import sys
 
 import numpy as np
@@ -14,7 +13,6 @@ from acquisition.recordings.questions import Missing
 from tests.conformance.test_formats import cells, packed, workbook
 
 WORKBOOK, ZIP = get_format("workbook"), get_format("zip")
-OLE = bytes.fromhex("d0cf11e0a1b11ae1")
 
 
 def rows(*columns: list[str]) -> str:
@@ -65,15 +63,6 @@ def test_what_unpacks_to_more_than_it_may_is_refused() -> None:
         ZIP.read("run.zip", bomb)
 
 
-def test_an_encrypted_archive_is_refused_in_one_line() -> None:
-    """The bit that says so is set in both headers."""
-    data = bytearray(packed({"run.csv": b"t (s),y (m)\n0,1\n1,2\n2,3\n"}))
-    data[6] |= 1
-    data[data.index(b"PK\x01\x02") + 8] |= 1
-    with pytest.raises(FormatError, match="encrypted"):
-        ZIP.read("run.zip", bytes(data))
-
-
 def test_an_archive_of_several_runs_asks_which() -> None:
     """Pictures are passed over and named; each file is read as what it is."""
     csv, picture = b"Time (s),Position (m)\n0.0,0.1\n0.1,0.2\n0.2,0.4\n0.3,0.1\n", b"\x89PNG" + bytes(99)
@@ -85,91 +74,9 @@ def test_an_archive_of_several_runs_asks_which() -> None:
     assert recording.samples.distance.tolist() == [0.1, 0.2, 0.4, 0.1]
 
 
-def record(kind: int, *parts: bytes) -> bytes:
-    """Return a record of BIFF."""
-    content = b"".join(parts)
-    return struct.pack("<HH", kind, len(content)) + content
-
-
-def number(row: int, column: int, value: float) -> bytes:
-    """Return the record of a cell."""
-    return record(0x203, struct.pack("<HHHd", row, column, 0, value))
-
-
-END, BOOK, SHEET = (
-    record(0x0A),
-    record(0x809, struct.pack("<HH12x", 0x600, 5)),
-    record(0x809, struct.pack("<HH12x", 0x600, 16)),
-)
-SAMPLES = b"".join(number(i, 0, 0.1 * i) + number(i, 1, 0.2 + 0.01 * (i % 7)) for i in range(40))
-
-
-def container(stream: bytes) -> bytes:
-    """Return an OLE file (MS-CFB, sectors of 4096 bytes) with one stream, ``Workbook``."""
-    filled = max(-(-len(stream) // 4096), 1)
-    tables = 1
-    while tables * 1024 < filled + 1 + tables:
-        tables += 1
-    free, end, table = 0xFFFFFFFF, 0xFFFFFFFE, 0xFFFFFFFD
-    chain = np.full(tables * 1024, free, "<u4")
-    chain[: filled - 1] = np.arange(1, filled)
-    chain[[filled - 1, filled]] = end
-    chain[filled + 1 : filled + 1 + tables] = table
-    header = OLE + bytes(16) + struct.pack("<5H6x", 0x3E, 3, 0xFFFE, 12, 6)
-    header += struct.pack("<9I", 0, tables, filled, 0, 4096, end, 0, end, 0)
-    header += np.arange(filled + 1, filled + 1 + tables, dtype="<u4").tobytes().ljust(436, b"\xff")
-
-    def entry(name: str, kind: int, start: int, length: int, below: int) -> bytes:
-        text = name.encode("utf-16-le")
-        return (
-            text.ljust(64, b"\0")
-            + struct.pack("<HBB3I", len(text) + 2, kind, 1, free, free, below)
-            + bytes(36)
-            + struct.pack("<IQ", start, length)
-        )
-
-    directory = entry("Root Entry", 5, end, 0, 1) + entry("Workbook", 2, 0, filled * 4096, free)
-    sectors = (header, stream.ljust(filled * 4096, b"\0"), directory.ljust(4096, b"\0"), chain.tobytes())
-    return sectors[0].ljust(4096, b"\0") + b"".join(sectors[1:])
-
-
-def xls(content: bytes, *, book: bytes = b"", sheets: int = 1) -> bytes:
-    """Return an xls whose sheets are all at one place."""
-    names = [record(0x85, struct.pack("<IBBBB", 0, 0, 0, 1, 0), bytes([65 + i % 26])) for i in range(sheets)]
-    at = len(BOOK + book + b"".join(names) + END)
-    names = [each[:4] + struct.pack("<I", at) + each[8:] for each in names]
-    return container(BOOK + book + b"".join(names) + END + SHEET + content + END)
-
-
-def test_an_xls_is_read_with_every_kind_of_value() -> None:
-    """Numbers, packed numbers, formulas and shared words, also of one that goes on in the next record."""
-    words = struct.pack("<II", 2, 2) + struct.pack("<HB", 5, 0) + b"t (s)" + struct.pack("<HB", 5, 0) + b"x ("
-    strings = record(0xFC, words) + record(0x3C, b"\x00m)")
-    heading = b"".join(record(0xFD, struct.pack("<HHHI", 0, column, 0, column)) for column in (0, 1))
-    times = b"".join(number(i + 1, 0, 0.1 * i) for i in range(20))
-    packed = b"".join(record(0x27E, struct.pack("<HHHi", i + 1, 1, 0, (100 + i) << 2 | 3)) for i in range(10))
-    formulas = b"".join(
-        record(0x06, struct.pack("<HHHdHI", i + 1, 1, 0, 0.5 * i, 0, 0), b"\x03\x00\x1e\x01\x00") for i in range(10, 20)
-    )
-    recording = WORKBOOK.read("run.xls", xls(heading + times + packed + formulas, book=strings))
-    assert (recording.channel, recording.info.rate_hz, recording.samples.unit) == ("x", 10.0, "m")
-    np.testing.assert_allclose(recording.samples.distance, [*(1.0 + 0.01 * np.arange(10)), *(0.5 * np.arange(10, 20))])
-
-
-HOSTILE = {
-    "a cell in the last row and column": xls(SAMPLES + number(65535, 65535, 1.0)),
-    "a cell in the last row and column of an xlsx": workbook(
-        {"A": cells("t (s)") + '<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>'}
-    ),
-}
-limited = pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="no limit of memory there")
-
-
-@limited
-@pytest.mark.parametrize("name", HOSTILE)
-def test_a_workbook_that_needs_too_much_memory_is_refused_in_one_line(name: str) -> None:
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="no limit of memory there")
+def test_a_workbook_that_needs_too_much_memory_is_refused_in_one_line() -> None:
     """The child process ends at its limit of memory, and this one goes on."""
-    with pytest.raises(FormatError) as caught:
-        WORKBOOK.read("run.xls", HOSTILE[name])
-    assert str(caught.value).startswith("run.xls: ")
-    assert "\n" not in str(caught.value)
+    data = workbook({"A": cells("t (s)") + '<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>'})
+    with pytest.raises(FormatError, match=r"^run\.xlsx: [^\n]*$"):
+        WORKBOOK.read("run.xlsx", data)

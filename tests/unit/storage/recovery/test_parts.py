@@ -136,14 +136,6 @@ def test_a_sensor_that_was_away_at_the_start_is_not_lost(tmp_path: Path) -> None
         assert (run.losses.gone_s is not None) == (name == "late")
 
 
-def test_a_short_recording_has_its_run_file(tmp_path: Path) -> None:
-    """However short the only part is."""
-    log = tmp_path / "run.wire"
-    with recording(log) as recorder:
-        send(recorder, 0, 1.0, 2.0)
-    assert [run.samples for run in recover(log).runs] == [200]
-
-
 def test_a_part_whose_beginning_is_damaged_is_found(tmp_path: Path) -> None:
     """If both events that open its channel are lost, its data are those of the only sensor."""
     log = tmp_path / "run.wire"

@@ -47,11 +47,7 @@ def wire(count: int, seed: int = 0) -> list[tuple[int, bytes]]:
     for n in range(count):
         distance = 0.3 + 0.05 * math.sin(0.14 * n)
         held += encoder.encode(
-            sequence=n,
-            device_us=10_000 * n,
-            echo_us=2e6 * distance / 344,
-            distance_m=distance,
-            temperature_c=math.nan,
+            sequence=n, device_us=10_000 * n, echo_us=2e6 * distance / 344, distance_m=distance, temperature_c=math.nan
         )
         keep = int(rng.integers(0, 20))
         reads.append((START_NS + 2_000_000_000 + 10_000_000 * n, held[: len(held) - keep]))
@@ -107,18 +103,6 @@ def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
     assert reported["clock_map"]["t0_mono_ns"] == pytest.approx(START_NS + 2_000_000_000, abs=1_000_000)
     began = datetime.fromisoformat(reported["start_time"]) - datetime(2020, 9, 13, 12, 26, 42, tzinfo=UTC)
     assert abs(began.total_seconds()) < 2e-3
-
-
-def test_several_sensors_make_several_files(tmp_path: Path) -> None:
-    """Each channel has a separate run file, each with the whole log inside."""
-    sensors = (SensorEntry(0, FAMILY, "A"), SensorEntry(5, FAMILY, "B"))
-    log = write(tmp_path / "run.wire", LogHeader(sensors=sensors, mono_ns=0, unix_ns=0))
-    report = recover(log, tmp_path / "out.h5")
-    assert [run.path.name for run in report.runs] == ["out.0.h5", "out.5.h5"]
-    for run, name in zip(report.runs, "AB", strict=True):
-        with open_run(run.path) as opened:
-            assert (len(opened), opened.info.name) == (200, name)
-            assert opened.originals()[0].data == log.read_bytes()
 
 
 def test_a_torn_log_gives_what_it_holds_and_says_so(tmp_path: Path) -> None:
@@ -187,16 +171,6 @@ def test_a_run_without_samples_is_a_run(tmp_path: Path) -> None:
         run.verify()
         assert len(run) == 0
         assert run.provenance["start_time"] == "2020-09-13T12:26:40.000000+00:00"
-
-
-def test_nothing_is_written_over_unasked(tmp_path: Path) -> None:
-    """A run file stands, unless its overwriting is asked for."""
-    log = write(tmp_path / "run.wire", count=10)
-    (tmp_path / "run.h5").write_bytes(b"old")
-    with pytest.raises(RunExists, match=r"run\.h5: already exists"):
-        recover(log)
-    assert (tmp_path / "run.h5").read_bytes() == b"old"
-    assert recover(log, overwrite=True).runs[0].samples == 10
 
 
 def test_the_log_goes_only_when_the_run_file_verifies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -269,16 +243,6 @@ def test_what_is_no_log_is_refused_in_one_line(data: bytes, tmp_path: Path) -> N
     with pytest.raises(NotALog, match=rf"any\.wire: expected a wire log, got {len(data)} bytes without a record"):
         recover(path)
     assert not (tmp_path / "any.h5").exists()
-
-
-def test_bytes_of_an_unnamed_channel_stay_in_the_log(tmp_path: Path) -> None:
-    """A channel that the header does not name is passed over, not mixed into another's."""
-    header = LogHeader(sensors=(SensorEntry(3, FAMILY),), mono_ns=0, unix_ns=0)
-    with Recorder(tmp_path / "run.wire", header, VirtualClock()) as recorder:
-        for host_ns, data in wire(20):
-            recorder.put(4, host_ns, data[::-1])
-            recorder.put(3, host_ns, data)
-    assert [run.samples for run in recover(tmp_path / "run.wire").runs] == [20]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="this system has no such locks")

@@ -8,16 +8,11 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import pytest
-import xarray as xr
 
 from acquisition.block import UNITS, Block
 from acquisition.source import SourceInfo
-from springmass.runs.loading import load
-from storage.errors import WriteFailed
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
-from tests.sampling import sampled
 
 INFO = SourceInfo("replay", "pivot", 100.0, sigma_m=1e-3)
 
@@ -27,21 +22,6 @@ def block(quantity: str = "angle", *, first: int = 0) -> Block:
     t = (first + np.arange(100)) / 100
     y = 0.1 * np.cos(8.3 * t)
     return Block(first, t, y, np.zeros(100, np.uint8), None, np.gradient(y, t), quantity, UNITS[quantity])
-
-
-@pytest.mark.parametrize("quantity", sampled(UNITS))
-def test_a_run_gives_back_quantity_and_unit(tmp_path: Path, quantity: str) -> None:
-    """Whole, in blocks and as a track, and other tools see the unit on the arrays."""
-    path = write_run(tmp_path / "run.h5", [block(quantity), block(quantity, first=100)], INFO)
-    with open_run(path) as run:
-        run.verify()
-        result = [run.samples(), *run.blocks(64)]
-        assert {(each.quantity, each.unit) for each in result} == {(quantity, UNITS[quantity])}
-    with xr.open_dataset(path, group="entry/signal", engine="h5netcdf") as signal:
-        assert signal.distance.attrs["units"] == signal.distance_errors.attrs["units"] == UNITS[quantity]
-        assert signal.velocity.attrs["units"] == UNITS[quantity] + "/s"
-    track = load(path).track
-    assert (track.quantity, track.unit) == (quantity, UNITS[quantity])
 
 
 def test_a_file_from_before_holds_a_length(tmp_path: Path) -> None:
@@ -59,10 +39,3 @@ def test_a_file_from_before_holds_a_length(tmp_path: Path) -> None:
         run.verify()
         samples = run.samples()
         assert (samples.quantity, samples.unit, run.sha256) == ("length", "m", digest)
-
-
-def test_two_quantities_make_no_run(tmp_path: Path) -> None:
-    """Nothing is written, and the line says which came where."""
-    with pytest.raises(WriteFailed, match="angle, got voltage from sample 100"):
-        write_run(tmp_path / "run.h5", [block("angle"), block("voltage", first=100)], INFO)
-    assert list(tmp_path.iterdir()) == []

@@ -38,24 +38,6 @@ class Follower:
         return list(self.scan.records(self.log.grow()))
 
 
-def test_every_record_comes_once_as_soon_as_it_is_whole(tmp_path: Path) -> None:
-    """Also past the copy of the header."""
-    log = WireLogWriter(tmp_path / "run.wire", HEADER)
-    follower = Follower(tmp_path / "run.wire")
-    assert [record.kind for record in follower.records()] == [Kind.HEADER]
-    for number in range(1000):
-        append(log, Kind.DATA, b"R%04d\r" % number, mono_ns=number)
-        *_, record = follower.records()
-        assert record.payload == b"R%04d\r" % number
-    assert follower.records() == []
-    assert not follower.scan.damage.ended
-    append(log, Kind.END, b"{}", mono_ns=400)
-    assert [record.kind for record in follower.records()] == [Kind.END]
-    assert follower.scan.damage.ended
-    assert follower.scan.damage.intact
-    log.close()
-
-
 @pytest.mark.parametrize("seed", sampled(range(10), 3))
 def test_a_log_that_grows_gives_what_a_reader_finds_at_its_end(tmp_path: Path, seed: int) -> None:
     """Cut anywhere while it grows, damaged or not: the same records, the same losses before them, each once."""

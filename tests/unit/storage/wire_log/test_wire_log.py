@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from storage.errors import NotALog, RunExists, WriteFailed
+from storage.errors import WriteFailed
 from storage.schema import ValueRefused
-from storage.wire_log.appending import WireLogWriter, Written
+from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry, event_payload, frame
 from storage.wire_log.scanning import read_log
 from tests.wire import append, json_of, parse_log
@@ -99,15 +99,6 @@ def test_a_record_lies_in_the_file_as_documented() -> None:
     assert len(record) == HEAD_BYTES + 6 == 34
 
 
-def test_nothing_is_written_over(tmp_path: Path) -> None:
-    """A file of that name, whatever it is, stands."""
-    path = tmp_path / "run.wire"
-    path.write_bytes(b"last week")
-    with pytest.raises(RunExists, match=r"run\.wire: already exists"):
-        WireLogWriter(path, HEADER)
-    assert path.read_bytes() == b"last week"
-
-
 def test_a_log_that_cannot_be_made_says_why(tmp_path: Path) -> None:
     """A missing folder and a header that JSON cannot hold are one line each and leave nothing."""
     with pytest.raises(WriteFailed, match="could not be made"):
@@ -116,47 +107,6 @@ def test_a_log_that_cannot_be_made_says_why(tmp_path: Path) -> None:
     with pytest.raises(WriteFailed, match="header cannot be written"):
         WireLogWriter(tmp_path / "run.wire", odd)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_disk_full_at_the_first_record_leaves_no_log(tmp_path: Path) -> None:
-    """A log without its header would only stand in the way of the next attempt."""
-    path = tmp_path / "run.wire"
-    path.touch()  # as if the seam had made it
-    with pytest.raises(WriteFailed, match="No space left"):
-        WireLogWriter(path, HEADER, open_file=Disk(room=10))
-    assert not path.exists()
-
-
-@pytest.mark.parametrize("bite", [1, 3, 29])
-def test_short_writes_are_finished(bite: int) -> None:
-    """A disk that takes a few bytes at a time loses none."""
-    disk = Disk(bite=bite)
-    log = WireLogWriter("run.wire", HEADER, open_file=disk)
-    for number in range(20):
-        append(log, Kind.DATA, bytes([number] * number), mono_ns=number)
-    assert [record.payload for record in parse_log(bytes(disk.data))][1:] == [bytes([n] * n) for n in range(20)]
-    assert log.written == Written(21, len(disk.data))
-
-
-@pytest.mark.parametrize(("trouble", "words"), [(errno.ENOSPC, "No space left"), (0, "bytes were written")])
-def test_a_full_disk_keeps_what_was_written(trouble: int, words: str) -> None:
-    """The error names what is kept, every later append raises it again, and the log reads up to there."""
-    disk = Disk(room=1000, trouble=trouble)
-    log = WireLogWriter("run.wire", HEADER, open_file=disk)
-    while disk.room - len(disk.data) >= HEAD_BYTES + 6:
-        append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    with pytest.raises(WriteFailed, match=words) as caught:
-        append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    survivors = log.written.records
-    assert f"{survivors} records ({log.written.bytes} bytes) are kept" in str(caught.value)
-    disk.room = 1 << 30
-    with pytest.raises(WriteFailed, match=words):
-        append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    contents = parse_log(bytes(disk.data))
-    assert len(list(contents)) == survivors
-    assert contents.damage.tail_bytes == 1000 - log.written.bytes
-    log.sync()
-    assert log.synced.records == survivors
 
 
 def test_a_failed_sync_is_never_taken_back() -> None:
@@ -173,17 +123,6 @@ def test_a_failed_sync_is_never_taken_back() -> None:
     with pytest.raises(WriteFailed, match="could not be synced"):
         append(log, Kind.DATA, b"R0500\r", mono_ns=0)
     assert (log.synced.records, log.written.records) == (1, 2)
-
-
-def test_the_header_is_on_the_disk_before_the_first_byte_comes() -> None:
-    """The constructor syncs; later syncs say how far they reached."""
-    disk = Disk()
-    log = WireLogWriter("run.wire", HEADER, open_file=disk)
-    assert disk.syncs == [len(disk.data)]
-    append(log, Kind.DATA, b"abc", mono_ns=1)
-    assert log.synced.records == 1
-    log.sync()
-    assert log.synced == Written(2, len(disk.data))
 
 
 def test_the_header_survives_its_first_page() -> None:
@@ -220,61 +159,6 @@ def test_a_record_that_comes_twice_is_delivered_once() -> None:
     assert (contents.damage.strays, contents.damage.lost, contents.damage.intact) == (1, 0, False)
     last = [frame(Kind.DATA, b"", sequence=n, mono_ns=0, log=1) for n in (2**31 - 1, 2**32 - 2, 2**32 - 1, 2**32)]
     assert [record.sequence for record in parse_log(b"".join(last))] == [2**31 - 1, 2**32 - 2, 2**32 - 1, 0]
-
-
-@pytest.mark.parametrize("data", [b"", b"\xf5\xa9" * 5000, bytes(100_000), b"R0500\r" * 1000])
-def test_what_is_no_log_has_no_records(data: bytes, tmp_path: Path) -> None:
-    """Any file opens, and its bytes are all accounted for."""
-    path = tmp_path / "any"
-    path.write_bytes(data)
-    contents = read_log(path)
-    assert (list(contents), contents.header, contents.damage.tail_bytes) == ([], None, len(data))
-
-
-def test_no_file_is_one_line(tmp_path: Path) -> None:
-    """A missing log and a folder are refused."""
-    for path in (tmp_path / "none.wire", tmp_path):
-        with pytest.raises(NotALog, match=r"cannot be read \(.*\); "):
-            read_log(path)
-
-
-def test_a_long_log_is_read_to_its_end(tmp_path: Path) -> None:
-    """Megabytes of long records are all there, and damage across several costs no others."""
-    disk = Disk()
-    log = WireLogWriter("run.wire", HEADER, open_file=disk)
-    ends = []
-    while log.written.bytes < 3 << 20:
-        append(log, Kind.DATA, bytes(60_000 + log.written.records), mono_ns=log.written.records)
-        ends.append(log.written.bytes)
-    path = tmp_path / "run.wire"
-    path.write_bytes(disk.data)
-    assert len(list(read_log(path))) == log.written.records
-    border = 1 << 20
-    disk.data[border - 40_000 : border + 40_000] = b"\xf5" * 80_000
-    path.write_bytes(disk.data)
-    contents = read_log(path)
-    assert sum(1 for _ in contents) == log.written.records - contents.damage.lost
-    assert 2 <= contents.damage.lost <= 3
-    assert contents.damage.tail_bytes == 0
-
-
-@pytest.mark.parametrize(
-    ("sensors", "options", "named"),
-    [
-        ((SensorEntry(256, "line"),), {}, "channel"),
-        ((), {}, "sensors"),
-        ((SensorEntry(0, "line"),), {"kind": "real"}, "kind"),
-        ((SensorEntry(0, "line", rate_hz=1e10),), {}, "rate_hz"),
-    ],
-)
-def test_a_header_that_no_reader_would_take_is_not_written(
-    tmp_path: Path, sensors: tuple[SensorEntry, ...], options: dict[str, Any], named: str
-) -> None:
-    """The first value that is not allowed is named."""
-    header = LogHeader(sensors=sensors, mono_ns=0, unix_ns=0, **options)
-    with pytest.raises((ValueRefused, WriteFailed), match=named):
-        WireLogWriter(tmp_path / "run.wire", header)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_header_is_checked() -> None:

@@ -32,16 +32,6 @@ def test_marks_of_thousands_are_refused(tmp_path: Path, group: str, point: str, 
         open_recording(path, unit=None if "(" in heading else "mm")
 
 
-@pytest.mark.parametrize("form", ["{t:.2f};1,{x:03d}", "{n};{y:,}", "{n};1,{x:03d},567"])
-def test_what_may_be_thousands_is_refused(tmp_path: Path, form: str) -> None:
-    """A comma that may be decimal or set thousands apart is not guessed."""
-    path = tmp_path / "run.csv"
-    rows = (form.format(t=n / 50, n=n, x=700 + n, y=900 + n) for n in range(200))
-    path.write_text("\n".join(["t (s);x (mm)", *rows, ""]), encoding="utf-8")
-    with pytest.raises(FormatError):
-        open_recording(path)
-
-
 def test_thousands_in_quotes_are_refused_next_to_separating_commas(tmp_path: Path) -> None:
     """Excel writes 1328 mm as "1,328" between quotes: read as a decimal it would be a thousand times too small."""
     path = tmp_path / "run.csv"
