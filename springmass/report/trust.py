@@ -49,7 +49,7 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
                 reasons.append(Trust("do not quote", "the recording contradicts the stated law"))
             elif key.row:
                 reasons.append(Trust("uncertain", "no damping law fits"))
-        grade = max(reasons, key=lambda each: GRADES.index(each.grade), default=SOUND).grade
+        grade = max(reasons, key=lambda each: GRADES.index(each.grade), default=Trust("sound")).grade
         found[key.name] = Trust(grade, ", ".join(dict.fromkeys(each.why for each in reasons)))
     return found
 

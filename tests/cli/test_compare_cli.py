@@ -102,7 +102,6 @@ def test_an_unreadable_run_ends_the_comparison(capsys: pytest.CaptureFixture[str
     assert "nothing.txt" in capsys.readouterr().err
 
 
-<<<<<<< HEAD
 def five_masses(folder: Path, hooke: str) -> list[str]:
     """Write runs of five bobs on a spring of 14 N/m and 20 g, and a table; return the arguments that name them."""
     arguments: list[str] = []
@@ -156,7 +155,8 @@ def test_a_static_measurement_that_gives_no_constant_is_one_line(
     said = capsys.readouterr().err
     assert words in said
     assert "Traceback" not in said
-=======
+
+
 def test_runs_of_one_bob_that_differ_in_damping_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Where two runs of one bob follow laws with other coefficients a warning says so, and k agrees all the same."""
     omega = math.sqrt(14.0 / (0.2176 + 0.01 / 3 + 8 / 3 * 1.1999 * 0.051**3))
@@ -167,4 +167,3 @@ def test_runs_of_one_bob_that_differ_in_damping_are_told(tmp_path: Path, capsys:
     result = compared([*runs, "--scene", DISC_SCENE], capsys)
     assert result["comparison"]["agree"] is True
     assert [f["code"] for f in result["findings"]] == ["laws_differ"]
->>>>>>> dietA

@@ -35,27 +35,6 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
-<<<<<<< HEAD
-def test_auto_keeps_the_tolerance_and_says_so(cli: Callable, scene: Path) -> None:
-    """The object holds method, step, predicted and measured error, both below the tolerance."""
-    done = cli("simulate", "--scene", scene, "--seconds", "30", "--tolerance", "1e-7", "--check", "--json")
-    assert done.code == 0
-    (found,) = done.results
-    assert found["measured_error"] <= found["predicted_error"] <= 1e-7
-    assert found["method"] == "strang"
-    assert found["samples"] == 3001
-
-
-def test_a_linear_scene_is_solved_exactly(cli: Callable, tmp_path: Path) -> None:
-    """Nothing but a spring: the exact propagator, and no term left in."""
-    path = tmp_path / "linear.toml"
-    path.write_text(LINEAR)
-    (found,) = cli("simulate", "--scene", path, "--check", "--json").results
-    assert found["method"] == "exact"
-    assert 0.0 < found["measured_error"] < 1e-10
-    assert found["equation"]["angular_frequency_per_s"] == 10.0
-
-
 @pytest.mark.parametrize(
     ("damping", "rate", "last"),
     [
@@ -80,8 +59,6 @@ def test_the_prediction_is_told_in_the_quantities_of_table_1(
     assert f"A = {predicted['last_amplitude_m']:.4g} m after 20 s" in done.out
 
 
-=======
->>>>>>> dietA
 def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Callable, scene: Path, tmp_path: Path) -> None:
     """A run file of kind simulated, which nothing overwrites unasked."""
     run = tmp_path / "run.h5"
@@ -204,24 +181,6 @@ def test_a_record_outside_the_band_names_what_would_have_to_move(cli: Callable, 
     same = cli("simulate", "--scene", other, "--against", run, "--json").results[0]["against"]
     assert same["leaves_s"] is None
     assert same["inside_95"] > 0.93
-<<<<<<< HEAD
-
-
-def test_the_charts_of_a_simulation_stand_on_a_page(cli: Callable, scene: Path, tmp_path: Path) -> None:
-    """Its charts are in simulation.html, and files only on request; both Euler methods are beside the exact motion."""
-    assert cli("simulate", "--scene", scene, "--seconds", "20", "--folder", tmp_path).code == 0
-    folder = tmp_path / "bench.simulated"
-    page = (folder / "simulation.html").read_text("utf-8")
-    (text,) = re.findall(r'<script type="application/json" id="charts">(.*?)</script>', page, re.DOTALL)
-    charts = {chart["name"]: chart for chart in json.loads(text)}
-    assert set(charts) == {"position", "velocity", "energy", "phase", "error"}
-    forward, symplectic = ([decoded(s["y"]) for s in panel["series"]] for panel in charts["energy"]["panels"])
-    assert forward[0][-1] > 2.0 * forward[1][-1]
-    assert symplectic[0][-1] == pytest.approx(symplectic[1][-1], rel=0.1)
-    assert symplectic[1][0] == pytest.approx(0.5e3 * 20.0 * 0.05**2)
-    assert not (folder / "figures").exists()
-    assert cli("simulate", "--scene", scene, "--seconds", "20", "--folder", tmp_path, "--figures", "pdf").code == 0
-    assert {path.name for path in (folder / "figures").iterdir()} == {f"{name}.pdf" for name in charts}
 
 
 def test_a_run_with_its_scene_is_enough(cli: Callable, scene: Path, tmp_path: Path) -> None:
@@ -270,5 +229,3 @@ def test_the_measured_run_stands_in_the_charts_of_both_methods(cli: Callable, sc
             measured, _, exact = panel["series"]
             assert measured["label"] == "measured"
             assert decoded(measured["y"])[0] == pytest.approx(decoded(exact["y"])[0], rel=0.01, abs=0.01)
-=======
->>>>>>> dietA

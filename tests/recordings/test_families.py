@@ -51,31 +51,6 @@ GIVEN = GRID | {"unit_given"}
 TABLE = [
     Row(f"{PANDHI}/position data.txt", "motion-sensor", 724, 100, (0.43, 7.66), (16.500, 16.647), traps=STATED),
     Row(f"{PANDHI}/velocity data.txt", "motion-sensor", 724, 100, (0.43, 7.66), (0, 0.147), "cm/s", traps=SUMMED),
-<<<<<<< HEAD
-    Row(f"{PANDHI}/damped velocity.txt", "motion-sensor", 12172, 100, (0, 121.71), (0, -4.685), "cm/s", traps=SUMMED),
-    Row("kamjha__PHY224/position_osc.txt", "motion-sensor", 690, 100, (1.27, 8.16), (20.985, 21.006), traps=STATED),
-    Row("kamjha__PHY224/velocity_osc.txt", "motion-sensor", 690, 100, (1.27, 8.16), (0, 0.021), "cm/s", traps=SUMMED),
-    Row(
-        "pankaj9um__PHY224/undamped_point_data.txt",
-        "motion-sensor",
-        1451,
-        100,
-        (5.04, 19.54),
-        (17.797, 17.765),
-        traps=STATED,
-    ),
-    Row(
-        "pankaj9um__PHY224/undamped_point_data_set2.txt",
-        "motion-sensor",
-        978,
-        100,
-        (0.49, 10.26),
-        (20.688, 21.101),
-        traps=STATED,
-    ),
-    Row(FILO, "capstone", 11886, 100, (1.0, 119.85), (0.4788, 0.4182), "", "position", traps=UNTIMED | GIVEN),
-=======
->>>>>>> dietA
     Row(
         FILO,
         "capstone",
@@ -113,12 +88,7 @@ TABLE = [
         clock="device",
         traps=frozenset({"jittered_time", "unit_assumed"}),
     ),
-<<<<<<< HEAD
     Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (36.81932105, 9.153431271), "", "x", traps=UNTIMED | GIVEN),
-    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (-3.838981342, -36.50951911), "", "y", traps=UNTIMED | GIVEN),
-=======
-    Row(TRACKER, "tracker", 890, 25, (5.68, 41.24), (36.81932105, 9.153431271), "", "x", traps=FORCED | GIVEN),
->>>>>>> dietA
     Row(
         SHM,
         "lvm",

@@ -34,34 +34,6 @@ def numbers_of(path: Path) -> dict[str, list[float]]:
     return lists
 
 
-<<<<<<< HEAD
-@pytest.fixture(scope="module")
-def pendulum(recordings: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return kafe2's pendulum: 121 times, s, and its angle, rad."""
-    numbers = numbers_of(peer(recordings, "kafe2_pendulum.yml"))
-    return np.array(numbers["x_data"]), np.array(numbers["y_data"])
-
-
-def test_kafe2s_pendulum_with_its_law_stated(pendulum: tuple[np.ndarray, np.ndarray]) -> None:
-    """kafe2 fits a linear law, c = 0.00992(16) 1/s: ours agrees within its u and is no wider than 1.1 of it."""
-    rate = sm.analyse(pendulum, unit="rad", law="linear")["damping_rate"]
-    assert abs(rate.value - 0.00992) < 0.00016
-    assert rate.u <= 1.1 * 0.00016
-
-
-def test_kafe2s_pendulum_without_a_law_covers_its_rate(pendulum: tuple[np.ndarray, np.ndarray]) -> None:
-    """The average over laws covers kafe2's rate, and is less certain than with the law stated."""
-    rate = sm.analyse(pendulum, unit="rad")["damping_rate"]
-    assert abs(rate.value - 0.00992) < 2.0 * rate.u
-    assert rate.u > sm.analyse(pendulum, unit="rad", law="linear")["damping_rate"].u
-
-
-def test_kafe2s_pendulum_starts_at_its_angle(pendulum: tuple[np.ndarray, np.ndarray]) -> None:
-    """kafe2's starting angle is 0.5984(26) rad."""
-    amplitude = sm.analyse(pendulum, unit="rad", law="linear")["amplitude"]
-    assert abs(amplitude.value - 0.5984) < 0.0026
-    assert amplitude.u <= 1.1 * 0.0026
-=======
 def test_kafe2s_pendulum(recordings: Path) -> None:
     """kafe2 fits a linear law, c = 0.00992(16) 1/s from 0.5984(26) rad on: ours agrees within its u, and is no wider.
 
@@ -75,7 +47,6 @@ def test_kafe2s_pendulum(recordings: Path) -> None:
         assert stated[name].u <= 1.1 * u
     assert abs(free["damping_rate"].value - 0.00992) < 2.0 * free["damping_rate"].u
     assert free["damping_rate"].u > stated["damping_rate"].u
->>>>>>> dietA
 
 
 def test_phypraks_torsion_pendulum(recordings: Path) -> None:
