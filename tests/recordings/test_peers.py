@@ -34,13 +34,18 @@ def numbers_of(path: Path) -> dict[str, list[float]]:
     return lists
 
 
-def test_kafe2s_pendulum(recordings: Path) -> None:
+@pytest.fixture(scope="module")
+def pendulum(recordings: Path) -> tuple[list[float], list[float]]:
+    """Return kafe2's pendulum: 121 times, s, and its angle, rad."""
+    numbers = numbers_of(peer(recordings, "kafe2_pendulum.yml"))
+    return numbers["x_data"], numbers["y_data"]
+
+
+def test_kafe2s_pendulum(pendulum: tuple[list[float], list[float]]) -> None:
     """kafe2 fits a linear law, c = 0.00992(16) 1/s from 0.5984(26) rad on: ours agrees within its u, and is no wider.
 
     The average over laws covers its rate, and is less certain than with the law stated.
     """
-    numbers = numbers_of(peer(recordings, "kafe2_pendulum.yml"))
-    pendulum = (numbers["x_data"], numbers["y_data"])
     stated, free = sm.analyse(pendulum, law="linear", unit="rad"), sm.analyse(pendulum, unit="rad")
     for name, value, u in (("damping_rate", 0.00992, 0.00016), ("amplitude", 0.5984, 0.0026)):
         assert abs(stated[name].value - value) < u
@@ -62,7 +67,7 @@ def test_phypraks_torsion_pendulum(recordings: Path) -> None:
         assert abs(decay_s - printed) < math.hypot(u_printed, u_s)
 
 
-def test_kafe2s_acceleration_of_gravity(pendulum: tuple[np.ndarray, np.ndarray]) -> None:
+def test_kafe2s_acceleration_of_gravity(pendulum: tuple[list[float], list[float]]) -> None:
     """kafe2 prints g = 9.7809(23) m/s^2 for l + r = 10.052 m, from the harmonic equation that its data obey."""
     run = sm.analyse(pendulum, unit="rad", law="linear")
     g = (run["angular_frequency"] ** 2 + run["damping_rate"] ** 2) * 10.052
