@@ -56,6 +56,7 @@ def test_a_help_fits_a_screen_or_is_grouped(cli: Cli, monkeypatch: pytest.Monkey
         (("analyse", "x.txt", "--accuracy", "bst"), "best"),
         (("analyse", "x.txt", "--chanel", "y"), "--channel"),
         (("analyse", "x.txt", "--rate-hz", "100", "--rate-hz", "50"), "--rate-hz"),
+        (("batch", "x.txt", "-o", "course", "--jobs", "1.5"), "--jobs"),
     ],
 )
 def test_a_mistyped_line_is_answered_with_what_was_meant(cli: Cli, line: tuple[str, ...], near: str) -> None:
