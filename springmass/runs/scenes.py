@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import os
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -40,7 +41,13 @@ def scene_from(given: Any) -> Scene | None:
     """Return a scene given as such, as its tables, or by the path of its file; None if none was given."""
     if given is None or isinstance(given, Scene):
         return given
-    return Scene.from_mapping(given) if isinstance(given, Mapping) else read_scene(given)
+    if isinstance(given, Mapping):
+        return Scene.from_mapping(given)
+    if not isinstance(given, str | os.PathLike):
+        raise ProgramError(
+            f"scene must be a Scene, a mapping of its tables or a path, got {given!r:.80}; name a file", USAGE
+        )
+    return read_scene(given)
 
 
 def read_tables(path: str | Path) -> dict[str, Any]:
