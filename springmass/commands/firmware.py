@@ -20,6 +20,7 @@ from acquisition.live.serial_port import SerialPort
 from springmass.commands.options import flag, option
 from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
 from springmass.session.sensors import outdated, settings_of
+from springmass.values import Whole
 
 ANSWER_S = 5.0
 """Longest time until a board answers: opening the port restarts it, and its bootloader waits for two seconds."""
