@@ -47,7 +47,7 @@ def scene_from(given: Any) -> Scene | None:
         raise ProgramError(
             f"scene must be a Scene, a mapping of its tables or a path, got {given!r:.80}; name a file", USAGE
         )
-    return read_scene(given)
+    return read_scene(Path(given))
 
 
 def read_tables(path: str | Path) -> dict[str, Any]:
