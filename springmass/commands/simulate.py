@@ -18,6 +18,7 @@ from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import Figures, File, Json, Overwrite, flag, option, output
 from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.runs.json_results import picked
 from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import ask_about, read_scene
@@ -37,6 +38,7 @@ from springmass.runs.simulating.simulation import (
 from springmass.terminal.printing import wrapped
 from springmass.values import Finite, Positive, Whole
 
+GROWTH = ("method", "predicted", "measured", "fails_above_s")
 FAR_BELOW = 1e-3  # of the band; a smaller tolerance gives no benefit
 
 
@@ -104,7 +106,10 @@ def simulate(
     print(_after(simulation, count), file=say)
     grown = growths(ready.problem, dt, count)
     print("\n".join(_grown(each) for each in grown), file=say)
-    results, over = summary(simulation, effects, wanted, band) | {"growth": [each.summary() for each in grown]}, None
+    results, over = (
+        summary(simulation, effects, wanted, band) | {"growth": [picked(each, GROWTH) for each in grown]},
+        None,
+    )
     if analysis is not None:
         from springmass.runs.simulating.against import deviation_text, lay_over
 

@@ -178,7 +178,11 @@ def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[s
             for joint in compared.joint
         ],
         "findings": compared.findings,
-        **({"mass_line": _line_json(compared.line)} if compared.line is not None else {}),
+        **(
+            {"mass_line": picked(compared.line, ("constant", "effective_mass", "chi2", "dof"))}
+            if compared.line is not None
+            else {}
+        ),
         **(
             {"hooke": {"constant": compared.hooke.constant, "normalised_error": compared.normalised_error}}
             if compared.hooke
@@ -189,10 +193,6 @@ def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[s
         "provenance": provenance,
     }
     return {key: plain(value) for key, value in content.items()}
-
-
-def _line_json(line: MassLine) -> dict[str, Any]:
-    return picked(line, ("constant", "effective_mass", "chi2", "dof"))
 
 
 def _moving(run: Run) -> Oscillation:

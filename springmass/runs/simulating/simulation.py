@@ -314,11 +314,6 @@ class Growth:
     measured: float | None
     fails_above_s: float
 
-    def summary(self) -> dict[str, Any]:
-        """Return the growth as the JSON of ``springmass simulate`` has it."""
-        names = ("method", "predicted", "measured", "fails_above_s")
-        return {name: getattr(self, name) for name in names}
-
 
 def growths(problem: Problem, step_s: float, count: int) -> tuple[Growth, ...]:
     """Return the growth by both Euler methods with a step."""
