@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from failure import Error
 from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import DynamicsError
@@ -73,7 +74,11 @@ def simulate(
     if tolerance is None and method == "auto":
         tolerance = default_tolerance(band)
     if isinstance(integrator, str):
-        demand_stable(ready.problem, integrator, spacing_s if tolerance is None else None, where="scene")
+        try:
+            demand_stable(ready.problem, integrator, spacing_s if tolerance is None else None, where="scene")
+        except Error as error:  # its remedy is that of the command line
+            what = str(error).partition("; ")[0]
+            raise DynamicsError(f'{what}; give times with a smaller step, a tolerance, or method="strang"') from None
     solution = solve(ready.problem, integrator, spacing_s, times.size - 1, tolerance)
     around = np.zeros((4, times.size)) if band is None else band.displacement_at(times)
     of = {"displacement": solution.trajectory.y, "u_displacement": 0.5 * (around[2] - around[1])}

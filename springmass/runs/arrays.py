@@ -119,7 +119,7 @@ def _columns(source: Any) -> tuple[_Column, _Column, Any]:
         return _Column(_index_of(source)), _Column(source), None
     elif isinstance(source, list | tuple) and len(source) == 2:
         return _Column(source[0]), _Column(source[1]), None
-    raise TrackError(f"{EXPECTED}, got a {type(source).__name__}")
+    raise TrackError(f"{EXPECTED}, got {type(source).__name__}")
 
 
 def _by_headings(frame: Any) -> tuple[_Column, _Column]:

@@ -15,6 +15,7 @@ import springmass as sm
 
 T = np.arange(1000) / 100
 RUN = (T, 0.2 + 0.05 * np.cos(8.3 * T))
+BENCH = sm.Scene(bob_mass_kg=0.2, spring_constant_n_per_m=14.0, start_displacement_m=0.05)
 WRONG: dict[str, Callable[[Path], Any]] = {
     "a file that is not there": lambda folder: sm.load(folder / "nothing.txt"),
     "a unit that nobody stated": lambda folder: sm.load(folder / "plain.csv"),
@@ -24,6 +25,7 @@ WRONG: dict[str, Callable[[Path], Any]] = {
     "an unknown key of a scene": lambda _: sm.analyse(RUN, {"bob": {"mass_g": 200}}),
     "a scene that is not there": lambda folder: sm.analyse(RUN, folder / "nothing.toml"),
     "a scene that is a number": lambda _: sm.analyse(RUN, 3),  # type: ignore[arg-type]
+    "an unstable step": lambda _: sm.simulate(BENCH, T, method="forward-euler"),
     "too few samples": lambda _: sm.analyse((T[:3], T[:3])),
     "times that run backwards": lambda _: sm.analyse((T[::-1], RUN[1])),
     "no array": lambda _: sm.analyse(3),  # type: ignore[arg-type]
