@@ -13,6 +13,7 @@ from acquisition.clock import VirtualClock
 from acquisition.live.reader import Sink
 from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
+from storage.wire_log.appending import SECOND_COPY
 from storage.wire_log.log_file import LogFile
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
@@ -200,6 +201,25 @@ def test_a_read_longer_than_a_record_is_divided() -> None:
     records = [record for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA]
     assert b"".join(record.payload for record in records) == long
     assert {(record.channel, record.mono_ns) for record in records} == {(1, 5)}
+
+
+def test_a_full_disk_stops_the_recording_and_counts_what_it_lost() -> None:
+    """The write that meets it begins with the second copy of the header, which nobody put."""
+    disk = Disk()
+    recording = recorder(disk)
+    disk.room = len(disk.data) + SECOND_COPY + 1000
+    disk.writes_pass.clear()
+    recording.put(0, 0, bytes(SECOND_COPY))
+    assert disk.held.wait(WAIT_S)
+    for number in range(200):
+        recording.put(0, number, b"R%04d\r" % number)
+    disk.writes_pass.set()
+    status = recording.drain()
+    kept = sum(record.kind is Kind.DATA for record in parse_log(bytes(disk.data)))
+    assert 1 < kept < 201
+    assert kept + status.dropped_records == 201
+    with pytest.raises(WriteFailed, match="No space left on device"):
+        recording.close()
 
 
 def test_what_a_full_disk_took_is_synced_at_once() -> None:
