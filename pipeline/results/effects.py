@@ -221,11 +221,11 @@ def _rest_drift(rest: Rest, noise_m: float) -> Effect:
 
 
 def _modes(disturbances: Disturbances, unit: str) -> Iterator[Effect]:
-    """Yield the effects of modes of other frequencies, and of harmonics and products of the main oscillation."""
+    """Yield the effects of modes of other frequencies, and of harmonics of the main oscillation."""
     found = disturbances.sideways.modes
     own = [mode for mode in found if mode.kind == "mode"]
     locked = [mode for mode in found if mode.kind != "mode"]
-    names = (("sideways_mode", own, "mode of another frequency"), ("harmonics", locked, "harmonic or product"))
+    names = (("sideways_mode", own, "mode of another frequency"), ("harmonics", locked, "harmonic"))
     for name, members, what in names:
         if disturbances.sideways.carrier is None:
             yield Effect(name, None, None, unit, False, "not sought: too few periods, or not at this accuracy")
