@@ -18,7 +18,7 @@ from pipeline.bench.air import speed_of_sound
 from pipeline.bench.derived_drag import SOURCES, DerivedDrag, disc_rate
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
-from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
+from pipeline.bench.spring import GRAVITY_M_PER_S2, HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
@@ -31,7 +31,6 @@ from pipeline.windows.disturbances import Disturbances
 SHARE = 0.1  # size from which the model includes an effect, over the uncertainty that the effect would change
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
 STEEL_KG_PER_M3 = 7850.0
-GRAVITY = 9.81  # m/s^2
 SOFTER_PER_K = 2.6e-4  # relative decrease of the modulus of spring steel with temperature, 1/K
 
 
@@ -96,7 +95,7 @@ def simulated_effects(
     def moved(name: str, share: float, what: str) -> Effect:
         return Effect(name, turned(share), None, "1", True, f"{what}: {share:.2g} of the bob's mass")
 
-    u_kelvin, length = scene_air(scene)[0].u, 4.0 * GRAVITY / omega**2
+    u_kelvin, length = scene_air(scene)[0].u, 4.0 * GRAVITY_M_PER_S2 / omega**2
     softer = f"the air's u of {u_kelvin:g} K makes a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
     swings = (
         f"the scene gives no length; suspended {length:.3g} m +- {1.5 * start:.2g} m below its point the bob would "
@@ -242,7 +241,7 @@ def _modes(disturbances: Disturbances, unit: str) -> Iterator[Effect]:
 
 
 def _buoyancy(scene: Scene, omega: float, length_m: float, unit: str) -> Effect:
-    shift = scene_air_density(scene) / STEEL_KG_PER_M3 * GRAVITY / omega**2
+    shift = scene_air_density(scene) / STEEL_KG_PER_M3 * GRAVITY_M_PER_S2 / omega**2
     why = "a constant force: it moves the rest position (a steel bob's by this much) and nothing else"
     return Effect("buoyancy", shift / length_m if length_m > 0.0 else None, None, unit, False, why)
 
