@@ -23,7 +23,7 @@ from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
 from pipeline.motion.averaged import Fitted, Phase, Rest
-from pipeline.numerics.quantity import Unit, amount
+from pipeline.numerics.quantity import amount
 from pipeline.registry.effects import check_effect
 from pipeline.track import Track
 from pipeline.windows.disturbances import Disturbances
@@ -65,7 +65,7 @@ def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
 
     return (
         *_masses(scene, counted),
-        *_drags(scene, damping, omega.value, unit),
+        _disc_drag(scene, damping, omega.value, unit),
         _backbone(phase, damping),
         _rest_drift(fitted.rest, fitted.demodulated.noise_m),
         *_modes(fitted.disturbances, unit),
@@ -169,20 +169,6 @@ def _forces(problem: Problem, seconds: float) -> Iterator[Effect]:
     for name, size in sizes.items():
         why = f"up to {min(size, 1.0):.1g} of the amplitude" if size > 0.0 else "the scene has none"
         yield Effect(name, min(size, 1.0), None, "1", size > 0.0, why)
-
-
-def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[Effect]:
-    yield _disc_drag(scene, damping, omega, unit)
-    chosen = f"selected law: {damping.selected}; admissible: {', '.join(damping.admissible) or 'none'}"
-    for name, coefficient, of in (
-        ("viscous_drag", "gamma", "1/s"),
-        ("quadratic_drag", "beta", Unit(-1, -1).of(unit)),
-        ("friction", "mu", Unit(1, -1).of(unit)),
-    ):
-        value = damping.best.drag_term(coefficient)
-        tried = any(fit.drag_term(coefficient) is not None for fit in damping.fits.values())
-        why = chosen if tried else f"no law with {name.replace('_', ' ')} is among those tried"
-        yield Effect(name, None, value, of, value is not None, why)
 
 
 def _disc_drag(scene: Scene, damping: Damping, omega: float, unit: str) -> Effect:
