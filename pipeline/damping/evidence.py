@@ -24,6 +24,7 @@ REJECTION = 1e-3  # probability with which chi-square rejects a true law
 # Difference of BIC below which evidence is "not worth more than a bare mention": Kass and Raftery, J. Am. Stat. Assoc.
 # 90 (1995) 773.
 BARE_MENTION = 2.0
+VERY_STRONG = 10.0  # difference from which it is "very strong" (the same)
 ALIKE = 0.1  # maximum relative difference in damping between two laws that count as equivalent
 SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # limits of the lower end of this comparison, over the largest amplitude
 # A coefficient this many standard uncertainties below zero rejects its law: a probability of 0.023 if its true value is

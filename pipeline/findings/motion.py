@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.motion.averaged import Fitted, Rest
+from pipeline.motion.by_samples import FEW_WINDOWS
 from pipeline.motion.overdamped import Overdamped
 from pipeline.numerics.quantity import amount
 from pipeline.registry.found import Found
@@ -16,7 +17,6 @@ from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import model_error
 
 SIDEWAYS = 0.01  # share of a second mode in the amplitude above which the finding is a warning and not a note
-FEWEST = 4  # minimum number of windows for the test of a damping law
 
 
 def overdamped_findings(found: Overdamped) -> Iterator[Found]:
@@ -42,7 +42,7 @@ def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Found]:
     """Yield what the fit shows of the motion."""
     demodulated, phase, rest = fitted.demodulated, fitted.phase, fitted.rest
     windows, omega = demodulated.t.size, phase.angular_frequency.value
-    if windows < FEWEST:
+    if windows < FEW_WINDOWS:
         yield Found("short_record", {"periods": cycles.count, "windows": windows})
     if demodulated.lost:
         lost = {"periods": demodulated.lost, "all_periods": demodulated.lost + windows}

@@ -14,6 +14,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from pipeline.damping.evidence import VERY_STRONG
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
@@ -40,8 +41,6 @@ POINTS = 2049  # number of points in the tables of the lag and of the integral o
 MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
 NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
 DEGREE = 6  # maximum degree of the polynomial of a drifting rest position
-# Minimum decrease of the BIC for a bent phase or a drifting rest position; 10 is "very strong" evidence.
-EVIDENCE = 10.0
 FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
 REJECTION = 1e-3  # probability that the chi-square test rejects residuals that are only noise
 
@@ -233,7 +232,7 @@ def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
     if u.size >= 8 and len(damping.best.law.parameters) > 1:
         table = area_of(damping.best.law, damping.best.joint.values, t0, middle, last)
         bent = solve_weighted(_turns(t, middle, table)[kept], phase[kept], u)
-        if (straight.chi2 - bent.chi2) / spread.correlation - math.log(u.size / spread.correlation) > EVIDENCE:
+        if (straight.chi2 - bent.chi2) / spread.correlation - math.log(u.size / spread.correlation) > VERY_STRONG:
             model, area = bent, table
     widened, length = _widening(straight, u, spread)
     covariance = straight.covariance * widened
@@ -352,7 +351,7 @@ def fit_rest(windows: Demodulated, unit: str) -> Rest:
     widened = max(spread.correlation, correlation_length(left)) * max(1.0, float(left @ left) / max(left.size - 1, 1))
     estimate = Estimate(mean, math.sqrt(widened / float(weight @ weight)), unit)
     curve = np.asarray(polynomial(t), np.float64)
-    return Rest(estimate, float(np.ptp(curve)), gain > EVIDENCE, t, curve)
+    return Rest(estimate, float(np.ptp(curve)), gain > VERY_STRONG, t, curve)
 
 
 def wrapped(angle: float) -> float:

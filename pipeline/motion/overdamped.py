@@ -10,8 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 from pipeline.bench.added_mass import added_mass_kg
+from pipeline.bench.instrument import U_CRYSTAL
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
+from pipeline.damping.evidence import VERY_STRONG
 from pipeline.motion.fit import Rows
 from pipeline.motion.relaxing import FREE, Decay, best_decay, critical_decay, lone_exponential
 from pipeline.numerics.estimate import Estimate
@@ -24,12 +26,9 @@ Kind = Literal["overdamped", "critical", "strong"]
 
 FEWEST = 20  # minimum number of samples for a fit of five parameters
 POINTS = 300  # approximate number of block means to which a record is reduced before shapes are compared
-EVIDENCE = 10.0  # margin by which the BIC of a relaxation must be lower than that of any drift, step or ramp
 MISFIT = 1.5  # maximum root mean square of the fit's residual, in units of the record's noise
 # Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
 LEAST_DAMPING = 0.05
-# Relative standard uncertainty of the clock; the tolerance of a crystal is assumed for every clock.
-U_CLOCK = 50e-6 / math.sqrt(3.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +78,7 @@ def _moves(y: F8, noise: float) -> bool:
     size = max(1, y.size // POINTS)
     values = y[: y.size // size * size].reshape(-1, size).mean(axis=1)
     excess = float(np.sum((values - values.mean()) ** 2)) * size / noise**2 - values.size
-    return bool(excess > EVIDENCE + 5.0 * math.log(values.size))
+    return bool(excess > VERY_STRONG + 5.0 * math.log(values.size))
 
 
 def _starts(y: F8, noise: float) -> Iterator[int]:
@@ -128,7 +127,7 @@ def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
     sigma = rows.u / math.sqrt(size)
     mine = float(np.sum(left**2)) / sigma**2 + 5.0 * math.log(t.size)
     others = min(left / sigma**2 + count * math.log(t.size) for left, count in _other_shapes(t, values))
-    return mine + EVIDENCE < others
+    return mine + VERY_STRONG < others
 
 
 def _other_shapes(t: F8, y: F8) -> Iterator[tuple[float, int]]:
@@ -184,7 +183,7 @@ def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[Kind, Deca
 def _described(fit: Decay, kind: Kind, start_s: float, noise: Estimate, unit: str) -> Overdamped:
     from uncertainties import correlated_values, ufloat, umath
 
-    clock = ufloat(1.0, U_CLOCK)
+    clock = ufloat(1.0, U_CRYSTAL)  # the tolerance of a crystal is assumed for every clock
     offset, a, v, *logarithms = correlated_values(fit.values, fit.covariance)
     v, rate = v * clock, umath.exp(logarithms[0]) * clock
     stiffness = rate**2 if fit.critical else umath.exp(logarithms[1]) * clock**2

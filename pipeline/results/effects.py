@@ -18,12 +18,12 @@ from pipeline.bench.air import speed_of_sound
 from pipeline.bench.derived_drag import SOURCES, DerivedDrag, disc_rate
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
-from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg
+from pipeline.bench.spring import GRAVITY_M_PER_S2, HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
 from pipeline.motion.averaged import Fitted, Phase, Rest
-from pipeline.numerics.quantity import Unit, amount
+from pipeline.numerics.quantity import amount
 from pipeline.registry.effects import check_effect
 from pipeline.track import Track
 from pipeline.windows.disturbances import Disturbances
@@ -31,7 +31,6 @@ from pipeline.windows.disturbances import Disturbances
 SHARE = 0.1  # size from which the model includes an effect, over the uncertainty that the effect would change
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
 STEEL_KG_PER_M3 = 7850.0
-GRAVITY = 9.81  # m/s^2
 SOFTER_PER_K = 2.6e-4  # relative decrease of the modulus of spring steel with temperature, 1/K
 
 
@@ -66,7 +65,7 @@ def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
 
     return (
         *_masses(scene, counted),
-        *_drags(scene, damping, omega.value, unit),
+        _disc_drag(scene, damping, omega.value, unit),
         _backbone(phase, damping),
         _rest_drift(fitted.rest, fitted.demodulated.noise_m),
         *_modes(fitted.disturbances, unit),
@@ -96,7 +95,7 @@ def simulated_effects(
     def moved(name: str, share: float, what: str) -> Effect:
         return Effect(name, turned(share), None, "1", True, f"{what}: {share:.2g} of the bob's mass")
 
-    u_kelvin, length = scene_air(scene)[0].u, 4.0 * GRAVITY / omega**2
+    u_kelvin, length = scene_air(scene)[0].u, 4.0 * GRAVITY_M_PER_S2 / omega**2
     softer = f"the air's u of {u_kelvin:g} K makes a steel spring softer by {SOFTER_PER_K * u_kelvin:.1g}"
     swings = (
         f"the scene gives no length; suspended {length:.3g} m +- {1.5 * start:.2g} m below its point the bob would "
@@ -172,20 +171,6 @@ def _forces(problem: Problem, seconds: float) -> Iterator[Effect]:
         yield Effect(name, min(size, 1.0), None, "1", size > 0.0, why)
 
 
-def _drags(scene: Scene, damping: Damping, omega: float, unit: str) -> Iterator[Effect]:
-    yield _disc_drag(scene, damping, omega, unit)
-    chosen = f"selected law: {damping.selected}; admissible: {', '.join(damping.admissible) or 'none'}"
-    for name, coefficient, of in (
-        ("viscous_drag", "gamma", "1/s"),
-        ("quadratic_drag", "beta", Unit(-1, -1).of(unit)),
-        ("friction", "mu", Unit(1, -1).of(unit)),
-    ):
-        value = damping.best.drag_term(coefficient)
-        tried = any(fit.drag_term(coefficient) is not None for fit in damping.fits.values())
-        why = chosen if tried else f"no law with {name.replace('_', ' ')} is among those tried"
-        yield Effect(name, None, value, of, value is not None, why)
-
-
 def _disc_drag(scene: Scene, damping: Damping, omega: float, unit: str) -> Effect:
     """Return the damping rate at the start that the disc should cause, next to the whole one that was measured."""
     share = {"m": 1.0, "m/s": omega**-1, "m/s^2": omega**-2}.get(unit)  # of the displacement in the recorded amplitude
@@ -221,11 +206,11 @@ def _rest_drift(rest: Rest, noise_m: float) -> Effect:
 
 
 def _modes(disturbances: Disturbances, unit: str) -> Iterator[Effect]:
-    """Yield the effects of modes of other frequencies, and of harmonics and products of the main oscillation."""
+    """Yield the effects of modes of other frequencies, and of harmonics of the main oscillation."""
     found = disturbances.sideways.modes
     own = [mode for mode in found if mode.kind == "mode"]
     locked = [mode for mode in found if mode.kind != "mode"]
-    names = (("sideways_mode", own, "mode of another frequency"), ("harmonics", locked, "harmonic or product"))
+    names = (("sideways_mode", own, "mode of another frequency"), ("harmonics", locked, "harmonic"))
     for name, members, what in names:
         if disturbances.sideways.carrier is None:
             yield Effect(name, None, None, unit, False, "not sought: too few periods, or not at this accuracy")
@@ -242,7 +227,7 @@ def _modes(disturbances: Disturbances, unit: str) -> Iterator[Effect]:
 
 
 def _buoyancy(scene: Scene, omega: float, length_m: float, unit: str) -> Effect:
-    shift = scene_air_density(scene) / STEEL_KG_PER_M3 * GRAVITY / omega**2
+    shift = scene_air_density(scene) / STEEL_KG_PER_M3 * GRAVITY_M_PER_S2 / omega**2
     why = "a constant force: it moves the rest position (a steel bob's by this much) and nothing else"
     return Effect("buoyancy", shift / length_m if length_m > 0.0 else None, None, unit, False, why)
 

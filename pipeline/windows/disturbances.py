@@ -23,7 +23,7 @@ class Disturbances:
     """The effects found beside the main oscillation."""
 
     conditioned: Conditioned  # the record without these effects, on which later stages work
-    sideways: Sideways  # modes, harmonics and products of both
+    sideways: Sideways  # modes and harmonics
     # Whether ``sideways`` was subtracted, since it would bias the amplitude by over a tenth of its uncertainty.
     modelled: bool
     leak_m: float  # bias of the amplitude that ``sideways`` would cause, m

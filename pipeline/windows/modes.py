@@ -104,14 +104,13 @@ class Mode:
     """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) w(t)`.
 
     The envelope E is a polynomial in time and the wave w is a complex oscillation. It has the mode's own frequency with
-    an exponential decay, or it is the product of the main wave's power :math:`b` and the first mode's power :math:`a`.
+    an exponential decay, or it is a power of the main wave.
     """
 
-    # (int, int), exponents a of the first mode and b of the main oscillation; (1, 0) is an independent mode.
-    turns: tuple[int, int]
+    turns: int  # power of the main wave; 0 for an independent mode
     frequency: Estimate  # mean frequency, Hz
     amplitude: Estimate  # root mean square of :math:`|E w|` over the record, m
-    decay: Estimate  # logarithmic decay rate of an independent mode's wave, 1/s; 0 for harmonics and products
+    decay: Estimate  # logarithmic decay rate of an independent mode's wave, 1/s; 0 for harmonics
     false_alarm: float  # probability that this mode is found in a record without it
     # (float, float), first and last time used, s. Outside this span, envelope and decay factor keep their values at its
     # ends.
@@ -119,28 +118,21 @@ class Mode:
     coefficients: C16  # (degree + 1,) m, coefficients of the envelope, in Legendre polynomials over ``span``
 
     @property
-    def kind(self) -> Literal["mode", "harmonic", "product"]:
-        """Kind of the mode: independent, a multiple of the main frequency, or a sum or difference of both."""
-        if self.turns == (1, 0):
-            return "mode"
-        return "product" if self.turns[0] else "harmonic"
+    def kind(self) -> Literal["mode", "harmonic"]:
+        """Kind of the mode: independent, or a multiple of the main frequency."""
+        return "harmonic" if self.turns else "mode"
 
     @property
     def degree(self) -> int:
         """Degree of the envelope's polynomial."""
         return self.coefficients.size - 1
 
-    def wave(self, t: F8, main: C16, first: C16 | None) -> C16:
-        """Return w at times t (n,), given the waves (n,) of the main oscillation and of the first mode."""
-        a, b = self.turns
-        if self.kind == "mode":
-            reach, angle = (
-                0.5 * (self.span[1] - self.span[0]),
-                2.0 * math.pi * self.frequency.value * (t - self.span[0]),
-            )
-            return rotating(np.exp(-self.decay.value * reach * self._x(t)), angle)
-        factors = [main if b > 0 else np.conj(main)] * abs(b) + ([] if first is None else [first] * a)
-        return np.asarray(math.prod(factors[1:], start=factors[0]))
+    def wave(self, t: F8, main: C16) -> C16:
+        """Return w at times t (n,), given the wave (n,) of the main oscillation."""
+        if self.turns:
+            return np.asarray(math.prod([main] * (self.turns - 1), start=main))
+        reach, angle = 0.5 * (self.span[1] - self.span[0]), 2.0 * math.pi * self.frequency.value * (t - self.span[0])
+        return rotating(np.exp(-self.decay.value * reach * self._x(t)), angle)
 
     def envelope(self, t: F8) -> C16:
         """Return E at times t (n,), m."""
@@ -152,10 +144,6 @@ class Mode:
             envelope *= x
             envelope += coefficient
         return envelope
-
-    def whole(self, t: F8, wave: C16) -> C16:
-        """Return the wave from which products are formed: wave times envelope, over the amplitude."""
-        return np.asarray(wave * self.envelope(t) / self.amplitude.value)
 
     def columns(self, t: F8, wave: C16) -> F8:
         """Return the columns (n, 2 (degree + 1)) that belong to the coefficients' real and imaginary parts."""
@@ -176,7 +164,6 @@ class Sideways:
 
     modes: tuple[Mode, ...]
     carrier: Carrier | None  # main oscillation; None if the record is too short, or too long, for a search
-    first: Mode | None = None  # the mode from which products are formed, as it was during the search for them
 
     def __bool__(self) -> bool:
         return bool(self.modes)
@@ -196,9 +183,6 @@ class Sideways:
     def _waves(self, t: F8) -> Iterator[tuple[Mode, C16]]:
         if self.carrier is None or not self.modes:
             return
-        main, first = self.carrier.wave(t), None
+        main = self.carrier.wave(t)
         for mode in self.modes:
-            wave = mode.wave(t, main, first)
-            if first is None and self.first is not None:
-                first = self.first.whole(t, wave)  # it is the first of the modes
-            yield mode, wave
+            yield mode, mode.wave(t, main)

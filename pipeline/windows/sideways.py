@@ -27,12 +27,9 @@ from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.modes import C16, Carrier, Mode, Sideways
 
-# Multiples of the phases of (sideways mode, main oscillation) at which a slanted beam shows products of both.
-PRODUCTS = ((2, 0), (1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (1, -2), (3, 0))
-HARMONICS = ((0, 2), (0, 3))
-NO_MODE = Estimate(0.0, 0.0, "Hz")
+HARMONICS = (2, 3)  # multiples of the main frequency
 FALSE_ALARM = 0.01  # probability that a mode or a harmonic is found in a record without any; each has half of it
-MOST = 4  # maximum number of modes, not counting harmonics and products
+MOST = 4  # maximum number of modes, not counting harmonics
 ENVELOPE = 4  # maximum degree of the polynomial for a mode's amplitude and phase
 LEAST_WINDOWS = 6  # minimum number of windows; fewer cannot separate a mode from the main oscillation
 # Maximum length of a record, periods; for longer ones the model of the blocks would outgrow the memory.
@@ -62,7 +59,7 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated) -> Sideway
     believed = np.abs(residual) <= 8.0 * spread
     blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, conditioned.track.rate_hz)
     band = _band(carrier, blocks)
-    multiples = tuple(turns[1] * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
+    multiples = tuple(turns * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
     if not worth_a_look(blocks, band, multiples, 0.5 * FALSE_ALARM):
         return Sideways((), carrier)
     return _Search(carrier, blocks, band).run()
@@ -81,7 +78,6 @@ class _Search:
         self.carrier, self.blocks, self.band = carrier, blocks, band
         self.t = blocks.t + blocks.origin
         self.main = carrier.wave(self.t)
-        self.first: C16 | None = None
         self.main_hz = carrier.angular_frequency / (2.0 * math.pi)
         # Data and columns over their standard uncertainty, an orthonormal basis of the columns, and the residual.
         self.data = blocks.y * blocks.weight
@@ -89,14 +85,13 @@ class _Search:
         self.basis, self.left = self.columns, self.data
         self.add(_main_columns(carrier, self.t) * blocks.weight[:, None])
         self.found = list[Mode]()
-        self.waves = dict[tuple[tuple[int, int], float, float], C16]()
+        self.waves = dict[tuple[int, float, float], C16]()
 
     def run(self) -> Sideways:
-        """Return the modes, strongest first, then products and harmonics, all fitted together."""
-        self.locked(HARMONICS, NO_MODE)
+        """Return the modes, strongest first, then the harmonics, all fitted together."""
+        self.harmonics()
         width = 2.0 / self.blocks.seconds
-        self.hole(*((b * self.main_hz, width) for _, b in HARMONICS))
-        first: Mode | None = None
+        self.hole(*((turns * self.main_hz, width) for turns in HARMONICS))
         for _ in range(MOST):
             peak = strongest(self.blocks, self.left, self.basis, self.band)
             if peak is None or peak.false_alarm > 0.5 * FALSE_ALARM:
@@ -107,11 +102,7 @@ class _Search:
             self.add(columns)
             self.found.append(mode)
             self.hole((mode.frequency.value, width))
-            if first is None:
-                first, self.first = mode, mode.whole(self.t, self.wave(mode))
-                self.locked(PRODUCTS, mode.frequency)
-        order = ("mode", "product", "harmonic")
-        return Sideways(tuple(sorted(self.together(), key=lambda mode: order.index(mode.kind))), self.carrier, first)
+        return Sideways(tuple(sorted(self.together(), key=lambda mode: mode.turns > 0)), self.carrier)
 
     def together(self) -> Iterator[Mode]:
         """Fit the coefficients of all modes together, because each was first fitted without the later ones."""
@@ -129,7 +120,7 @@ class _Search:
     def wave(self, mode: Mode) -> C16:
         key = (mode.turns, mode.frequency.value, mode.decay.value)
         if key not in self.waves:
-            self.waves[key] = mode.wave(self.t, self.main, self.first)
+            self.waves[key] = mode.wave(self.t, self.main)
         return self.waves[key]
 
     def hole(self, *holes: tuple[float, float]) -> None:
@@ -151,20 +142,14 @@ class _Search:
         u = math.sqrt(0.5 * unit * float(cofactors[0, 0] + cofactors[1, 1])) * _rms(self.wave(mode))
         return replace(mode, amplitude=Estimate(self.size(mode), u, "m"))
 
-    def locked(self, orders: tuple[tuple[int, int], ...], base: Estimate) -> None:
-        """Test lines whose frequencies are combinations of the main frequency and ``base``, and so are not free.
-
-        They are tested one after another, each beyond those found before it.
-        """
-        trials = [
-            self.blank((a, b), Estimate(abs(a * base.value + b * self.main_hz), abs(a) * base.u, "Hz"))
-            for a, b in orders
-        ]
+    def harmonics(self) -> None:
+        """Test the multiples of the main frequency one after another, each beyond those found before it."""
+        trials = [self.blank(turns, Estimate(turns * self.main_hz, 0.0, "Hz")) for turns in HARMONICS]
         trials = [trial for trial in trials if self.sought(trial.frequency.value)]
         if not trials:
             return
         taken, fallen = np.empty((self.t.size, 0)), 0.0
-        least = evidence_for(0.5 * FALSE_ALARM, len(orders))
+        least = evidence_for(0.5 * FALSE_ALARM, len(HARMONICS))
         for trial in trials:
             both = np.concatenate([taken, self.columns_of(trial)], axis=1)
             values, cofactors, fitted = self.fit(both)
@@ -175,7 +160,7 @@ class _Search:
                 continue  # the density is at least the smooth one
             density = spectral_density(self.blocks, left, f, self.band, smooth)
             if evidence > least * density:
-                unit, chance = density * self.blocks.samples, false_alarm(evidence / density, len(orders))
+                unit, chance = density * self.blocks.samples, false_alarm(evidence / density, len(HARMONICS))
                 found = replace(trial, false_alarm=chance)
                 self.found.append(self.fitted(found, values[-2:], cofactors[-2:, -2:], unit))
                 taken, fallen = both, fall
@@ -198,7 +183,7 @@ class _Search:
         known = any(abs(frequency_hz - centre) < half for centre, half in self.band.holes)
         return 0.1 * self.main_hz < frequency_hz < 0.4 / self.blocks.step and not known
 
-    def blank(self, turns: tuple[int, int], frequency: Estimate) -> Mode:
+    def blank(self, turns: int, frequency: Estimate) -> Mode:
         """Return a mode that has yet to be fitted."""
         span, unknown = (float(self.carrier.t[0]), float(self.carrier.t[-1])), Estimate(0.0, 0.0, "m")
         return Mode(turns, frequency, unknown, Estimate(0.0, 0.0, "1/s"), 1.0, span, np.zeros(1, np.complex128))
@@ -228,7 +213,7 @@ class _Search:
         room = int(2.0 * (abs(f - self.main_hz) * self.blocks.seconds - 1.0) - self.carrier.degree)
         degrees = np.arange(min(ENVELOPE, max(room, 0)) + 1)
         trial = replace(
-            self.blank((1, 0), Estimate(f, u_rate / (2.0 * math.pi), "Hz")),
+            self.blank(0, Estimate(f, u_rate / (2.0 * math.pi), "Hz")),
             decay=Estimate(rate if abs(rate) > 3.0 * u_rate else 0.0, u_rate, "1/s"),
             false_alarm=peak.false_alarm,
             coefficients=np.zeros(degrees.size, np.complex128),

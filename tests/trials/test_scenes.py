@@ -1,6 +1,6 @@
 """``auto`` on random scenes: within its tolerance or refused, held to references of 80 bits made by other code.
 
-``tests/reference/scenes.py`` drew and solved them once. ``SPRINGMASS_TRIALS=200 pytest -m trials -s
+``tests/reference/scenes.py`` of version 0.2.0 drew and solved them once. ``SPRINGMASS_TRIALS=200 pytest -m trials -s
 tests/trials/test_scenes.py`` takes all 200; fewer are the first of each kind.
 """
 

@@ -72,6 +72,19 @@ def test_a_long_pause_is_named_with_the_part_beyond_it(pause_s: float) -> None:
     assert analysis.estimates["damping_rate"].value == pytest.approx(0.015, abs=1e-4)
 
 
+@pytest.mark.parametrize("seed", sampled(range(12), 3))
+def test_lost_rows_are_named_and_covered(seed: int) -> None:
+    """Two per cent of the rows are lost, and the times are row numbers."""
+    rng = np.random.default_rng(seed)
+    y = damped(np.arange(1500) / 50, seed)[rng.random(1500) > 0.02]
+    analysis = analyse(Track.from_arrays(np.arange(y.size) / 50, y))
+    assert "lost_rows" in codes(analysis, "warning")
+    assert not codes(analysis) & {"clipped", "smoothed_sensor", "amplitude_dependent_frequency"}
+    period = analysis.estimates["period"]
+    assert abs(period.value - 0.790066) < 2.0 * period.u
+    assert 0.008 < period.u / period.value < 0.04
+
+
 @pytest.mark.parametrize("degrees", [20, 30, 45, 60, 75, 90])
 @pytest.mark.parametrize("quadratic", sampled((0.02, 0.0, 0.1), 1))
 def test_a_wide_pendulum(degrees: int, quadratic: float) -> None:

@@ -86,7 +86,6 @@ def test_a_coefficient_means_nothing_by_its_name(name: str) -> None:
     assert set(own) == {name}
     assert own[name].value == pytest.approx(0.3, rel=0.05)
     assert "drag_coefficient" not in found.estimates
-    assert all(not effect.included for effect in found.effects if effect.name in ("quadratic_drag", "friction"))
 
 
 def test_a_coefficient_with_the_name_of_an_estimate_is_refused() -> None:
