@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 from pipeline.registry.laws import law_names
 
@@ -26,6 +26,14 @@ def _where(holds: Callable[[float], bool], demand: str) -> Parameter:
     return Parameter(validator=validate)
 
 
+def _whole(_: object, tokens: Sequence[Token]) -> int:
+    """Convert a whole number; cyclopts itself would cut off a fraction."""
+    try:
+        return int(tokens[0].value)
+    except ValueError:
+        raise ValueError("must be a whole number") from None
+
+
 ANY_LAW = "any"
 """The value in place of a law's name that lets the recording choose, regardless of the scene."""
 
@@ -41,6 +49,7 @@ Positive = Annotated[float, _where(lambda x: x > 0.0, "must be positive")]
 Share = Annotated[float, _where(lambda x: 0.0 <= x <= 1.0, "must lie in 0 to 1")]
 ReadingsPerSecond = Annotated[float, _where(lambda x: 1e-3 <= x <= 1e6, "must lie in 0.001 to 1000000")]
 PartsPerMillion = Annotated[float, _where(lambda x: 0.0 <= x <= 1e6, "must lie in 0 to 1000000")]
-Count = Annotated[int, _where(lambda x: x >= 1, "must be 1 or more")]
-WholeNumber = Annotated[int, _where(lambda x: x >= 0, "must be 0 or more")]
-TcpPort = Annotated[int, _where(lambda x: 0 <= x <= 65535, "must be a port from 0 to 65535")]
+Whole = Annotated[int, Parameter(converter=_whole)]
+Count = Annotated[Whole, _where(lambda x: x >= 1, "must be 1 or more")]
+WholeNumber = Annotated[Whole, _where(lambda x: x >= 0, "must be 0 or more")]
+TcpPort = Annotated[Whole, _where(lambda x: 0 <= x <= 65535, "must be a port from 0 to 65535")]

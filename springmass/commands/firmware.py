@@ -20,6 +20,7 @@ from acquisition.live.serial_port import SerialPort
 from springmass.commands.options import flag, option
 from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
 from springmass.session.sensors import outdated, settings_of
+from springmass.values import Whole
 
 ANSWER_S = 5.0
 """Longest time until a board answers: opening the port restarts it, and its bootloader waits for two seconds."""
@@ -49,9 +50,9 @@ def firmware(
     *,
     port: Annotated[str | None, option("P", "port of the board")] = None,
     flash: Annotated[bool, flag("write the firmware that comes with this program")] = False,
-    rate: Annotated[int | None, option("R", "pings per second, 10 to 125; the board stores the setting")] = None,
+    rate: Annotated[Whole | None, option("R", "pings per second, 10 to 125; the board stores the setting")] = None,
     gate: Gate = None,
-    spread: Annotated[int | None, option("US", "largest random delay of a ping, 0 to 2000 us")] = None,
+    spread: Annotated[Whole | None, option("US", "largest random delay of a ping, 0 to 2000 us")] = None,
     name: Annotated[str | None, option("NAME", "name of the board: at most 12 letters, digits, . _ or -")] = None,
 ) -> int:
     """Show the wiring and how to flash; with a port, show the board's settings, change them, or flash it."""

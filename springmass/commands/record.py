@@ -26,7 +26,7 @@ from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted, flag, option, output
-from springmass.errors import INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
+from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
 from springmass.page.process import PageProcess
 from springmass.runs.outputs import made_now
 from springmass.runs.scenes import ask_about, read_scene
@@ -42,7 +42,7 @@ from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import ProgressLine
 from springmass.terminal.style import style_of
-from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond
+from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
 from storage.recovery.recover import recover
@@ -81,7 +81,7 @@ class RecordOptions:
         File | None, option("FILE", "scene file to store with the run; its air sets the speed of sound")
     ] = None
     title: Annotated[str, option("TEXT", "title of the run")] = ""
-    baud: Annotated[int | None, option("B", "baud rate of the ports (default: that of the sensor family)")] = None
+    baud: Annotated[Whole | None, option("B", "baud rate of the ports (default: that of the sensor family)")] = None
     rate_hz: Annotated[ReadingsPerSecond | None, option("R", "rate that the sensor is set to, readings per second")] = (
         None
     )
@@ -99,7 +99,7 @@ class RecordOptions:
     ] = None
     trigger: Annotated[Positive | None, option("M", "start when the bob is M metres from its rest position")] = None
     pre: Annotated[Positive | None, option("S", "seconds to keep before the trigger (default: 2)")] = None
-    seed: Annotated[int, option("N", "with --simulate: seed of the noise (default: 0)")] = 0
+    seed: Annotated[Whole, option("N", "with --simulate: seed of the noise (default: 0)")] = 0
 
 
 def record(*, options: RecordOptions = RecordOptions(), page_options: PageOptions = PageOptions()) -> int:
@@ -136,6 +136,7 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         STOPS.last_words = lambda: _stopped(session, log)
         console = Console(lambda error: session.failures.note("stderr", error))
         beside.callback(console.close)
+        page = None
         try:
             page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
             ended = _Bench(session, options, log, console, release, page).record()
@@ -153,6 +154,8 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
                 page.attend()
             return code
         except Closed:
+            if page is not None and page.failed:
+                return INTERNAL
             console.line("nothing was recorded: the page was closed first")
             return OK
         except KeyboardInterrupt:

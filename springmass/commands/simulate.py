@@ -35,7 +35,7 @@ from springmass.runs.simulating.simulation import (
     summary,
 )
 from springmass.terminal.printing import wrapped
-from springmass.values import Finite, Positive
+from springmass.values import Finite, Positive, Whole
 
 FAR_BELOW = 1e-3  # of the band; a smaller tolerance gives no benefit
 
@@ -61,7 +61,7 @@ def simulate(
     sensor: Annotated[Literal["ideal", "rangefinder"], option("NAME", "sensor of RUN.h5 (default: rangefinder)")] = (
         "rangefinder"
     ),
-    seed: Annotated[int, option("N", "seed of the sensor's noise (default: 0)")] = 0,
+    seed: Annotated[Whole, option("N", "seed of the sensor's noise (default: 0)")] = 0,
     folder: Annotated[
         File | None, option("DIR", "folder for NAME.simulated (default: here; with --json or -o: none)")
     ] = None,

@@ -48,6 +48,7 @@ class PageProcess:
         self._lines: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
         self._phase = "waiting"
         self._over = self._gone = False
+        self.failed = False  # the process died; False if somebody closed the page
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> PageProcess:
@@ -132,7 +133,7 @@ class PageProcess:
         if self._phase in ("ready", "still"):
             advice = "nothing has been recorded; start `springmass record` again"
         self._say(f"springmass: the page has ended ({error}); {advice}")
-        self._gone = True
+        self._gone = self.failed = True
         self._close_if_ready()
 
     def _close_if_ready(self) -> None:

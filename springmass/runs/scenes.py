@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import codecs
+import os
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from acquisition.errors import visible
 from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
@@ -40,7 +42,12 @@ def scene_from(given: Any) -> Scene | None:
     """Return a scene given as such, as its tables, or by the path of its file; None if none was given."""
     if given is None or isinstance(given, Scene):
         return given
-    return Scene.from_mapping(given) if isinstance(given, Mapping) else read_scene(given)
+    if isinstance(given, Mapping):
+        return Scene.from_mapping(given)
+    if not isinstance(given, str | os.PathLike):
+        demand = f"scene must be a Scene, a mapping of its tables or a path, got {visible(repr(given)[:80])}"
+        raise ProgramError(f"{demand}; name a file", USAGE)
+    return read_scene(Path(given))
 
 
 def read_tables(path: str | Path) -> dict[str, Any]:

@@ -239,10 +239,10 @@ def test_a_killed_page_ends_no_recording(record: Callable[..., Any], start: Call
 
 @pytest.mark.trials
 def test_a_killed_page_ends_a_bench_that_waits_for_it(bench: tuple[Any, Page]) -> None:
-    """Nothing could begin the recording any more: the program says so, and ends."""
+    """Nothing could begin the recording any more: the program says so, and ends with the code of an internal error."""
     program, _ = bench
     kill_page_of(program)
-    assert program.ended() == 0
+    assert program.ended() == 70
     assert "the page has ended" in "".join(program.messages)
     assert not program.out.exists()
 

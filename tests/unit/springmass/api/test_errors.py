@@ -23,6 +23,7 @@ WRONG: dict[str, Callable[[Path], Any]] = {
     "a folder without a course": sm.results,
     "an unknown key of a scene": lambda _: sm.analyse(RUN, {"bob": {"mass_g": 200}}),
     "a scene that is not there": lambda folder: sm.analyse(RUN, folder / "nothing.toml"),
+    "a scene that is a number": lambda _: sm.analyse(RUN, 3),  # type: ignore[arg-type]
     "too few samples": lambda _: sm.analyse((T[:3], T[:3])),
     "times that run backwards": lambda _: sm.analyse((T[::-1], RUN[1])),
     "no array": lambda _: sm.analyse(3),  # type: ignore[arg-type]
