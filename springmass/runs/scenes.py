@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from acquisition.errors import visible
 from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
@@ -44,9 +45,8 @@ def scene_from(given: Any) -> Scene | None:
     if isinstance(given, Mapping):
         return Scene.from_mapping(given)
     if not isinstance(given, str | os.PathLike):
-        raise ProgramError(
-            f"scene must be a Scene, a mapping of its tables or a path, got {given!r:.80}; name a file", USAGE
-        )
+        demand = f"scene must be a Scene, a mapping of its tables or a path, got {visible(repr(given)[:80])}"
+        raise ProgramError(f"{demand}; name a file", USAGE)
     return read_scene(Path(given))
 
 

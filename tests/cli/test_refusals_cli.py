@@ -31,6 +31,7 @@ LINES: list[tuple[tuple[str, ...], str]] = [
     (("analyse", "x.txt", "--accuracy", "bst"), "best"),
     (("analyse", "x.txt", "--chanel", "y"), "--channel"),
     (("analyse", "x.txt", "--rate-hz", "100", "--rate-hz", "50"), "--rate-hz"),
+    (("batch", "x.txt", "-o", "course", "--jobs", "1.5"), "--jobs"),
     (("analyse", "--json", RUN, "--from", "20"), "9.99"),
     (("analyse", "--json", RUN, "--to", "-1"), "9.99"),
     (("analyse", "--json", RUN, "--from", "5", "--to", "4"), "9.99"),
