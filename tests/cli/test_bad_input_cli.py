@@ -41,6 +41,7 @@ def refused(done: Any, path: Path, *words: str) -> None:
         b"\x89PNG\r\n\x1a\n" + bytes(3000),
         b" \r\n\r\n",
         b"\x89HDF\r\n\x1a\n" + bytes(300),
+        b"\0\0\0\x20ftypisom" + bytes(99),
         b"Motion Sensor Data File Mar 12, 2024 2:05 PM",
         b"Dear diary,\r\ntoday we hung a mass.\r\n",
         b"0.01\t25.3 " * 2000,

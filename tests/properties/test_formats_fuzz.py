@@ -1,14 +1,12 @@
-"""Readers under damaged files of the conformance suite: refused in one line or read truly; sound ones as by pandas."""
+"""Readers under damaged files of the conformance suite: refused in one line or read truly."""
 
 from __future__ import annotations
 
-import io
 import re
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -167,38 +165,3 @@ def test_xml_that_would_swell_is_refused() -> None:
     """Entities are not expanded."""
     data = b'<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><phyphox><title>&b;</title></phyphox>'
     assert isinstance(read("phyphox", data, {}), str)
-
-
-# Differential --------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "label", "arguments", "scale"),
-    [
-        ("motion-sensor", "position", {"sep": "\t", "skiprows": 1}, 100),
-        ("capstone", "localised", {"sep": ";", "decimal": ","}, 1),
-        ("logger-pro", "latest", {"sep": ","}, 1),
-        ("phyphox", "comma", {"sep": ","}, 1),
-        ("tracker", "masa", {"sep": "\t", "skiprows": 1}, 1),
-        ("table", "semicolon-comma", {"sep": ";", "decimal": ","}, 1000),
-        ("table", "bare-tabs", {"sep": "\t", "header": None}, 100),
-    ],
-)
-def test_pandas_reads_the_same_numbers(name: str, label: str, arguments: dict[str, Any], scale: float) -> None:
-    """Times and values are those of pandas, to the last bit of a decimal fraction."""
-    import pandas as pd
-
-    (case,) = (case for case in CASES if (case.format, case.label) == (name, label))
-    rng = np.random.default_rng(1)
-    t = (rng.integers(0, 400) + np.arange(500)) / 100.0
-    x = np.round(rng.normal(0.3, 0.2, 500), 5)
-    x[rng.integers(0, 500, 20)] = np.nan
-    data = case.build(t, x)
-    table = pd.read_csv(io.BytesIO(data), **arguments)
-    recording = get_format(name).read("run.dat", data, **case.options)
-    theirs = table.iloc[:, 1 if label == "position" else -1].to_numpy(float)
-    np.testing.assert_allclose(recording.samples.distance * scale, theirs, rtol=1e-14, atol=0)
-    np.testing.assert_allclose(recording.samples.t, table.iloc[:, 0].to_numpy(float), rtol=1e-12)
-
-
-# Coverage-guided -----------------------------------------------------------------------------------------------
