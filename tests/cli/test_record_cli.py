@@ -160,17 +160,8 @@ def test_a_disk_nearly_full_is_told_before_a_run_starts(
 
 def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """After kill -9 the log gives a run file with the first second whole."""
-    command = [
-        sys.executable,
-        "-m",
-        "springmass",
-        "record",
-        "--simulate",
-        "--scene",
-        str(scene),
-        "-o",
-        str(tmp_path / "run.h5"),
-    ]
+    words = ["record", "--simulate", "--scene", str(scene), "-o", str(tmp_path / "run.h5")]
+    command = [sys.executable, "-m", "springmass", *words]
     child = subprocess.Popen(command, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
     assert child.stderr is not None
     assert any(" s | " in line for line in child.stderr)  # it has kept its first second
@@ -243,20 +234,8 @@ def test_two_distances_by_the_ruler_set_offset_and_scale(
 def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable, tmp_path: Path, scene: Path) -> None:
     """--still, --ruler and --trigger work without hardware: the ruler's distance is the rest, the run its motion."""
     done = cli(
-        *(
-            "record",
-            "--simulate",
-            "--scene",
-            scene,
-            "--still",
-            "0.5",
-            "--ruler",
-            "0.26",
-            "--trigger",
-            "0.01",
-            "--pre",
-            "0.2",
-        ),
+        *("record", "--simulate", "--scene", scene, "--still", "0.5", "--ruler", "0.26"),
+        *("--trigger", "0.01", "--pre", "0.2"),
         *("--seconds", "1", "-o", tmp_path / "run.h5"),
     )
     assert done.code == 0, done.err
@@ -367,17 +346,8 @@ def test_lines_of_a_sketch_are_recorded(
     family = replace(get_family("text-lines"), encoder=lambda: Sketch(template))
     with VirtualPort(family, finder, SystemClock(), seconds=20.0) as port:
         port.start()
-        typed = [
-            "record",
-            "--port",
-            port.path,
-            "--sensor",
-            "text-lines",
-            "--seconds",
-            "4",
-            "-o",
-            str(tmp_path / "r.h5"),
-        ]
+        typed = ["record", "--port", port.path, "--sensor", "text-lines", "--seconds", "4"]
+        typed += ["-o", str(tmp_path / "r.h5")]
         if options is None:
             assert main(typed) == 4
             asked = capfd.readouterr().err
