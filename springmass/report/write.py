@@ -1,4 +1,4 @@
-"""Write a report: the page, its tables and, if asked for, its figures, in a folder that is replaced as a whole."""
+"""Write a report: the page, its tables and, if asked for, its figures; their folder gets new files, the page last."""
 
 from __future__ import annotations
 

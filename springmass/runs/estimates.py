@@ -51,6 +51,9 @@ _NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := _exponents(uni
 _NAMES[(0.0,) * 5] = ""
 
 
+ROUNDING = 1e-13  # part of a value: a u below it is what cancelled correlations leave, as of period times frequency
+
+
 class Value(UFloat):  # type: ignore[misc]
     """A result: a number with uncertainty of the ``uncertainties`` package that knows its unit.
 
@@ -63,6 +66,8 @@ class Value(UFloat):  # type: ignore[misc]
     >>> period = Value.of(Estimate(0.7431, 0.0002, "s"))
     >>> period, 1 / period, period - period
     (0.74310(20) s, 1.34571(36) 1/s, 0 s)
+    >>> period * (1 / period)
+    1
     >>> print(2 * period, f"{period:.1uS}", 0.2 * period**-2)
     1.48620 +- 0.00040 s 0.7431(2) 0.36219 +- 0.00019
     >>> print(f"{period.ufloat:.1u}")
@@ -100,10 +105,14 @@ class Value(UFloat):  # type: ignore[misc]
         return UFloat(self.nominal_value, self._linear_part)
 
     def __str__(self) -> str:
-        return self._shown[0] if self._shown else format_value(self.value, self.u, self.unit or "")
+        return self._shown[0] if self._shown else self._written(format_value)
 
     def __repr__(self) -> str:
-        return self._shown[1] if self._shown else in_brackets(self.value, self.u, self.unit or "")
+        return self._shown[1] if self._shown else self._written(in_brackets)
+
+    def _written(self, write: Callable[[float, float, str], str]) -> str:
+        exact = self.u <= ROUNDING * abs(self.value)
+        return write(self.value, 0.0 if exact else self.u, self.unit or "")
 
     def __abs__(self) -> Value:
         return self if self.value >= 0.0 else -self
