@@ -13,7 +13,7 @@ from pipeline.dynamics.band import Band
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of
 from springmass.runs.simulating.against import Against
-from springmass.runs.simulating.simulation import EULERS, Eulers, Simulation, beside_exact
+from springmass.runs.simulating.simulation import EULERS, Eulers, Simulation, beside_exact, growths
 
 PERIODS, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
 POINTS = 1500
@@ -44,10 +44,16 @@ def simulation(found: Simulation, mass_kg: float | None, over: Against | None = 
     return (
         Chart("position", "Position", beside, of_position, end),
         Chart("velocity", "Velocity", beside, of_velocity, end),
-        Chart("energy", "Energy", beside, of_energy),
+        Chart("energy", "Energy", f"{beside} {_growth(found)}", of_energy),
         Chart("phase", "Phase plot", f"The first {TURNS} turns of each method.", of_phase),
         Chart("error", "Error of each method", "Largest difference so far from the exact motion.", _error(found, runs)),
     )
+
+
+def _growth(found: Simulation) -> str:
+    forward, _ = growths(found.problem, found.trajectory.spacing_s, len(found.trajectory.y) - 1)
+    measured = "" if forward.measured is None else f", as computed here by {forward.measured:.6f}"
+    return f"Each step of forward Euler multiplies the amplitude by √(1 + ω²h²) = {forward.predicted:.6f}{measured}."
 
 
 def _both(
