@@ -22,6 +22,7 @@ from springmass.errors import USAGE, ProgramError
 from springmass.runs.run import Run
 from springmass.runs.table_lines import table_lines
 
+COLUMNS = ("run", "name", "value", "u", "unit")
 APART = 4.0  # differences beyond so many standard uncertainties are no chance
 TOO_SMALL = 3.0  # an uncertainty is too small if what is sure to be in it is so many times larger: one digit is printed
 POWERS = sorted(range(-6, 7), key=abs)[1:]
@@ -57,10 +58,10 @@ def read_reported(path: str | os.PathLike[str], runs: Sequence[Run]) -> list[Rep
     table = [(line, [cell.strip() for cell in cells], comma) for line, cells, comma in table_lines(Path(path), "table")]
     head = [name.lower() for name in table[0][1]] if table else []
     if not {"run", "name", "value"} <= set(head):
-        raise ProgramError(f"{path}: expected the columns run, name, value, u, unit, got {', '.join(head)}", USAGE)
+        raise ProgramError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {', '.join(head)}", USAGE)
     rows = []
     for line, cells, comma in table[1:]:
-        text = {"u": "", "unit": "", **dict(zip(head, cells, strict=False))}
+        text = dict.fromkeys(COLUMNS, "") | dict(zip(head, cells, strict=False))
         if any(cells):
             rows.append(_row(f"{path}, line {line}", text, runs, decimal_comma=comma))
     return rows
@@ -83,7 +84,8 @@ def _row(where: str, text: Mapping[str, str], runs: Sequence[Run], *, decimal_co
     if len(of) != 1:
         raise ProgramError(f"{where}: {text['run']!r} must be one of {', '.join(names)}, or its beginning", USAGE)
     name, unit = _NAMES.get(text["name"], text["name"]), text["unit"]
-    si = QUANTITIES[name].unit_in("m") if name in QUANTITIES else unit
+    (recorded,) = (run.loaded.track.unit for run in runs if run.name == of[0])
+    si = QUANTITIES[name].unit_in(recorded) if name in QUANTITIES else unit
     factor = 1.0
     if unit and unit != si and unit not in _SAME.get(si, ()):
         measure = time_unit(unit) if si == "s" else measure_of(unit)
@@ -150,7 +152,7 @@ class _Bench:
 
     def agrees(self, row: Reported, expected: Estimate, scale: float = 1.0, roughly: float = 0.0) -> bool:
         """Tell whether a printed value is within its u, or that of reading it off a graph, of an expected one."""
-        by_eye = STATED_ERROR_M / math.sqrt(2.0) if row.name == "amplitude" else 0.0
+        by_eye = STATED_ERROR_M / math.sqrt(2.0) if row.name == "amplitude" and expected.unit == "m" else 0.0
         if row.name in PERIODIC:
             by_eye = abs(PERIODIC[row.name] * expected.value) * READING_S / CYCLES / self.run["period"].value
         allowed = APART * math.hypot(max(row.u * scale, by_eye), expected.u) + row.rounding * scale

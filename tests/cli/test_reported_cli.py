@@ -97,6 +97,8 @@ def test_a_value_that_no_usual_mistake_explains_differs(
         ("bare,period,fast,,s", "value must be a number"),
         ("bare,period,0.7,-1,s", "u must be a number"),
         ("bare,period,0.7,,kg", "give s"),
+        ("bare,period", "value must be a number"),
+        ("bare,period,1e400,,s", "value must be a number"),
     ],
 )
 def test_a_table_that_cannot_be_read_names_the_line(
