@@ -247,6 +247,8 @@ def _quantity(table: str, key: str, given: object, where: str) -> Estimate:
         if unknown or "value" not in given:
             raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}")
         value, u = given["value"], given.get("u", 0.0)
+    elif isinstance(given, tuple) and len(given) == 2:  # as in Scene(bob_mass_kg=(0.2, 0.0001))
+        value, u = given
     number, spread = _number(value, name), _number(u, f"{name}, its u")
     if not quantity.least <= number <= quantity.greatest:
         raise SceneError(f"{name} must be {quantity.allowed()}, got {number:g}")

@@ -48,8 +48,7 @@ def motion_findings(cycles: Cycles, fitted: Fitted) -> Iterator[Found]:
         lost = {"periods": demodulated.lost, "all_periods": demodulated.lost + windows}
         yield Found("missing_samples", lost, "warning")
     if phase.backbone is not None:
-        start = fitted.damping.best.joint["A0"].value
-        shift = phase.backbone.value * start**2 / omega
+        start, shift = fitted.first_shift(phase.backbone.value)
         # In computed data drag itself shifts the frequency, by the square of the decrease of the amplitude in a radian.
         if abs(shift) > (fitted.damping.best.rate_at_start() / omega) ** 2:
             numbers = {"relative_shift": shift, "amplitude_m": start}

@@ -10,8 +10,10 @@ from pipeline.registry.found import Found
 from pipeline.results.effects import Effect
 
 
-def scene_findings(scene: Scene, effects: tuple[Effect, ...]) -> Iterator[Found]:
+def scene_findings(scene: Scene, effects: tuple[Effect, ...], *, constant: bool = True) -> Iterator[Found]:
     """Yield what is missing or implausible in a scene; the effects say whether the mass of the spring counts.
+
+    ``constant`` says whether a spring constant is derived: the angle of a pendulum gives none.
 
     >>> bare = Scene.from_mapping({"bob": {"mass_kg": 0.2}})
     >>> [found.code for found in scene_findings(bare, ())]
@@ -28,7 +30,7 @@ def scene_findings(scene: Scene, effects: tuple[Effect, ...]) -> Iterator[Found]
     if unusual := scene.unusual():
         said = [clause if clause.endswith("?") else f"{clause}." for clause in unusual]
         yield Found("scene_implausible", {"first": said[0], "more": len(said) - 1 or None, "all": " ".join(said)})
-    if scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
+    if constant and scene.bob_mass_kg is not None and scene.spring_mass_kg is None:
         yield Found("spring_mass_missing", {"heaviest": HEAVIEST_SHARE})
     if exact:
         yield Found("uncertainty_missing", {"inputs": ", ".join(exact)})

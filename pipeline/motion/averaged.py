@@ -45,6 +45,9 @@ FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference fro
 REJECTION = 1e-3  # probability that the chi-square test rejects residuals that are only noise
 
 
+LARGE_SHIFT = 0.02  # of the frequency between very small swings and the first amplitude, beyond which it is checked
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Phase:
     """Total phase against time: a straight line, a backbone if one shows, less the lag of a period's sinusoid."""
@@ -119,6 +122,22 @@ class Fitted:
     waveform: Waveform  # including the disturbances
     method: str  # "windows", "samples" or "equation"
     why: str  # what a method that failed, or the equation of motion, came to
+
+    def first_shift(self, kappa: float) -> tuple[float, float]:
+        """Return the first amplitude, and the shift of the frequency from very small swings to it, over the frequency.
+
+        A large shift that the first windows do not show to half its size does not grow with the square of the
+        amplitude; then it is theirs, at their mean amplitude.
+        """
+        windows, omega, small = self.demodulated, self.phase.angular_frequency.value, self.phase.small_swings
+        start = self.damping.best.joint["A0"].value
+        shift, last = kappa * start**2 / omega, max(2, windows.t.size // 20)
+        if small is None or abs(shift) < LARGE_SHIFT or last >= windows.t.size:
+            return start, shift
+        mean = float(np.mean(windows.amplitude[: last + 1]))
+        turned, passed = (float(each[last] - each[0]) for each in (windows.phase, windows.t))
+        shown = turned / passed / small.value - 1.0
+        return (mean, shown) if abs(shown) < 0.5 * abs(kappa) * mean**2 / omega else (start, shift)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

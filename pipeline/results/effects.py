@@ -22,7 +22,7 @@ from pipeline.bench.spring import GRAVITY_M_PER_S2, HEAVIEST_SHARE, oscillating_
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
-from pipeline.motion.averaged import Fitted, Phase, Rest
+from pipeline.motion.averaged import Fitted, Rest
 from pipeline.numerics.quantity import amount
 from pipeline.registry.effects import check_effect
 from pipeline.track import Track
@@ -66,7 +66,7 @@ def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
     return (
         *_masses(scene, counted),
         _disc_drag(scene, damping, omega.value, unit),
-        _backbone(phase, damping),
+        _backbone(fitted),
         _rest_drift(fitted.rest, fitted.demodulated.noise_m),
         *_modes(fitted.disturbances, unit),
         *((_buoyancy(scene, omega.value, 1.0, "m"), _speed_of_sound(scene, instrument)) if unit == "m" else ()),
@@ -183,12 +183,11 @@ def _disc_drag(scene: Scene, damping: Damping, omega: float, unit: str) -> Effec
     return Effect("disc_drag", predicted, measured, "1/s", len(damping.best.law.parameters) > 1, why)
 
 
-def _backbone(phase: Phase, damping: Damping) -> Effect:
-    name = "amplitude_dependent_frequency"
-    if phase.backbone is None:
+def _backbone(fitted: Fitted) -> Effect:
+    name, backbone = "amplitude_dependent_frequency", fitted.phase.backbone
+    if backbone is None:
         return Effect(name, None, None, "1", False, "a constant frequency describes the phase: an ideal spring's")
-    start = damping.best.joint["A0"].value
-    shift = phase.backbone.value * start**2 / phase.angular_frequency.value
+    _, shift = fitted.first_shift(backbone.value)
     why = (
         f"the phase bends: the frequency shifts by {shift:.2g} of itself from rest to the first amplitude, "
         "with the square of the amplitude, far beyond its uncertainty"
