@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.damping.laws import words_of
+from pipeline.track import UNUSABLE
 from springmass.report.budgets import budgets_of
+from springmass.report.trust import trust_of
 from springmass.runs.rows import is_about
 from springmass.typeset import kept, pretty_number, unbroken
 
@@ -55,7 +57,8 @@ def damping_sentence(analysis: Analysis) -> str:
         return ""
     damping, quoted = analysis.motion.damping, analysis.motion.derived.quoted
     chosen = words_of(damping.best.law)
-    span = f"{float(analysis.track.t[-1] - analysis.track.t[0]):.0f} s"
+    used = analysis.track.t[(analysis.flags & UNUSABLE) == 0]
+    span = f"{float(used.max() - used.min()):.0f} s"
     if damping.best.rejected and damping.by_statement:
         return (
             f"The recording contradicts the stated law, {chosen}; state no law, or quote the amplitude against time "
@@ -89,6 +92,9 @@ def damping_sentence(analysis: Analysis) -> str:
         if more > 1:
             possible = [*possible[:NAMED_LAWS], f"{more} more laws"]
         ruled_out = f"{listed(possible)} cannot be ruled out in {span}"
+        rate = trust_of(analysis).get("damping_rate")
+        if rate is None or rate.grade == "do not quote":
+            return f"{text}; {ruled_out}."
         return f"{text}; {ruled_out}. The damping rate may be quoted: it allows for all of them."
     others, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
     if not others:

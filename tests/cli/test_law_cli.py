@@ -6,6 +6,7 @@ import csv
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import springmass
@@ -78,3 +79,15 @@ def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Callable[..., Done], r
     wrong = cli("batch", run, other, "--runs", table, "-o", folder, "--jobs", "1", "--reports", "0")
     assert wrong.code == 2
     assert "law must be one of" in wrong.complaint
+
+
+def test_a_damping_rate_that_is_not_to_be_quoted_is_not_recommended(cli: Callable[..., Done], tmp_path: Path) -> None:
+    """Table 1 and the sentence on damping agree about it, and the sentence counts the seconds that were analysed."""
+    t, rng = np.arange(1400) / 100, np.random.default_rng(1)
+    y = 0.2 + np.where(t < 4.0, 0.1, 0.02 * np.cos(8.0 * t) * np.exp(-5e-4 * t)) + 1e-3 * rng.standard_normal(t.size)
+    path = tmp_path / "weak.csv"
+    path.write_text("time (s),distance (m)\n" + "".join(f"{a:.2f},{b:.5f}\n" for a, b in zip(t, y, strict=True)))
+    out = " ".join(cli("analyse", path, "--no-report").out.split())
+    assert "lambda" in out.partition("Do not quote: ")[2].partition(". ")[0]
+    assert "may be quoted" not in out
+    assert "in 7 s" in out  # all that is left when it moves freely
