@@ -66,7 +66,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     if track.unit == "m" and track.sigma_m is None and scene.sensor_sigma_m is not None:
         track = replace(track, sigma_m=scene.sensor_sigma_m.value)
     samples = condition(track)
-    part = free_part(samples, options.early, options.late)
+    part = free_part(samples)
     if isinstance(part, NoOscillation):
         return without_period(samples, part, scene, options)
     samples, windows = _uncut(part)

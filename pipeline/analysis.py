@@ -14,7 +14,6 @@ from pipeline.motion.overdamped import Overdamped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
-from pipeline.registry.quantities import check_quantity
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
 from pipeline.results.kinematics import Smoothed, kinematics
@@ -62,10 +61,6 @@ class Analysis:
     effects: tuple[Effect, ...]
     findings: tuple[Finding, ...]  # the most severe first
     estimates: Mapping[str, Estimate]  # by names in :data:`pipeline.registry.quantities.QUANTITIES`
-
-    def __post_init__(self) -> None:
-        for name in self.estimates:
-            check_quantity(name)
 
     @property
     def flags(self) -> U8:

@@ -26,10 +26,6 @@ class Options:
     rows: Literal["windows", "samples"] = (
         "windows"  # whether amplitudes and phases of periods, or all samples are fitted
     )
-    # Shares of the samples. If the bob stops before ``early``, its rest is left out; if it stops before ``late``, only
-    # if the whole recording shows no oscillation.
-    early: float = 0.25
-    late: float = 0.75
 
     @property
     def known_law(self) -> str | Law | None:

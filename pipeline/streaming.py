@@ -44,19 +44,10 @@ class MotionAccumulator:
     milliseconds, so one value a second uses less than a hundredth of a core.
     """
 
-    def __init__(
-        self,
-        rate_hz: float,
-        window_s: float = 10.0,
-        options: Options | None = None,
-        *,
-        quantity: str = "length",
-        unit: str = "m",
-    ) -> None:
+    def __init__(self, rate_hz: float, window_s: float = 10.0, options: Options | None = None) -> None:
         if not (rate_hz > 0 and window_s > 0):
             raise ValueError(f"rate_hz and window_s must be positive, got {rate_hz} and {window_s}")
-        self._rate_hz = rate_hz
-        self._options, self._quantity, self._unit = options, quantity, unit
+        self._rate_hz, self._options = rate_hz, options
         self._room = max(int(rate_hz * window_s), 16)
         self.clear()
 
@@ -87,15 +78,8 @@ class MotionAccumulator:
     def track(self) -> Track:
         """Return the stored samples as a track, as a batch analysis would get them."""
         held = slice(max(self._stop - self._room, 0), self._stop)
-        return Track(
-            self._t[held].copy(),
-            self._y[held].copy(),
-            self._flags[held].copy(),
-            self._rate_hz,
-            clock="device",
-            quantity=self._quantity,
-            unit=self._unit,
-        )
+        t, y, flags = self._t[held].copy(), self._y[held].copy(), self._flags[held].copy()
+        return Track(t, y, flags, self._rate_hz, clock="device")
 
     def value(self) -> LiveMotion | NotYet:
         """Return the motion of the stored samples, or the reason why no value is available."""

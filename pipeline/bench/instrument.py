@@ -35,7 +35,7 @@ class Instrument:
     clock_refused: bool = False
 
     @classmethod
-    def of(cls, track: Track, *, u_crystal: float = U_CRYSTAL) -> Instrument:
+    def of(cls, track: Track) -> Instrument:
         """Return the clock and scale that a track states for its sensor.
 
         A clock that was not compared with another is known only to its crystal's specification. A comparison of the
@@ -57,7 +57,7 @@ class Instrument:
         >>> print(Instrument.of(track).clock_rate)
         1.000000 +- 0.000029
         """
-        for name, u in (("u_scale", track.u_scale), ("u_offset_m", track.u_offset_m), ("u_crystal", u_crystal)):
+        for name, u in (("u_scale", track.u_scale), ("u_offset_m", track.u_offset_m)):
             if not (math.isfinite(u) and u >= 0):
                 raise TrackError(
                     f"{name} must be finite and not negative, got {u:g}; leave it out where it is not known"
@@ -65,17 +65,17 @@ class Instrument:
         for name, limit in (("clock_limit", track.clock_limit), ("compared_s", track.compared_s)):
             if limit is not None and not (math.isfinite(limit) and limit >= 0):
                 raise TrackError(f"{name} must be finite and not negative, got {limit:g}; leave it out")
-        rate, words, refused = _rate(track, u_crystal)
+        rate, words, refused = _rate(track)
         sound, sonic = track.speed_of_sound_m_per_s, track.sonic or track.speed_of_sound_m_per_s is not None
         return cls(track.clock, rate, words, sound, track.u_scale, track.u_offset_m, sonic, refused)
 
 
-def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
+def _rate(track: Track) -> tuple[Estimate, str, bool]:
     """Return the factor on every frequency, its origin, and whether the comparison of the clocks was rejected."""
-    spec = f"a crystal's {u_crystal * 1e6:.0f} ppm"
+    spec = f"a crystal's {U_CRYSTAL * 1e6:.0f} ppm"
     limit = math.inf if track.clock_limit is None else track.clock_limit + HOST_LIMIT
     if track.rate_error is None:
-        return _uncompared(track, u_crystal, limit, spec)
+        return _uncompared(track, limit, spec)
     rate, u = track.rate_error, track.u_rate_error
     if u is None or not (math.isfinite(rate) and math.isfinite(u) and u >= 0):
         raise TrackError(
@@ -89,8 +89,8 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
             f"{text}, and {limit * 1e6:.0f} ppm are all that the two can be apart: nothing is corrected, and "
             f"{half * 1e6:.0f} ppm stand in every frequency's uncertainty as the half-width of a rectangle"
         )
-        return Estimate(1.0, math.hypot(u_crystal, half / math.sqrt(3.0))), words, True
-    if abs(rate) > CONTRADICTION * math.hypot(u, math.sqrt(2.0) * u_crystal):
+        return Estimate(1.0, math.hypot(U_CRYSTAL, half / math.sqrt(3.0))), words, True
+    if abs(rate) > CONTRADICTION * math.hypot(u, math.sqrt(2.0) * U_CRYSTAL):
         span_s = float(track.t[-1] - track.t[0])
         apart_s = abs(rate) * (span_s if track.compared_s is None else min(track.compared_s, span_s))
         if apart_s < HOST_DELAY_S:
@@ -98,18 +98,18 @@ def _rate(track: Track, u_crystal: float) -> tuple[Estimate, str, bool]:
                 f"{text}, {apart_s * 1e3:.2g} ms in all, which the host's delays may be too: nothing is corrected, and "
                 "the difference stands in every frequency's uncertainty"
             )
-            return Estimate(1.0, math.hypot(u_crystal, rate / math.sqrt(3.0))), words, False
+            return Estimate(1.0, math.hypot(U_CRYSTAL, rate / math.sqrt(3.0))), words, False
         words = f"{text}, more than two crystals can differ: frequencies are corrected to the host's"
-        return Estimate(1.0 + rate, (1.0 + rate) * math.hypot(u, u_crystal)), words, False
+        return Estimate(1.0 + rate, (1.0 + rate) * math.hypot(u, U_CRYSTAL)), words, False
     if track.held_samples:
-        u_all = math.hypot(u_crystal, min(u, limit / math.sqrt(3.0), 1.0))
+        u_all = math.hypot(U_CRYSTAL, min(u, limit / math.sqrt(3.0), 1.0))
         words = f"{text}, as two crystals may: {u_all * 1e6:.0f} ppm stand in every frequency's uncertainty"
         return Estimate(1.0, u_all), words, False
     words = f"{text}, as two crystals may: {spec} stand in every frequency's uncertainty"
-    return Estimate(1.0, u_crystal), words, False
+    return Estimate(1.0, U_CRYSTAL), words, False
 
 
-def _uncompared(track: Track, u_crystal: float, limit: float, spec: str) -> tuple[Estimate, str, bool]:
+def _uncompared(track: Track, limit: float, spec: str) -> tuple[Estimate, str, bool]:
     """Return factor, origin and rejection for a clock without a comparison; delays may have prevented one."""
     if track.clock == "device" and track.held_samples:
         half = min(limit, 1.0)
@@ -118,7 +118,7 @@ def _uncompared(track: Track, u_crystal: float, limit: float, spec: str) -> tupl
             f"{half * 1e6:.0f} ppm that they may be apart stand in every frequency's uncertainty as the half-width of "
             "a rectangle"
         )
-        return Estimate(1.0, math.hypot(u_crystal, half / math.sqrt(3.0))), words, True
+        return Estimate(1.0, math.hypot(U_CRYSTAL, half / math.sqrt(3.0))), words, True
     source = {"nominal": "are row numbers over the nominal rate", "host": "are the host's"}
     times = source.get(track.clock, "were measured by the device")
-    return Estimate(1.0, u_crystal), f"times {times}: {spec} stand in every frequency's uncertainty", False
+    return Estimate(1.0, U_CRYSTAL), f"times {times}: {spec} stand in every frequency's uncertainty", False

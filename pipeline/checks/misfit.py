@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.registry.quantities import check_input
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:
@@ -17,6 +15,3 @@ class Misfit:
     phase_rad: float = 0.0
     damping_rate: float = 0.0
     clock: float = 0.0  # relative, of all quantities measured by the times of the record
-
-    def __post_init__(self) -> None:
-        check_input(self.name)

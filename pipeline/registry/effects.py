@@ -20,9 +20,3 @@ EFFECTS: Mapping[str, str] = {
     "temperature": "air temperature",
     "clock_rate": "rate of the clock",
 }
-
-
-def check_effect(name: str) -> None:
-    """Raise an error if the name of an effect is not registered."""
-    if name not in EFFECTS:
-        raise ValueError(f"effect {name!r} is not registered in pipeline.registry.effects")

@@ -115,15 +115,3 @@ INPUTS: Mapping[str, Input] = {
     "implausible_distance": Input("distances that no sensor measures"),
 }
 """All inputs of :mod:`pipeline.results.derive` by name."""
-
-
-def check_quantity(name: str) -> None:
-    """Raise an error if the name of an estimate is not registered."""
-    if name not in QUANTITIES:
-        raise ValueError(f"estimate {name!r} is not registered in pipeline.registry.quantities")
-
-
-def check_input(name: str) -> None:
-    """Raise an error if the name of a budget input is not registered."""
-    if name not in INPUTS:
-        raise ValueError(f"budget input {name!r} is not registered in pipeline.registry.quantities")

@@ -15,7 +15,6 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
-from pipeline.registry.quantities import check_input
 
 Kind = Literal["A", "B"]
 
@@ -151,7 +150,6 @@ class Inputs:
         return Budget(quantity, Estimate(float(x.nominal_value), math.sqrt(whole), unit, x), tuple(lines))
 
     def _register(self, name: str, kind: Kind, dof: float = math.inf) -> None:
-        check_input(name)
         if name in self._kinds:
             raise ValueError(f"an input {name!r} is there already")
         self._kinds[name], self._dofs[name] = kind, max(dof, 1.0)

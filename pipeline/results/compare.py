@@ -22,6 +22,7 @@ NEARER = 0.01  # maximum tension with two runs exchanged, over that without: cha
 SOLVED = 0.5  # maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it
 LARGEST_SPRING = 0.6  # maximum mass of a spring, over the lightest bob: a heavier spring is noticed and weighed
 GAUSS_NEWTON_STEPS = 30
+PROBABILITY = 0.997  # with which runs of one spring agree
 SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those farthest from the mean
 
 
@@ -88,7 +89,6 @@ def compare_springs(
     *,
     spring_mass_kg: Estimate | None = None,
     mass_correlation: float = 0.0,
-    probability: float = 0.997,
 ) -> Comparison:
     """Test whether runs made with one spring give one spring constant.
 
@@ -122,7 +122,7 @@ def compare_springs(
         raise ValueError(f"mass_correlation must lie in 0 to 1, got {mass_correlation}")
     _check(runs, spring_mass_kg)
     masses = [run.mass_kg for run in runs]
-    fit = _fit(runs, masses, spring_mass_kg, mass_correlation, probability)
+    fit = _fit(runs, masses, spring_mass_kg, mass_correlation)
     exchanged: tuple[str, ...] = ()
     best = fit
     if not fit.agree:
@@ -131,7 +131,7 @@ def compare_springs(
         for i, j in itertools.combinations(farthest, 2):
             trial = masses.copy()
             trial[i], trial[j] = trial[j], trial[i]
-            other = _fit(runs, trial, spring_mass_kg, mass_correlation, probability)
+            other = _fit(runs, trial, spring_mass_kg, mass_correlation)
             if other.tension <= max(nearest, 1.0) and (not exchanged or other.tension < best.tension):
                 best, exchanged = other, (runs[i].name, runs[j].name)
     return Comparison(
@@ -190,7 +190,6 @@ def _fit(
     masses: Sequence[Estimate],
     stated: Estimate | None,
     mass_correlation: float,
-    probability: float,
 ) -> _Fit:
     loads = np.array([mass.value for mass in masses])
     spring = _known_spring(masses, stated)
@@ -209,12 +208,12 @@ def _fit(
     dof = len(runs) - (2 if solved else 1)
     if stated is not None and stated.u > 0:
         chi2 += ((line.spring.value - stated.value) / stated.u) ** 2
-    tension = chi2 / chi2_quantile(probability, dof) if dof else 0.0
+    tension = chi2 / chi2_quantile(PROBABILITY, dof) if dof else 0.0
     if solved:
         # The mass of a spring cannot be negative, and a heavy spring would have been weighed.
         heaviest = LARGEST_SPRING * float(loads.min())
         away = max(-found.value, found.value - heaviest, 0.0) / max(found.u, 1e-12 * heaviest)
-        tension = max(tension, away**2 / chi2_quantile(probability, 1))
+        tension = max(tension, away**2 / chi2_quantile(PROBABILITY, 1))
     # With a stated spring, each constant is that of the run's own analysis. Without a usable mass it excludes the
     # spring.
     shown = stated or (found if solved and tension <= 1.0 else Estimate(0.0, 0.0, "kg"))

@@ -24,7 +24,6 @@ from pipeline.damping.select import Damping
 from pipeline.dynamics.problem import Problem
 from pipeline.motion.averaged import Fitted, Rest
 from pipeline.numerics.quantity import amount
-from pipeline.registry.effects import check_effect
 from pipeline.track import Track
 from pipeline.windows.disturbances import Disturbances
 
@@ -44,9 +43,6 @@ class Effect:
     unit: str
     included: bool
     why: str
-
-    def __post_init__(self) -> None:
-        check_effect(self.name)
 
 
 def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:

@@ -19,6 +19,9 @@ from pipeline.windows.sinusoid import check_sinusoid
 
 MOST_PARTS = 4  # maximum number of times that a freely moving part is sought within the part found before
 LEAST_HALVED = 128  # minimum number of samples of which the later half may show a motion
+# Shares of the samples: if the bob stops before the first, its rest is left out; before the second, only if the whole
+# recording shows no oscillation.
+EARLY, LATE = 0.25, 0.75
 CLEAR = 0.1  # maximum noise over the largest amplitude of a motion that only the later half shows
 
 
@@ -39,19 +42,19 @@ class FreePart:
     lost: LostRows | None = None
 
 
-def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoOscillation:
+def free_part(samples: Conditioned) -> FreePart | NoOscillation:
     """Find the part that oscillates freely.
 
     The time before the trigger, the time long after the stop and all but one free part are left out. The samples are
     conditioned again after each step, because the part left out may have hidden the noise of the rest.
     """
     segments: Segments | None = None
-    for outside in (before_trigger(samples), long_after_stop(samples, early)):
+    for outside in (before_trigger(samples), long_after_stop(samples, EARLY)):
         if outside is not None:
             samples, segments = condition(outside.flagged(samples.track)), outside.within(segments)
     if (part := longest_part(samples)) is not None:
         samples, segments = condition(part.flagged(samples.track)), part.within(segments)
-    cycles, stopped = _cycles(samples, early, late)
+    cycles, stopped = _cycles(samples)
     if isinstance(cycles, NoOscillation):
         # A long time in the hand hides the motion after it, which the later half may show.
         t = samples.track.t[samples.used]
@@ -60,7 +63,7 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
         half_s = float(np.median(t))
         later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
         trial = condition(later.flagged(samples.track))
-        trimmed, stopped = _cycles(trial, late, late)
+        trimmed, stopped = _cycles(trial, LATE)
         if isinstance(trimmed, NoOscillation):
             return cycles
         windows = demodulate(trial, trimmed)
@@ -71,7 +74,7 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
     windows = demodulate(samples, cycles)
     if (lost := find_lost_rows(samples, windows)) is not None:
         samples = lost.samples
-        cycles, stopped = _cycles(samples, early, late)
+        cycles, stopped = _cycles(samples)
         if isinstance(cycles, NoOscillation):
             return cycles
         windows = demodulate(samples, cycles)
@@ -86,7 +89,7 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
                 cycles, windows = followed, along
                 break
         shorter = condition(outside.flagged(samples.track))
-        trimmed, stops = _cycles(shorter, early, late)
+        trimmed, stops = _cycles(shorter)
         if isinstance(trimmed, NoOscillation):
             break
         samples, segments, cycles, stopped = shorter, outside.within(segments), trimmed, stops
@@ -96,10 +99,10 @@ def free_part(samples: Conditioned, early: float, late: float) -> FreePart | NoO
     return FreePart(samples, segments, cycles, windows, stopped, lost)
 
 
-def _cycles(samples: Conditioned, early: float, late: float) -> tuple[Cycles | NoOscillation, bool]:
+def _cycles(samples: Conditioned, early: float = EARLY) -> tuple[Cycles | NoOscillation, bool]:
     """Return the cycles and whether the bob stops before a share of the samples; if so, those of the moving part."""
     cycles = find_cycles(samples)
-    moving = moving_part(samples, late if isinstance(cycles, NoOscillation) else early)
+    moving = moving_part(samples, LATE if isinstance(cycles, NoOscillation) else early)
     if moving is None or isinstance(trimmed := find_cycles(moving), NoOscillation):
         return cycles, False
     return trimmed, True
