@@ -19,7 +19,7 @@ from acquisition.live.serial_port import SerialPort
 from acquisition.replay import Replay
 from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import UNREADABLE, USAGE, ProgramError
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import made_now, save_run
@@ -106,7 +106,11 @@ def source(
         stated = scene_from(scene)
         loaded = load(Path(what), ReadOptions.of(how))
         return _Played(loaded if stated is None else replace(loaded, scene=stated.to_mapping()), speed)
-    return _Live(os.fspath(what), sensor, baud, scene_from(scene))
+    address = os.fspath(what)
+    if not (address.startswith("/dev/") or "://" in address or address.upper().startswith("COM")):
+        ports = 'a port is named like "/dev/ttyUSB0", "COM3" or "socket://HOST:PORT"'
+        raise ProgramError(f"{address}: there is no such file; check the name, {ports}", UNREADABLE)
+    return _Live(address, sensor, baud, scene_from(scene))
 
 
 def _simulated(scene: Scene) -> Loaded:

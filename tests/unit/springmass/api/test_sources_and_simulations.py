@@ -37,6 +37,8 @@ def test_a_replay_is_kept_losslessly(tmp_path: Path) -> None:
     again = sm.analyse(tmp_path / "again.h5")
     assert again.result["estimates"] == whole.result["estimates"]
     assert again.loaded.originals == whole.loaded.originals
+    with pytest.raises(sm.Error, match="no such file"):
+        sm.source("missing.txt")
     with sm.source(path) as bench, pytest.raises(sm.Error, match="exists"):
         bench.record(tmp_path / "again.h5")
 
