@@ -119,6 +119,8 @@ def _columns(source: Any) -> tuple[_Column, _Column, Any]:
         return _Column(_index_of(source)), _Column(source), None
     elif isinstance(source, list | tuple) and len(source) == 2:
         return _Column(source[0]), _Column(source[1]), None
+    if coords := ", ".join(map(str, getattr(source, "coords", ()))):
+        raise TrackError(f"its times were expected as a coordinate named time, got {coords}; rename the one with times")
     raise TrackError(f"{EXPECTED}, got {type(source).__name__}")
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import springmass as sm
 
@@ -28,6 +29,7 @@ WRONG: dict[str, Callable[[Path], Any]] = {
     "an unstable step": lambda _: sm.simulate(BENCH, T, method="forward-euler"),
     "too few samples": lambda _: sm.analyse((T[:3], T[:3])),
     "times that run backwards": lambda _: sm.analyse((T[::-1], RUN[1])),
+    "times under another name": lambda _: sm.analyse(xr.DataArray(RUN[1], {"t": RUN[0]}, ["t"])),
     "no array": lambda _: sm.analyse(3),  # type: ignore[arg-type]
     "a range without samples": lambda _: sm.analyse(RUN, from_s=99.0),
     "an unknown law": lambda _: sm.analyse(RUN, law="cubic"),
