@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -101,11 +101,14 @@ def source(
     0.758516(22) s
     """
     if isinstance(what, Scene | Mapping):
-        return _Played(_simulated(what if isinstance(what, Scene) else Scene.from_mapping(what)), speed)
+        return _bench(what if isinstance(what, Scene) else Scene.from_mapping(what), speed)
     if os.path.isfile(what):
         stated = scene_from(scene)
         loaded = load(Path(what), ReadOptions.of(how))
-        return _Played(loaded if stated is None else replace(loaded, scene=stated.to_mapping()), speed)
+        loaded = loaded if stated is None else replace(loaded, scene=stated.to_mapping())
+        pace = speed if math.isfinite(speed) else None
+        replay = Replay(loaded.samples_in_blocks(), _clock(speed), info=loaded.info, speed=pace)
+        return _Played(replace(loaded, info=replay.info), replay)
     address = os.fspath(what)
     if not (address.startswith("/dev/") or "://" in address or address.upper().startswith("COM")):
         ports = 'a port is named like "/dev/ttyUSB0", "COM3" or "socket://HOST:PORT"'
@@ -113,12 +116,17 @@ def source(
     return _Live(address, sensor, baud, scene_from(scene))
 
 
-def _simulated(scene: Scene) -> Loaded:
-    """Return a recording without samples of a simulated bench, whose samples are made as they are wanted."""
+def _clock(speed: float) -> Clock:
+    return SystemClock() if math.isfinite(speed) else VirtualClock()
+
+
+def _bench(scene: Scene, speed: float) -> _Played:
+    """Return a simulated bench, whose samples are made as they are wanted."""
     sigma_m = SIGMA_M if scene.sensor_sigma_m is None else scene.sensor_sigma_m.value
     info, nothing = SourceInfo("simulated", "scene", RATE_HZ, sigma_m), concatenate(())
-    track = to_track(nothing, info)
-    return Loaded(Path("scene"), "memory", info, "distance", "", nothing, track, scene=scene.to_mapping())
+    track, tables = to_track(nothing, info), scene.to_mapping()
+    loaded = Loaded(Path("scene"), "memory", info, "distance", "", nothing, track, scene=tables)
+    return _Played(loaded, _swing(scene, sigma_m, _clock(speed), speed))
 
 
 def _swing(scene: Scene, sigma_m: float, clock: Clock, speed: float) -> Iterator[Block]:
@@ -127,25 +135,16 @@ def _swing(scene: Scene, sigma_m: float, clock: Clock, speed: float) -> Iterator
     for first in count(0, BLOCK):
         t = np.arange(first, first + BLOCK) / RATE_HZ
         distance = np.array([position(each) for each in t]) + sigma_m * rng.standard_normal(BLOCK)
-        if math.isfinite(speed):
-            clock.sleep_until_ns(began_ns + int(1e9 * t[-1] / speed))
+        clock.sleep_until_ns(began_ns + int(1e9 * t[-1] / speed))
         yield Block(first, t, distance, np.zeros(BLOCK, np.uint8))
 
 
 class _Played:
-    """A recording or a simulated bench, at any speed."""
+    """A recording or a simulated bench; what is recorded is kept in memory until the end."""
 
-    def __init__(self, loaded: Loaded, speed: float) -> None:
-        clock: Clock = SystemClock() if math.isfinite(speed) else VirtualClock()
-        self._loaded, self._path, self._kept = loaded, Path(), list[Block]()
-        if len(loaded.samples):
-            pace = speed if math.isfinite(speed) else None
-            replay = Replay(loaded.samples_in_blocks(), clock, info=loaded.info, speed=pace)
-            self.info, self._blocks = replay.info, iter(replay)
-        else:
-            self.info = loaded.info
-            scene = Scene.from_mapping(loaded.scene or {})
-            self._blocks = _swing(scene, loaded.info.sigma_m or 0.0, clock, speed)
+    def __init__(self, loaded: Loaded, blocks: Iterable[Block]) -> None:
+        self.info = loaded.info
+        self._loaded, self._blocks, self._path, self._kept = loaded, blocks, Path(), list[Block]()
 
     def record(self, path: str | os.PathLike[str]) -> None:
         demand_new(Path(path), 1)
@@ -156,7 +155,7 @@ class _Played:
 
     def __exit__(self, *error: object) -> None:
         if self._path != Path():
-            save_run(self._path, replace(self._loaded, info=self.info), blocks=self._kept)
+            save_run(self._path, self._loaded, blocks=self._kept)
 
     def __iter__(self) -> Iterator[Block]:
         for block in self._blocks:
@@ -200,7 +199,8 @@ class _Live:
         self._port.close()
         if self._recorder is not None:
             self._recorder.close()
-            recover(self._recorder.contents(), self._path, remove_log=True, provenance=made_now())
+            whole = not self._recorder.status.dropped_records
+            recover(self._recorder.contents(), self._path, remove_log=whole, provenance=made_now())
 
     def __iter__(self) -> Iterator[Block]:
         while not self._session.lost:

@@ -125,7 +125,7 @@ def _run(source: Any, scene: Any, function: str, options: Mapping[str, Any]) -> 
     try:
         return Run.of(source, scene, how)
     except NeedsAnswer as error:
-        raise error.with_remedy(for_python(error.question, function, how.stated())) from None
+        raise error.with_remedy(for_python(error.question, function, how.given())) from None
 
 
 def compare(

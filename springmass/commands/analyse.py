@@ -195,7 +195,7 @@ def _failed(failed: Failed) -> int:
     if failed.question is not None:
         path = f"./{task.path}" if task.path.startswith("-") else task.path
         velocity = () if task.how.velocity is None else ("--velocity", str(task.how.velocity))
-        given = {name: value for name, value in task.how.stated().items() if name != "velocity"}
+        given = {name: value for name, value in task.how.given().items() if name != "velocity"}
         words = ["springmass", "analyse", path, *velocity]
         message = str(failed.question.with_remedy(for_command(failed.question.question, words, given)))
     complain(message)

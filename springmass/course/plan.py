@@ -118,7 +118,7 @@ def plan(
     jobs = []
     for file, line, values in joined:
         velocity = {} if file.velocity is None else {"velocity": file.velocity}
-        stated = how.stated() | velocity | {name: values[name] for name in ANSWERS if name in values}
+        stated = how.given() | velocity | {name: values[name] for name in ANSWERS if name in values}
         of_run = _scene(values, shared, f"{runs_csv}, line {line}")
         of_tags = {name: values[name] for name in tags if name in values}
         jobs.append(Job(file.path, os.getcwd(), stated, of_run, of_tags))

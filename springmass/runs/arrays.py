@@ -54,10 +54,9 @@ def loaded_of(source: Any, options: ReadOptions) -> Loaded:
     return Loaded(Path(), "memory", SourceInfo(*info), "", "", samples, track)
 
 
-def again(loaded: Loaded, options: ReadOptions) -> Loaded:
-    """Return a recording that was read before; refuse options of reading, which would have no effect."""
+def refuse_reading(options: ReadOptions) -> None:
+    """Refuse options of reading for a run that was read before, on which they would have no effect."""
     _demand(options, _OF_RUNS, "run that is read already")
-    return loaded
 
 
 def _demand(options: ReadOptions, allowed: Collection[str], what: str) -> None:
@@ -77,7 +76,7 @@ def _stated(source: Any, about: Mapping[str, Any], samples: Block) -> Loaded | N
     if path.is_file() and kind_of(path) == "run":
         loaded = load(path)
         # Samples at the same times have the same velocities and times of arrival.
-        if len(samples) == len(loaded.samples):
+        if np.array_equal(samples.t, loaded.samples.t, equal_nan=True):
             samples = replace(samples, velocity=loaded.samples.velocity, host_ns=loaded.samples.host_ns)
         return replace(loaded, samples=samples, track=_track(samples, loaded.info, vars(loaded)))
     return None

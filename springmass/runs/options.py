@@ -76,8 +76,8 @@ class ReadOptions:
     ] = None
 
     def given(self) -> dict[str, Any]:
-        """Return the values of all given options by name."""
-        return {each.name: value for each in fields(self) if (value := getattr(self, each.name)) not in (None, False)}
+        """Return the values of all options that are not the default, by name."""
+        return {each.name: value for each in fields(self) if (value := getattr(self, each.name)) != each.default}
 
     @classmethod
     def of(cls, answers: Mapping[str, Any]) -> Self:
@@ -131,15 +131,10 @@ class How(ReadOptions):
             chosen = replace(chosen, stated=self.law)
         return chosen
 
-    def stated(self) -> dict[str, Any]:
-        """Return every option that is not the default."""
-        return {each.name: value for each in fields(self) if (value := getattr(self, each.name)) != each.default}
-
     @property
     def parameters(self) -> dict[str, Any]:
-        """Every option that was given, and the accuracy, as JSON has them."""
-        names = [each.name for each in fields(self) if each.name != "laws"]
-        stated = {name: getattr(self, name) for name in names}
+        """Every option, as JSON has them."""
+        stated = {each.name: getattr(self, each.name) for each in fields(self)}
         laws = None if self.laws is None else [getattr(law, "name", law) for law in _laws(self.laws)]
         return {**stated, "law": getattr(self.law, "name", self.law), "laws": laws}
 

@@ -19,13 +19,14 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic, classic
 from pipeline.track import Track
 from springmass.errors import detail
-from springmass.runs.arrays import again, loaded_of
+from springmass.runs.arrays import loaded_of, refuse_reading
 from springmass.runs.estimates import Value
 from springmass.runs.frames import estimates_frame, run_dataset, samples_dataset
 from springmass.runs.json_results import result_of, with_traps
 from springmass.runs.loading import Loaded, load, within
 from springmass.runs.options import HOW, How
 from springmass.runs.outputs import now_utc, save_run
+from springmass.runs.rows import TableRow, table_rows
 from springmass.runs.scenes import scene_from, stated_keys
 from springmass.runs.showing import html_summary, text_summary
 
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
-
-    from springmass.runs.rows import TableRow
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,9 +83,10 @@ class Run(Mapping[str, Value]):
         if isinstance(source, str | os.PathLike):
             loaded = load(Path(source), how, scene_given=scene is not None)
         elif isinstance(source, Run):
-            loaded = within(again(source.loaded, how), how)
+            refuse_reading(how)
+            loaded = within(source.loaded, how)
             scene, name = source.stated if scene is None else scene, name or source.name
-            how = replace(source.how, **how.stated())
+            how = replace(source.how, **how.given())
         else:
             loaded = within(loaded_of(source, how), how)
         return cls(loaded, scene_from(scene), how, name or loaded.path.name)
@@ -151,8 +151,6 @@ class Run(Mapping[str, Value]):
     @property
     def rows(self) -> tuple[TableRow, ...]:
         """The lines of Table 1."""
-        from springmass.runs.rows import table_rows
-
         return table_rows([self.analysis])
 
     def _numbers(self) -> Mapping[str, Estimate]:

@@ -34,7 +34,7 @@ def demand_new(path: Path, sensors: int) -> None:
         if (size := len(os.fsencode(there.name))) > longest:
             why = f"expected a name of at most {longest} bytes, got {size}; choose a shorter one"
         elif there.is_symlink() and not there.exists():
-            why = "a link to nothing stands there; remove it or choose another name"
+            why = "it is a link to a file that does not exist; remove it or choose another name"
         elif there.exists():
             why = "exists already, and a recording never replaces one; choose another name"
         else:

@@ -199,7 +199,7 @@ def test_a_wrong_table_is_one_line(runs, cli, table, named):
 
 
 def test_two_passes_do_not_share_a_folder(runs, cli):
-    """The second pass is refused while the first one runs, and told which process that is."""
+    """The second pass is refused while the first one runs; the message names the process of the first."""
     cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
     before = contents(Path("out"))
     holder = Path("out/course.lock").read_text()

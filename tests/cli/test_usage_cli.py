@@ -48,24 +48,6 @@ def test_a_help_fits_a_screen_or_is_grouped(cli: Cli, monkeypatch: pytest.Monkey
     assert text.count("\n") <= 24 or max(group.count("\n") for group in groups) <= 30
 
 
-@pytest.mark.parametrize(
-    ("line", "near"),
-    [
-        ((), "--help"),
-        (("analyze", "x.txt"), "analyse"),
-        (("analyse", "x.txt", "--accuracy", "bst"), "best"),
-        (("analyse", "x.txt", "--chanel", "y"), "--channel"),
-        (("analyse", "x.txt", "--rate-hz", "100", "--rate-hz", "50"), "--rate-hz"),
-        (("batch", "x.txt", "-o", "course", "--jobs", "1.5"), "--jobs"),
-    ],
-)
-def test_a_mistyped_line_is_answered_with_what_was_meant(cli: Cli, line: tuple[str, ...], near: str) -> None:
-    """One line on stderr and exit code 2; no value of an option is forgotten in silence."""
-    done = cli(*line)
-    assert (done.code, done.out) == (2, "")
-    assert near in done.complaint
-
-
 def test_every_finding_is_explained(cli: Cli) -> None:
     """The list names codes that ``explain`` knows, each with a short example; a wrong code gets the right one."""
     (listed,) = cli("explain", "--json").results

@@ -1,4 +1,4 @@
-"""Who watches the page is told the truth about how much longer to record."""
+"""The page states correctly how much longer to record."""
 
 from __future__ import annotations
 

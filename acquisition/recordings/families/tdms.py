@@ -37,7 +37,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
     from nptdms.log import log_manager
 
     said = io.StringIO()
-    log_manager.console_handler.setStream(said)  # else it writes on stderr
+    log_manager.console_handler.stream = said  # else it writes on stderr, which may be closed by now
     try:
         with TdmsFile.open(io.BytesIO(data)) as file:
             groups = file.groups()

@@ -176,7 +176,9 @@ def _unlikely(column: Column) -> tuple[bool, bool, float]:
     derived = bool(_DERIVED.search(plain))
     known = column.measure is not None
     some = _some_of(column)
-    return derived, not named, -float(np.std(some)) if known and some.size else 0.0
+    with np.errstate(all="ignore"):  # a file may have numbers whose squares are infinite
+        spread = float(np.std(some)) if known and some.size else 0.0
+    return derived, not named, -spread
 
 
 def _some_of(column: Column) -> F8:

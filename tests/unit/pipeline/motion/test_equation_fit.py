@@ -1,4 +1,4 @@
-"""Strong drag and friction are told by the equation of motion, against the integration of it by the trials."""
+"""Strong drag and friction by the equation of motion, compared with the trials' own integration of it."""
 
 from __future__ import annotations
 

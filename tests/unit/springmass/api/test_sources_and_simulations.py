@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import springmass as sm
+from acquisition.block import concatenate
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
 from acquisition.simulated.pseudo_terminal import VirtualPort
@@ -41,6 +43,14 @@ def test_a_replay_is_kept_losslessly(tmp_path: Path) -> None:
         sm.source("missing.txt")
     with sm.source(path) as bench, pytest.raises(sm.Error, match="exists"):
         bench.record(tmp_path / "again.h5")
+
+
+def test_an_empty_recording_has_no_samples(tmp_path: Path) -> None:
+    """None are made up from its scene."""
+    nothing = sm.Run(replace(sm.load(DATA / "damped_simulated_position.txt").loaded, samples=concatenate(())))
+    path = sm.Run(nothing.loaded, sm.Scene.from_mapping(BENCH)).save(tmp_path / "empty.h5")
+    with sm.source(path, speed=math.inf) as bench:
+        assert [len(block) for block in bench] == []
 
 
 def test_a_simulated_bench_swings_without_end(tmp_path: Path) -> None:

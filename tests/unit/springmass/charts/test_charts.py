@@ -102,7 +102,7 @@ def test_amplitude(charts: dict[str, Drawn], damped: Analysis, motion: Oscillati
 
 
 def test_frequency_and_spectrum(charts: dict[str, Drawn], damped: Analysis) -> None:
-    """The frequency of the stretches is that of Table 1, and the highest peak stands there."""
+    """The frequency of the stretches and that of the highest peak are the one of Table 1."""
     _, shift = charts["frequency"].xy("a stretch of the run")
     u = decoded(charts["frequency"].series("a stretch of the run")["u"])
     assert abs(np.average(shift, weights=u**-2.0)) < 4.0 * np.sum(u**-2.0) ** -0.5

@@ -228,11 +228,9 @@ def test_a_run_without_oscillation_says_so(still: sm.Run) -> None:
         still["T"]
 
 
-def test_loading_is_no_analysis(full: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run is analysed when a result is asked for."""
-    run = sm.load(full)
-    assert run.loaded.title
-    monkeypatch.setattr("springmass.runs.run.analyse", lambda *_: pytest.fail("analysed"))
-    assert run.scene.bob_mass_kg is not None
-    with pytest.raises(BaseException, match="analysed"):
+def test_loading_is_no_analysis() -> None:
+    """What cannot be analysed is loaded all the same; the error comes when a result is asked for."""
+    run = sm.load((np.arange(3) / 100, [0.2, 0.21, 0.2]))
+    assert len(run.loaded.samples) == 3
+    with pytest.raises(sm.Error):
         run["T"]
