@@ -10,20 +10,18 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 
 I8 = NDArray[np.int64]
-# Probability that a jump is found anywhere in a smooth series: Bonferroni's bound over all points tested.
-FALSE_ALARM = 1e-3
 # Numbers of points in an interval, in ascending order. Lengths that double lose less than a tenth of the power
 # between two lengths [1]_. Fewer than 8 points leave no degrees of freedom. Over more than 32 periods, drag and drift
 # are no longer cubic.
 LENGTHS = (10, 18, 32)
-UNDISTURBED = 1 / 3  # minimum share of the intervals without a jump; the scatter of these intervals is taken as typical
-# Minimum number of points between an interval's end and a jump within it, so that two bad windows do not count as a
-# jump. It is a quarter of the interval if that is less. At the ends of the series one point is enough.
-APART = 5
+# Minimum share of the intervals without a jump, whose scatter is typical. A jump lies in at most two thirds of the
+# intervals (see `_scatter`), so the probability that a typical interval contains it is zero.
+UNDISTURBED = 1 / 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +124,7 @@ def _strongest(t: F8, y: F8, u: F8, length: int, trials: int) -> Change | None:
         left = left - np.sum(column * left, axis=2, keepdims=True) * column
     gain = _gains(weight, basis, left)
     after = np.maximum(np.sum(left**2, axis=(0, 2))[:, None] - gain, 0.0)
-    statistic = np.where(_allowed(starts, length, t.size, APART), gain / m, 0.0) / np.maximum(1.0, after / dof)
+    statistic = np.where(_allowed(starts, length, t.size), gain / m, 0.0) / np.maximum(1.0, after / dof)
     place = np.argmax(statistic, axis=1)
     highest = np.max(statistic, axis=1)
     best: tuple[float, Change] | None = None
@@ -202,9 +200,12 @@ def _from_end(values: F8) -> F8:
     return np.asarray(np.cumsum(values[..., ::-1], axis=-1)[..., ::-1])
 
 
-def _allowed(starts: I8, length: int, size: int, apart: int) -> NDArray[np.bool_]:
-    """Return (intervals, length): whether to test a jump before a point; one point suffices at the series' ends."""
-    k, apart = np.arange(length), min(apart, length // 4)
+def _allowed(starts: I8, length: int, size: int) -> NDArray[np.bool_]:
+    """Return (intervals, length): whether to test a jump before a point.
+
+    Two bad windows at an interval's end are no jump, unless it is an end of the series.
+    """
+    k, apart = np.arange(length), min(FEWEST_FOR_LINE, length // 4)
     first = np.where(starts == 0, 1, apart)[:, None]
     last = np.where(starts + length == size, length - 1, length - apart)[:, None]
     return np.asarray((k >= first) & (k <= last))

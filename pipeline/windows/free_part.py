@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Conditioned, condition
 from pipeline.samples.stopping import moving_part
 from pipeline.track import Quality
@@ -22,7 +23,6 @@ LEAST_HALVED = 128  # minimum number of samples of which the later half may show
 # Shares of the samples: if the bob stops before the first, its rest is left out; before the second, only if the whole
 # recording shows no oscillation.
 EARLY, LATE = 0.25, 0.75
-CLEAR = 0.1  # maximum noise over the largest amplitude of a motion that only the later half shows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +67,10 @@ def free_part(samples: Conditioned) -> FreePart | NoOscillation:
         if isinstance(trimmed, NoOscillation):
             return cycles
         windows = demodulate(trial, trimmed)
-        if windows.noise_m > CLEAR * float(np.max(windows.amplitude)) or check_sinusoid(trial, windows) is not None:
+        if (
+            windows.noise_m > NEGLIGIBLE * float(np.max(windows.amplitude))
+            or check_sinusoid(trial, windows) is not None
+        ):
             return cycles
         samples, segments = trial, later.within(segments)
         cycles = trimmed
