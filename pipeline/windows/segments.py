@@ -251,7 +251,7 @@ class _Series:
         values, u = self.values[:, first:stop], self.u[:, first:stop]
         rows = np.flatnonzero(~lone_points(values, u, FALSE_ALARM))
         changes = find_changes(self.t[first + rows], values[:, rows], u[:, rows])
-        edges = [first, *(first + int(rows[change.index]) for change in changes), stop]
+        edges = [first, *(first + int(rows[k]) for k in changes), stop]
         return [_Part(a, b, False) for a, b in itertools.pairwise(edges)]
 
 
