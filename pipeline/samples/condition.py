@@ -27,7 +27,8 @@ SPIKE_SIGMAS = 8.0
 # Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an unclipped
 # crest the ratio is 1 / (sqrt 2 - 1) = 2.4.
 CONTRAST = 5.0
-GAP = 3.0  # time between two samples, in sample intervals, above which they are no neighbours
+# Time between two samples, in sample intervals, above which they are no neighbours: that of a filter over five samples.
+GAP = 5.0
 
 
 @dataclass(frozen=True, slots=True)

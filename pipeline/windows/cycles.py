@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE
 from pipeline.numerics.quantity import amount, noun
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import GAP, Conditioned
 from pipeline.track import F8
 
 FEW_PERIODS = 4.5  # periods below which the line's negative-frequency image shifts the spectrum's peak
-HOLE = 8.0  # length from which a gap counts as a hole, sample intervals
 SAMPLES_PER_WINDOW = 12  # minimum number of samples in a window; windows span as many whole periods as this needs
 # Maximum standard uncertainty of a window's phase due to noise, rad. Windows span as many whole periods as this
 # needs, so that phases can be unwrapped at any signal-to-noise ratio.
@@ -93,7 +92,7 @@ def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, f
     grid = t[0] + ordinal / rate_hz
     # Times that are equally spaced except for rounding need no interpolation.
     regular = t.size == n and float(np.abs(t - grid).max()) <= 1e-9 / rate_hz
-    values = y if regular else _bridged(grid, t, y, recorded, HOLE / rate_hz)
+    values = y if regular else _bridged(grid, t, y, recorded, GAP / rate_hz)
     centred = ordinal - 0.5 * (n - 1)
     values = values - values.sum() / n
     values -= centred * (float(centred @ values) / float(centred @ centred))

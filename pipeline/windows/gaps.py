@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pipeline.errors import AnalysisError
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, SIGNIFICANT
 from pipeline.numerics.regression import correlation_length, solve_weighted
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import GAP, Conditioned
 from pipeline.track import F8, Quality
-from pipeline.windows.cycles import HOLE, Cycles, NoOscillation, find_cycles
+from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.windows.demodulate import ROUNDING, demodulate
 from pipeline.windows.segments import Segments, Span, SpanKind
 
@@ -58,7 +58,7 @@ def _stretches(samples: Conditioned, t: F8) -> list[tuple[float, float]]:
         return whole
     k = int(np.argmax(steps))
     gap_s, longer_s = float(steps[k]), max(float(t[k] - t[0]), float(t[-1] - t[k + 1]))
-    if gap_s <= HOLE / samples.track.rate_hz:
+    if gap_s <= GAP / samples.track.rate_hz:
         return whole
     if gap_s <= longer_s and _continues(samples, float(t[k]), float(t[k + 1])):
         return whole

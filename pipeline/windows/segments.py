@@ -16,7 +16,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, NEGLIGIBLE
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, FEWEST_FOR_LINE, NEGLIGIBLE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.samples.stopping import moving_part
@@ -25,9 +25,7 @@ from pipeline.windows.change_points import find_changes, lone_points
 from pipeline.windows.demodulate import FINEST, Demodulated
 
 LARGEST_EXPONENT = math.log(math.sqrt(sys.float_info.max))
-LEAST_AFTER = 64  # samples needed after a trigger to leave out the part before it
 HANGING = 0.25  # fraction of the range after the trigger within which a bob hangs still before it
-STILL = 0.02  # amplitude over that of the motion after the release, below which a bob hangs still
 NEAR = FEWEST_FOR_LINE  # number of windows beside a break or still windows from which the motion is extrapolated
 # Minimum amplitude of a part relative to the largest one. A smaller motion is a remnant after handling and is not
 # analysed.
@@ -110,7 +108,7 @@ def before_trigger(conditioned: Conditioned) -> Segments | None:
     if moment_s is None:
         return None
     before, after = conditioned.used & (t < moment_s), conditioned.used & (t >= moment_s)
-    if not before.any() or np.count_nonzero(after) < LEAST_AFTER:
+    if not before.any() or np.count_nonzero(after) < FEWEST_FOR_CURVE:
         return None
     # A bob that is already swinging triggers immediately, so there is no still part to leave out.
     ranges = [float(np.ptp(np.quantile(y[rows], (0.05, 0.95)))) for rows in (before, after)]
@@ -327,7 +325,7 @@ def _released(series: _Series) -> Segments | None:
     # The next window may contain the release.
     first = int(small[-1]) + 2
     begin_s, first_s = float(series.t[0]) - 0.5 * series.spacing, float(series.t[first]) - 0.5 * series.spacing
-    kind = SpanKind.AT_REST if np.max(series.size[small]) < STILL * series.size[most] else SpanKind.HANDLED
+    kind = SpanKind.AT_REST if np.max(series.size[small]) < NEGLIGIBLE * series.size[most] else SpanKind.HANDLED
     return Segments(first_s, math.inf, (Span(kind, begin_s, first_s),))
 
 
