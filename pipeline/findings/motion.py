@@ -75,9 +75,9 @@ def _modes(fitted: Fitted, unit: str) -> Iterator[Found]:
     own = [mode for mode in disturbances.sideways.modes if mode.kind == "mode"]
     if not own:
         return
-    f, size_m = own[0].frequency.value, own[0].amplitude.value
+    f, size_m = own[0].frequency_hz, own[0].amplitude_m
     large = size_m > NOTICEABLE * float(np.median(fitted.demodulated.amplitude))
-    further = ", ".join(f"{amount(m.amplitude.value, unit)} at {m.frequency.value:.4g} Hz" for m in own[1:])
+    further = ", ".join(f"{amount(m.amplitude_m, unit)} at {m.frequency_hz:.4g} Hz" for m in own[1:])
     numbers = {
         "frequency_hz": f,
         "amplitude_m": size_m,
