@@ -22,6 +22,8 @@ def rounding(samples: Conditioned, fitted: Fitted) -> Outcome | None:
     damping, windows = fitted.damping, fitted.demodulated
     elapsed, best = windows.t - damping.t0, damping.best
     errors = rounding_errors(best.amplitude(elapsed), samples.quantum_m, windows.noise_m)
+    if float(np.max(np.abs(errors))) <= NEGLIGIBLE * best.joint["A0"].u:
+        return None
     u_amplitude_m, u_rate = 0.0, 0.0
     for fit in (best, damping.of_powers(1, 2) or best):
         _, by = fit.law.curve(elapsed, fit.joint.values)
