@@ -10,9 +10,7 @@ from __future__ import annotations
 from acquisition.block import Block, Flag
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
-from acquisition.decoders.framed import FramedDecoder
-from acquisition.decoders.lines import LineSplitter
-from acquisition.decoders.sum_frames import SumFrames, with_sum
+from acquisition.decoders.frames import FramedDecoder, LineSplitter, SumFrames, with_sum
 from acquisition.errors import FormatError, NeedsAnswer, SensorError
 from acquisition.readings import Reading, Readings
 from acquisition.recordings.base import Format, SurveyFormat

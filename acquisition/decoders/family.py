@@ -16,16 +16,7 @@ aging (Murata P16E)."""
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """How a device identifies itself.
-
-    Parameters
-    ----------
-    model, version : str
-    name : str
-        Name that the owner gave the device; may be empty.
-    settings : mapping of str to int
-        Settings of the device; their names include the units.
-    """
+    """How a device identifies itself; names of settings include the units."""
 
     model: str
     version: str
@@ -113,9 +104,8 @@ class Family:
 
     Parameters
     ----------
-    name : str
-    title : str
-        One line for the user that lists the devices of the family.
+    name, title : str
+        Name in the registry, and one line for the user that lists the devices of the family.
     baud : int
         Default speed of the port (8 data bits, no parity, one stop bit).
     rate_hz : float
