@@ -1,4 +1,4 @@
-"""Families of text that are known by the lines above their rows: PASCO, Vernier, phyphox and Tracker.
+"""Families of text that are known by the lines above their rows: PASCO and Vernier.
 
 What is easy to get wrong:
 
@@ -11,9 +11,6 @@ What is easy to get wrong:
   from small programs, only long names and units, or headings with units in brackets. Further data sets follow, each
   with its name and headings.
 - Logger Pro: runs are side by side under ``Latest: Position (m)`` or ``Data Set 1:Time(s)``.
-- phyphox: the phone measures the times, so their steps vary, and each sensor may have a separate column of times.
-- Tracker: an optional line ``mass A``, in the user's language, above ``t x y``. Lengths have the unit of the
-  calibration stick, so the user must state it.
 """
 
 from __future__ import annotations
@@ -43,8 +40,6 @@ _QUANTITIES = words(
 _DATASTUDIO = re.compile(r"(?P<name>[^\t;]+), (?P<run>\S+ #\s?\d+)\s*")
 _DATASTUDIO_LINE = re.compile(rb"[\r\n]([^\t;\r\n]+, [^\s]+ #[ \t]?\d+[ \t]*)(?=[\r\n])")
 _LOGGER_PRO = re.compile(r"(?P<run>[^:]+):\s*(?P<quantity>.+)")
-_QUOTED = re.compile(r'\s*(?:"[^"]*"[,;\t]?)+\s*')
-_COORDINATES = frozenset(("x", "y", "r"))
 _VERNIER = "Vernier Format 2"
 _MOST_HEADINGS, _MOST_LINES = 3, 40
 
@@ -99,41 +94,6 @@ def logger_pro(lines: Sequence[str]) -> Header | None:
     if not any(is_time(each.name) for each in headings) and not all(each.unit for each in headings):
         return None
     return Header(f'headings in line 1 begin with a run, "{headings[0].run}: "', 1, mark, headings)
-
-
-def phyphox(lines: Sequence[str]) -> Header | None:
-    """Read quoted headings, the first of which is a time with its unit."""
-    if not _QUOTED.fullmatch(lines[0]):
-        return None
-    cells, mark = split_heading(lines[0])
-    headings = headings_of(cells)
-    if len(headings) < 2 or not is_time(headings[0].name) or not headings[0].unit:
-        return None
-    begin = f'"{headings[0].name} ({headings[0].unit})"'
-    return Header(f"line 1 is quoted headings that begin with {begin}", 1, mark, headings)
-
-
-def tracker(lines: Sequence[str]) -> Header | None:
-    """Read the line of headings, which is line 1, or line 2 below the name of the mass."""
-    for at, line in enumerate(lines[:2]):
-        cells, mark = _tracker_cells(line)
-        headings = headings_of(cells)
-        names = [each.name for each in headings]
-        if len(names) < 2 or names[0] != "t" or not _COORDINATES & set(names):
-            continue
-        above = [cell for cell in _tracker_cells(lines[0])[0] if cell] if at else []
-        row = lines[at + 1] if len(lines) > at + 1 else ""
-        first = [cell for cell in row.split(mark or None) if cell.strip()][:1]
-        if len(above) > 2 or not first or parse_number(first[0].strip()) is None:
-            return None
-        mass = " ".join(above)
-        why = f'line {at + 1} is "{" ".join(cells)}"' + (f' below "{mass}"' if at else "")
-        return Header(why, at + 1, mark, headings, title=mass)
-    return None
-
-
-def _tracker_cells(line: str) -> tuple[list[str], str]:
-    return split_heading(line) if any(mark in line for mark in "\t;,") else (line.split(), "")
 
 
 def vernier(lines: Sequence[str]) -> Header | None:

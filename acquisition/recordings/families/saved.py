@@ -19,7 +19,7 @@ import io
 import math
 import re
 import tarfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -28,7 +28,7 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError
-from acquisition.recordings.families.dialects import logger_pro, phyphox, tracker
+from acquisition.recordings.families.dialects import logger_pro
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading, Role, is_time, name_and_unit, numbered_apart
@@ -309,23 +309,12 @@ def _world(frame: int, pixel: Sequence[float], systems: Sequence[tuple[int, Sequ
 
 
 _TITLE = "Logger Pro, Graphical Analysis: CSV, or saved as cmbl or gambl"
-_LOGGER_PRO_TEXT = text_format("logger-pro", _TITLE, logger_pro, expected='headings like "Latest: Position (m)"')
-_PHYPHOX_TEXT = text_format("phyphox", "phyphox export as CSV, or saved state as XML", phyphox)
-_TRACKER_TEXT = text_format("tracker", "Tracker: table t x y of a mass on video, or saved as trk (XML)", tracker)
-
-
-def _or_text(
-    text: ColumnFormat, evidence: Callable[[bytes], str], tables: Callable[[str, bytes], Sequence[Table]]
-) -> ColumnFormat:
-    """Return a format of text whose program also saves files with other evidence and tables."""
-    return replace(
-        text,
-        evidence=lambda head: evidence(head) or text.evidence(head),
-        tables=lambda path, data: (tables if evidence(data[:HEAD_BYTES]) else text.tables)(path, data),
-    )
-
-
-LOGGER_PRO = _or_text(_LOGGER_PRO_TEXT, _vernier_evidence, _vernier_tables)
-PHYPHOX = _or_text(_PHYPHOX_TEXT, _phyphox_evidence, _phyphox_tables)
-TRACKER = _or_text(_TRACKER_TEXT, _tracker_evidence, _tracker_tables)
+_TEXT = text_format("logger-pro", _TITLE, logger_pro, expected='headings like "Latest: Position (m)"')
+LOGGER_PRO = replace(
+    _TEXT,
+    evidence=lambda head: _vernier_evidence(head) or _TEXT.evidence(head),
+    tables=lambda path, data: (_vernier_tables if _vernier_evidence(data[:HEAD_BYTES]) else _TEXT.tables)(path, data),
+)
+PHYPHOX = ColumnFormat("phyphox", "phyphox: saved state as XML", _phyphox_evidence, _phyphox_tables)
+TRACKER = ColumnFormat("tracker", "Tracker: saved as trk (XML)", _tracker_evidence, _tracker_tables)
 CASSY = ColumnFormat("cassy", "CASSY Lab: saved as labx (XML) or lab (text)", _cassy_evidence, _cassy_tables)
