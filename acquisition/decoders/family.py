@@ -49,20 +49,16 @@ class Decoder(Protocol):
 
         "garbage_bytes" counts the bytes outside of frames. Their fraction shows whether a stream is of this family.
         """
-        ...
 
     @property
     def pending(self) -> int:
         """Number of bytes of an incomplete frame; it is bounded for any input."""
-        ...
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
         """Decode the bytes of one read of the port, and return the readings of the completed frames, if any."""
-        ...
 
     def flush(self) -> None:
         """Discard an incomplete frame, after the port was reopened or a reply timed out."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +91,6 @@ class Encoder(Protocol):
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
     ) -> bytes:
         """Return one frame; a NaN distance means no target."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import name_and_unit
 from acquisition.recordings.tables.rows import read_rows
-from acquisition.recordings.tables.table import Column, Lines, Table
+from acquisition.recordings.tables.table import Column, Table
 from acquisition.recordings.tables.text import Line, Text, decode, is_text, text_of
 
 _MAGIC = "LabVIEW Measurement"
@@ -166,7 +166,7 @@ def _joined(passes: list[list[Table]]) -> list[Table]:
         return []
     tables = []
     for parts in zip(*passes, strict=True):
-        formula = _one_formula(parts)
+        formula, lines = _one_formula(parts), [part.lines for part in parts if part.lines is not None]
         tables.append(
             replace(
                 parts[0],
@@ -174,7 +174,10 @@ def _joined(passes: list[list[Table]]) -> list[Table]:
                 times=None if formula and parts[0].times is None else _one([_times(each) for each in parts]),
                 formula=formula,
                 run=f"Segments 1 to {len(parts)}",
-                lines=_one_lines([part.lines for part in parts if part.lines is not None]),
+                lines=lines[-1]._replace(
+                    numbers=np.concatenate([each.numbers for each in lines]),
+                    words=np.concatenate([each.words for each in lines]),
+                ),
                 beside=tuple(_one(list(each)) for each in zip(*(part.beside for part in parts), strict=True)),
             )
         )
@@ -216,22 +219,6 @@ def _one_formula(parts: Sequence[Table]) -> Formula | None:
             return None
         rows += part.columns[0].values.size
     return None if first is None else replace(first, samples=rows)
-
-
-def _one_lines(parts: list[Lines]) -> Lines:
-    """Return where the rows of all segments stand; the lines between two segments are no rows."""
-    rows, line = 0, parts[0].first
-    skipped = []
-    for part in parts:
-        skipped += [np.full(part.first - line, rows), part.skipped + rows]
-        rows += part.rows
-        line = part.first + part.rows + part.skipped.size
-    return parts[-1]._replace(
-        first=parts[0].first,
-        rows=rows,
-        skipped=np.concatenate(skipped).astype(np.int64),
-        words=np.concatenate([part.words for part in parts]),
-    )
 
 
 def _name_and_unit(label: str, unit: str, column: int) -> tuple[str, str]:

@@ -93,8 +93,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
         count_from_first(columns[0])
         headings.insert(0, Heading("Time", "s", role="time"))
     numbered = np.array([line.number for line, _ in lines[first:stop]])
-    skipped = np.repeat(np.arange(1, len(rows)), np.diff(numbered) - 1)
-    where = Lines(int(numbered[0]), len(rows), skipped, np.zeros(len(rows), bool), zeros=text.zeros)
+    where = Lines(numbered, np.zeros(len(rows), bool), zeros=text.zeros)
     return side_by_side(Table(tuple(columns), lines=where), headings)
 
 

@@ -9,8 +9,7 @@ from typing import Any
 
 from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.base import Survey
-from acquisition.recordings.recording import Recording, Trap
+from acquisition.recordings.recording import Recording, Survey, Trap
 from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.rows import Sheet, read_rows

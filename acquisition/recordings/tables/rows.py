@@ -68,15 +68,13 @@ def read_rows(
     stop = text.stop if stop is None else stop
     pieces: list[list[tuple[F8, I1, B1]]] = []  # for each column
     sizes: list[int] = []
-    skipped: list[int] = []
-    most, count, last = stop - first.start + _MOST_EMPTY, 0, []
+    numbers = [np.empty(0, np.int64)]
+    most, count, number, last = stop - first.start + _MOST_EMPTY, 0, first.number, []
     for page in text.pages(first.start, stop):
-        rows = []
-        for line in split_page(page, mark, brackets=brackets):
-            if line:
-                rows.append(line)
-            else:
-                skipped.append(count + len(rows))
+        lines = split_page(page, mark, brackets=brackets)
+        numbers.append(np.flatnonzero(list(map(bool, lines))) + number)
+        number += len(lines)
+        rows = list(filter(None, lines))
         if not rows:
             continue
         most -= len(rows) * max(map(len, rows))
@@ -114,8 +112,8 @@ def read_rows(
     if clock is not None and clock < len(columns):
         count_from_first(columns[clock])
     words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
-    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, text.zeros)
-    return Table(tuple(columns), lines=lines, traps=traps)
+    where = Lines(np.concatenate(numbers), words, ended, cut, text.zeros)
+    return Table(tuple(columns), lines=where, traps=traps)
 
 
 def count_from_first(column: Column) -> None:
@@ -145,9 +143,7 @@ def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Table:
     columns = [Column("", "", column.values[filled], column.forms[filled]) for column in columns]
     if clock is not None:
         count_from_first(columns[clock])
-    skipped = np.cumsum(filled)[~filled].astype(np.int64)
-    lines = Lines(first, int(filled.sum()), skipped, columns[0].forms == UNREAD)
-    return Table(tuple(columns), lines=lines)
+    return Table(tuple(columns), lines=Lines(first + np.flatnonzero(filled), columns[0].forms == UNREAD))
 
 
 def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -> tuple[Trap, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.errors import AcquisitionError
-from acquisition.recordings.base import dialect_folder
+from acquisition.recordings.identify import dialect_folder
 from acquisition.recordings.identify import formats, get_format, open_recording
 
 LOG = """
