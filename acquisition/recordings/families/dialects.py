@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import islice
 
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import text_format
@@ -30,7 +29,7 @@ from acquisition.recordings.tables.headings import (
     words,
 )
 from acquisition.recordings.tables.table import Header
-from acquisition.recordings.tables.text import Line, Text
+from acquisition.recordings.tables.text import Text
 
 _CAPSTONE = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+|Run \d+)")
 _QUANTITIES = words(
@@ -38,7 +37,7 @@ _QUANTITIES = words(
     "vitesse accélération posición velocidad aceleración 位置 速度 加速度"
 )
 _DATASTUDIO = re.compile(r"(?P<name>[^\t;]+), (?P<run>\S+ #\s?\d+)\s*")
-_DATASTUDIO_LINE = re.compile(rb"[\r\n]([^\t;\r\n]+, [^\s]+ #[ \t]?\d+[ \t]*)(?=[\r\n])")
+_DATASTUDIO_LINE = re.compile(rb"\n([^\t;\n]+, [^\s]+ #[ \t]?\d+[ \t]*)(?=\n)")
 _LOGGER_PRO = re.compile(r"(?P<run>[^:]+):\s*(?P<quantity>.+)")
 _VERNIER = "Vernier Format 2"
 _MOST_HEADINGS, _MOST_LINES = 3, 40
@@ -73,15 +72,13 @@ def datastudio(lines: Sequence[str]) -> Header | None:
     return Header(f'line 1 is the run, "{name}", line 2 the headings with units', 2, mark, headings, title=name)
 
 
-def _datastudio_runs(text: Text, first: Header) -> Iterator[tuple[Line, Header]]:
+def _datastudio_runs(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
     """Yield the two lines above each further run."""
     del first
-    counted, number = text.start, 1
-    for match in _DATASTUDIO_LINE.finditer(text.data, text.start, text.stop):
-        number += text.line_ends(counted, counted := match.start(1))
-        header = datastudio([line.text for line in islice(text.lines(counted), 2)])
-        if header is not None:
-            yield Line(number, counted, counted, ""), header
+    for match in _DATASTUDIO_LINE.finditer(text.data):
+        begin = text.at(match.start(1))
+        if (header := datastudio(text.lines(begin, 2))) is not None:
+            yield begin, header
 
 
 def logger_pro(lines: Sequence[str]) -> Header | None:
@@ -137,25 +134,23 @@ def _vernier_headings(lines: Sequence[str]) -> list[Heading]:
     return [Heading(name, unit) for name, unit in zip(names, units, strict=False)]
 
 
-def _vernier_sets(text: Text, first: Header) -> Iterator[tuple[Line, Header]]:
+def _vernier_sets(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
     """Yield further data sets: each repeats the line of long names, below its own name or below all lines of a file."""
-    lines = text.head(first.lines + 1)
-    names = [line for line in lines[2 : first.lines] if line.text.strip()]
-    if not names or len(lines) <= first.lines:
+    names = [at for at in range(2, min(first.lines, len(text))) if text.line(at).strip()]
+    if not names:
         return
     long_names = names[1 if first.run and len(names) > 1 else 0]
-    needle = b"\n" + text.data[long_names.start : long_names.next].rstrip(b"\r\n")
-    rows, counted, number = lines[first.lines].start, lines[first.lines].start, lines[first.lines].number
-    while (again := text.data.find(needle, rows, text.stop)) >= 0:
+    needle = b"\n" + text.data[text.starts[long_names] : text.starts[long_names + 1]].rstrip(b"\n")
+    rows = first.lines
+    while (again := text.find(needle, rows)) is not None:
         begin = text.words_above(rows, again + 1)
-        number += text.line_ends(counted, counted := begin)
-        head = [line.text for line in text.head(_MOST_LINES, begin, number)]
+        head = text.head(_MOST_LINES, begin)
         skip = next((at + 2 for at, line in enumerate(head[:_MOST_HEADINGS]) if line.startswith(_VERNIER)), 0)
         below = _data_set(head[skip:])
         if begin <= rows or below is None:
             return
-        yield Line(number, begin, begin, ""), Header(first.why, skip + below[1], "\t", below[2], run=below[0])
-        rows = again + len(needle)
+        yield begin, Header(first.why, skip + below[1], "\t", below[2], run=below[0])
+        rows = again + 1
 
 
 _TITLE = "PASCO Capstone CSV: runs side by side, any decimal mark"

@@ -95,7 +95,7 @@ def _phyphox_evidence(head: bytes) -> str:
 
 def _phyphox_tables(path: str, data: bytes) -> list[Table]:
     text = text_of(path, data)
-    root = _read_markup(path, text.data[text.start : text.stop], "save the experiment in phyphox again")
+    root = _read_markup(path, text.data, "save the experiment in phyphox again")
     buffers = {}
     for each in root.iter("container"):
         values = _numbers(cell for cell in each.get("init", "").split(",") if cell.strip())
@@ -172,7 +172,7 @@ def _cassy_tables(path: str, data: bytes) -> list[Table]:
     if not _begins(data[:HEAD_BYTES], _CASSY):
         return _cassy_text(path, text)
     columns = []
-    for each in _read_markup(path, text.data[text.start : text.stop], _CASSY_EXPORT).iter("channel"):
+    for each in _read_markup(path, text.data, _CASSY_EXPORT).iter("channel"):
         values = _numbers(value.text or "" for value in each.iter("value"))
         if values.size:
             described = ((each.findtext(tag) or "").strip() for tag in ("quantity", "symbol", "unit"))
@@ -194,18 +194,17 @@ _COMPUTED = re.compile(r"10( -?\d+){3}")
 def _cassy_text(path: str, text: Text) -> list[Table]:
     lines = text.head(_MOST_HEAD_LINES)
     for at, line in enumerate(lines[:-1]):
-        size = re.fullmatch(r"(\d+) (\d+)", line.text.strip())
-        row = lines[at + 1].text.rstrip("\t").split("\t")
+        size = re.fullmatch(r"(\d+) (\d+)", line.strip())
+        row = lines[at + 1].rstrip("\t").split("\t")
         if size and len(row) == int(size[1]) > 1 and all(parse_number(cell) is not None for cell in row if cell):
             break
     else:
         raise FormatError(path, "expected the numbers of columns and rows, and the rows below", _CASSY_EXPORT)
-    headings, first = _described(path, [each.text for each in lines[:at]], len(row)), lines[at + 1]
     # Settings follow the rows and contain no tabs; if their first line has no end, it is an incomplete row.
-    tab = text.data.rfind(b"\t", first.start, text.stop)
-    end = next((line.next for line in text.lines(tab)), text.stop)
-    stop = end if b"\n" in text.data[end : text.stop] else text.stop
-    return side_by_side(replace(read_rows(path, text, first, "\t", stop=stop), ragged=True), headings)
+    tab = text.at(text.data.rfind(b"\t"))
+    stop = tab + 1 if tab + 2 < len(text) or text.ended else len(text)
+    table = read_rows(path, text, at + 1, "\t", stop=stop)
+    return side_by_side(replace(table, ragged=True), _described(path, lines[:at], len(row)))
 
 
 def _described(path: str, above: Sequence[str], width: int) -> list[Heading]:

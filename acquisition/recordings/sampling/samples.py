@@ -65,7 +65,8 @@ def row_traps(rows: Rows, timed: B1, zeros: int) -> Iterator[Trap]:
         first = line_of(rows.lines, int(unread_rows[0]))
         kept_rows = int(np.count_nonzero(timed[unread_rows]))
         rows_are = "1 row" if unread_rows.size == 1 else f"{unread_rows.size} rows"
-        message = f"{rows_are} could not be read, the first in line {first}; {kept_rows} kept as missing samples"
+        where = "" if first is None else f", the first in line {first}"
+        message = f"{rows_are} could not be read{where}; {kept_rows} kept as missing samples"
         yield Trap("malformed_rows", message, int(unread_rows.size), first)
 
 
