@@ -285,8 +285,7 @@ def _written(write: Callable[[], str], folder: Path) -> int:
 def _write_numbers(folder: Path, done: Sequence[_Done]) -> Path:
     """Write the numbers of all runs: results.csv for a table, results.json for programs."""
     from springmass.runs.rows import results_csv
-    from storage.atomic import write_whole
-    from storage.folder import whole_folder
+    from storage.atomic import whole_folder, write_whole
 
     text = json.dumps([one.result for one in done], indent=2, allow_nan=False, ensure_ascii=False)
     with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:

@@ -12,11 +12,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from acquisition.errors import AcquisitionError, FormatError, NeedsAnswer, UnknownFormat, visible
-from acquisition.recordings.base import Survey, read_bytes
 from acquisition.recordings.families.archive import members
-from acquisition.recordings.identify import Inspection, inspect, sniff
+from acquisition.recordings.identify import Inspection, inspect, read_bytes, sniff
 from acquisition.recordings.identify import formats as every_format
 from acquisition.recordings.questions import Missing
+from acquisition.recordings.recording import Survey
 from springmass.commands.options import PART, File, Json, argument, refuse
 from springmass.errors import OK, ProgramError, suggest
 from springmass.runs.json_results import picked, plain

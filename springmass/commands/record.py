@@ -43,8 +43,8 @@ from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import ProgressLine
 from springmass.terminal.style import style_of
 from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole
-from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
+from storage.recorder import check_disk
 from storage.recovery.recover import recover
 from storage.recovery.report import RecoverReport
 from storage.run_file.reading import open_run

@@ -66,11 +66,10 @@ def replay(
         clock,
         info=loaded.info,
         speed=None if fast else speed,
+        from_s=-math.inf if seek is None else seek,
         loop=loop,
     )
     with source:
-        if seek is not None:
-            source.seek(seek)
         if output is not None:
             path = save_run(output, replace(loaded, info=source.info), blocks=source, overwrite=overwrite)
             tell(f"{path}: replayed from {loaded.path}")

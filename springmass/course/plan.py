@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from acquisition.recordings.base import dialect_folder
+from acquisition.recordings.identify import dialect_folder
 from acquisition.regular_file import open_regular, open_regular_text, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import SceneError

@@ -87,7 +87,7 @@ def test_a_folder_is_one_table(cli: Cli, tmp_path: Path) -> None:
     assert (done.code, done.err) == (0, "")
     table = [line.split() for line in done.out.splitlines()]
     assert table[1] == ["a.csv", "table", "Position", "10", "Hz", "4", "s"]
-    assert table[3] == ["old/b.csv", "tracker", "x,", "y", "10", "Hz", "4", "s", "--channel,", "--unit"]
+    assert table[3] == ["old/b.csv", "table", "x,", "y", "10", "Hz", "4", "s", "--channel,", "--unit"]
     entries = cli("formats", "--json", shelf).results
     assert [each["file"] for each in entries] == ["a.csv", "notes.md", "old/b.csv"]
     assert entries[2]["missing"] == ["channel", "unit"]

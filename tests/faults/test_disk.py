@@ -15,7 +15,7 @@ from storage.errors import WriteFailed
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
 from storage.run_file.reading import open_run
-from storage.wire_log.log_file import LogFile, open_log_file
+from storage.wire_log.appending import LogFile, open_log_file
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
 
