@@ -19,7 +19,7 @@ from acquisition.live.serial_port import SerialPort
 from acquisition.replay import Replay
 from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
-from springmass.errors import UNREADABLE, USAGE, ProgramError
+from springmass.errors import UNREADABLE, ProgramError
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import made_now, save_run
@@ -188,7 +188,7 @@ class _Live:
         self._recorder = self._session.preview(self._path.with_suffix(".wire"))
         if self._recorder is None:
             why = "; ".join(self._session.failures.describe())
-            raise ProgramError(f"{path}: the recording cannot begin ({why}); choose another folder", USAGE)
+            raise ProgramError(f"{path}: the recording cannot begin ({why}); choose another folder")
 
     def __enter__(self) -> Self:
         self._session.listen()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, Group, Parameter
 
 from springmass import __version__
-from springmass.errors import OK, USAGE, ProgramError, adopt
+from springmass.errors import OK, ProgramError, adopt
 from springmass.layout import STDIN
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def _begin(
 ) -> int:
     adopt(quiet, verbose)
     if not words:
-        raise ProgramError("no command; try springmass demo or springmass --help", USAGE)
+        raise ProgramError("no command; try springmass demo or springmass --help")
     end = words.index("--") if "--" in words else len(words)
     named = [STDIN if word == "-" else word for word in words[:end]]
     return int(app([*named, *words[end:]], exit_on_error=False, print_error=False) or OK)

@@ -83,9 +83,7 @@ class AnalyseOptions:
         False
     )
     method: Annotated[
-        Literal["classic"] | None,
-        option("NAME", "also apply the lab report's classic method, for comparison"),
-        FURTHER,
+        Literal["classic"] | None, option("NAME", "also apply the lab report's classic method, for comparison"), FURTHER
     ] = None
     output: Annotated[File | None, output("DIR", "output folder (default: here; with --json: none)")] = None
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
@@ -111,7 +109,7 @@ def analyse(
     inputs = [str(each) for each in recordings]
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
-        raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself", USAGE)
+        raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself")
     scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
     found, folders = files_of(inputs)
     for line in folders:

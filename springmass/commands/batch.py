@@ -18,7 +18,7 @@ from springmass.course.rows import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.runs_csv import template
 from springmass.course.store import DATABASE, opened
-from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, manner, suggest, tell
+from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, manner, suggest, tell
 from springmass.runs.options import How
 from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
@@ -55,16 +55,16 @@ def batch(
     refuse("batch", how, "velocity")
     inputs = [str(each) for each in recordings]
     if not inputs and options.runs is None:
-        raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them", USAGE)
+        raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them")
     if options.template:
         table = template([job.path for job in plan(inputs).jobs])
         # A file gets the paths unchanged, because they are read back from it.
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK
     if options.output is None:
-        raise ProgramError("batch needs a folder for the results; name it with -o DIR", USAGE)
+        raise ProgramError("batch needs a folder for the results; name it with -o DIR")
     if options.dask is not None and options.jobs:
-        raise ProgramError("--dask brings its workers, got --jobs too; leave out --jobs", USAGE)
+        raise ProgramError("--dask brings its workers, got --jobs too; leave out --jobs")
     quiet = manner()[0]
     folder = make_folder(options.output)
     with contextlib.ExitStack() as shown, opened(folder) as store:

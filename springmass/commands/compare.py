@@ -14,19 +14,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from acquisition.errors import visible
-from springmass.commands.options import (
-    Figures,
-    File,
-    Json,
-    Scenes,
-    Strict,
-    argument,
-    option,
-    output,
-    refuse,
-)
+from springmass.commands.options import Figures, File, Json, Scenes, Strict, argument, option, output, refuse
 from springmass.course.rows import COURSE, is_course, read_rows
-from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
+from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
 from springmass.runs.analysing import Task, analysed, law_line
 from springmass.runs.comparing import Compared, beside, compare_runs, comparison_json
 from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
@@ -74,9 +64,7 @@ def compare(
     if all(is_course(path) for path in inputs):
         return _run_courses(inputs, options)
     if len(inputs) < 2:
-        raise ProgramError(
-            f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one", USAGE
-        )
+        raise ProgramError(f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one")
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
     scenes = read_scenes(options.scene, len(inputs))
     out = None if options.output is None else make_folder(options.output)
@@ -117,7 +105,7 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
 
     if options.output is not None or options.scene or options.reported is not None or options.hooke is not None:
         raise ProgramError(
-            "-o, --scene, --reported and --hooke go with single runs; a course has its page and its scenes", USAGE
+            "-o, --scene, --reported and --hooke go with single runs; a course has its page and its scenes"
         )
     rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
     found = compare_rows(rows)

@@ -10,7 +10,7 @@ from typing import Annotated
 from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
 from springmass.commands.options import PART, File, Overwrite, argument, option, output, refuse
-from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, suggest, tell
+from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import save_run
@@ -35,9 +35,9 @@ def convert(
     """Convert one input."""
     refuse("convert", read, *PART)
     if output is not None and target is not None:
-        raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once", USAGE)
+        raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once")
     if (output := target or output) is None:
-        raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form", USAGE)
+        raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form")
     stated = None if scene is None else read_scene(scene).to_mapping()
     loaded = load(recording, read)
     out = Path(output)
@@ -67,14 +67,12 @@ def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
     if writer is None:
         raise ProgramError(
             f"{out}: the suffix says what to write, one of {', '.join((*RUN_SUFFIXES, *WRITERS))}; "
-            f"got {out.suffix or 'no suffix'}",
-            USAGE,
+            f"got {out.suffix or 'no suffix'}"
         )
     if loaded.samples.quantity != "length":
         raise ProgramError(
             f"{out}: this form holds a length in m, got {loaded.samples.quantity} in {loaded.samples.unit}; "
-            f"write a run file, one of {', '.join(RUN_SUFFIXES)}",
-            USAGE,
+            f"write a run file, one of {', '.join(RUN_SUFFIXES)}"
         )
     start_time = str(loaded.provenance.get("start_time", ""))
     written = writer(str(loaded.path), loaded.samples, loaded.info, loaded.title, start_time)
@@ -97,7 +95,7 @@ def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:
     """Check before the work, so that of a pair either both files are written or none."""
     for target in () if overwrite else targets:
         if target.exists():
-            raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite", USAGE)
+            raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite")
 
 
 def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
@@ -109,9 +107,7 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
         targets = [out]
     else:
         names = ", ".join(o.name for o in loaded.originals)
-        raise ProgramError(
-            f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder", USAGE
-        )
+        raise ProgramError(f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder")
     _demand_free(targets, overwrite)
     return [
         write_whole(target, original.data, overwrite=overwrite)

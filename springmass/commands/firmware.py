@@ -18,7 +18,7 @@ from acquisition.errors import visible
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
 from springmass.commands.options import flag, option
-from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
+from springmass.errors import OK, SENSOR, ProgramError, suggest, tell
 from springmass.session.sensors import outdated, settings_of
 from springmass.values import Whole
 
@@ -60,7 +60,7 @@ def firmware(
     commands = [f"{letter}{value}" for letter, value in settings if value is not None]
     if port is None:
         if flash or commands:
-            raise ProgramError("--port must name the board's port; `springmass ports` lists them", USAGE)
+            raise ProgramError("--port must name the board's port; `springmass ports` lists them")
         _show()
         return OK
     if flash:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.runs.options import ReadOptions
 from springmass.runs.questions import option_of
 from springmass.values import LawName, Positive, TcpPort
@@ -124,10 +124,7 @@ class BenchOptions:
     mass_kg: Annotated[
         Any,
         Parameter(
-            metavar="M",
-            help="all that hangs on the spring, kg: 0.2007+/-0.0001",
-            converter=_measured,
-            n_tokens=1,
+            metavar="M", help="all that hangs on the spring, kg: 0.2007+/-0.0001", converter=_measured, n_tokens=1
         ),
     ] = None
     set: Annotated[
@@ -163,7 +160,7 @@ PART = ("from_s", "to_s", "clock_ppm")
 def refuse(command: str, read: ReadOptions, *names: str) -> None:
     """Refuse options of reading that mean nothing to a command."""
     if given := [option_of(name) for name in read.given() if name in names]:
-        raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out", USAGE)
+        raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out")
 
 
 def only_reading(*, read: ReadOptions = ReadOptions()) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from springmass.commands.options import PART, PageOptions, Recording, flag, refuse
-from springmass.errors import OK, USAGE, ProgramError, manner, tell
+from springmass.errors import OK, ProgramError, manner, tell
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
 from springmass.page.web.server import serve
@@ -70,7 +70,7 @@ def page(
         tell("the page is closed")
     except OSError as error:
         reason = error.strerror or str(error)
-        raise ProgramError(f"--page-port {page.page_port}: {reason}; name another, or 0 for any", USAGE) from error
+        raise ProgramError(f"--page-port {page.page_port}: {reason}; name another, or 0 for any") from error
     finally:
         state.close()
     return OK

@@ -26,7 +26,7 @@ from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted, flag, option, output
-from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
+from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
 from springmass.runs.outputs import made_now
 from springmass.runs.scenes import ask_about, read_scene
@@ -86,8 +86,7 @@ class RecordOptions:
         None
     )
     option: Annotated[
-        tuple[tuple[str, Any], ...],
-        converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option),
+        tuple[tuple[str, Any], ...], converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option)
     ] = ()
     still: Annotated[Positive | None, option("S", "first measure rest position and noise for S seconds")] = None
     ruler: Annotated[
@@ -109,7 +108,7 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         what = Path(options.scene).name.removesuffix(".toml").removesuffix(".scene")
     out = default_name(options.title or what, datetime.now()) if options.output is None else Path(options.output)
     if out.suffix.lower() != ".h5":
-        raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5", USAGE)
+        raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5")
     _demand_sense(options, page_options)
     _fill_standard_streams()
     if not options.simulate:
@@ -251,9 +250,9 @@ def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
         ("--law", page.law is not None, "--page", options.page),
     ):
         if given and not there:
-            raise ProgramError(f"{name} does nothing without {needed}; name both or neither", USAGE)
+            raise ProgramError(f"{name} does nothing without {needed}; name both or neither")
     if options.simulate and options.port:
-        raise ProgramError("--simulate takes no --port; leave one of them out", USAGE)
+        raise ProgramError("--simulate takes no --port; leave one of them out")
 
 
 def _page(options: PageOptions, log: Path, session: Session, console: Console) -> PageProcess:
@@ -371,8 +370,7 @@ class _Bench:
         if sys.stdin is None or not sys.stdin.readline():
             raise ProgramError(
                 "several --ruler distances are measured one after the other, each begun with Enter, and the standard "
-                "input is closed; name one --ruler, or run this at a terminal",
-                USAGE,
+                "input is closed; name one --ruler, or run this at a terminal"
             )
 
 
@@ -390,7 +388,7 @@ def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> I
             yield [sensor]
         return
     if len(names) not in (1, len(options.port)):
-        raise ProgramError("--sensor must be named once for all ports, or once for each in their order", USAGE)
+        raise ProgramError("--sensor must be named once for all ports, or once for each in their order")
     families = [get_family(name) for name in (names * len(options.port) if len(names) == 1 else names)]
     sensors: list[Sensor] = []
     try:
@@ -414,14 +412,14 @@ def _simulated(
     release: Release,
 ) -> Iterator[Sensor]:
     if os.name == "nt":
-        raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port", USAGE)
+        raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port")
     from acquisition.simulated.pseudo_terminal import VirtualPort
     from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 
     family = get_family(name)
     if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
-        raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that", USAGE)
+        raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that")
     waits = options.still is not None or options.ready
     where = "the example bench" if options.scene is None else str(options.scene)
     seconds = options.seconds or UNLIMITED_S
@@ -451,4 +449,4 @@ def _calibration(options: RecordOptions, scene: Scene | None) -> Calibration:
     try:
         return Calibration(speed_of_sound_m_per_s=speed)
     except CalibrationError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(str(error)) from error

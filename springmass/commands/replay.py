@@ -15,7 +15,7 @@ from cyclopts import Parameter, Token
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.options import PART, File, Overwrite, PageOptions, Recording, flag, option, output, refuse
-from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.errors import OK, ProgramError, suggest, tell
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import save_run
@@ -53,7 +53,7 @@ def replay(
     """Play the input to stdout, one line per sample, or into a run file."""
     refuse("replay", read, *PART)
     if loop and output is not None:
-        raise ProgramError("--loop never ends and a run file is written whole at the end; leave one of them out", USAGE)
+        raise ProgramError("--loop never ends and a run file is written whole at the end; leave one of them out")
     if page:
         from springmass.commands.page import page as show
 
@@ -61,13 +61,7 @@ def replay(
     loaded = load(recording, read)
     fast = math.isinf(speed)
     clock: Clock = VirtualClock() if fast else SystemClock()
-    source = Replay(
-        loaded.samples_in_blocks(),
-        clock,
-        info=loaded.info,
-        speed=None if fast else speed,
-        loop=loop,
-    )
+    source = Replay(loaded.samples_in_blocks(), clock, info=loaded.info, speed=None if fast else speed, loop=loop)
     with source:
         if seek is not None:
             source.seek(seek)

@@ -17,7 +17,7 @@ from pipeline.dynamics.band import Band
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import Figures, File, Json, Overwrite, flag, option, output
-from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.errors import OK, ProgramError, suggest, tell
 from springmass.runs.json_results import picked
 from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
@@ -73,10 +73,10 @@ def simulate(
 ) -> int:
     """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
     if scene is None and against is None:
-        raise ProgramError("simulate needs --scene S.toml, or --against RUN with a scene of its own", USAGE)
+        raise ProgramError("simulate needs --scene S.toml, or --against RUN with a scene of its own")
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if output is not None and Path(output).exists() and not overwrite:
-        raise ProgramError(f"{visible(str(output))}: exists; take another name, or --overwrite", USAGE)
+        raise ProgramError(f"{visible(str(output))}: exists; take another name, or --overwrite")
     stated, analysis, longest_s = None if scene is None else read_scene(scene), None, seconds or 10.0
     if scene is not None and stated is not None:
         ask_about(stated, scene)
@@ -100,7 +100,7 @@ def simulate(
     try:
         simulation = simulated(ready.problem, method, dt, count, wanted, check=check)
     except DynamicsError as error:
-        raise ProgramError(f"{where}: {error}", USAGE) from error
+        raise ProgramError(f"{where}: {error}") from error
     print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
     print(_before(_tolerance(wanted, band, given=tolerance is not None), effects), file=say)
     print(_after(simulation, count), file=say)

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from springmass.errors import SOME_FAILED, USAGE, ProgramError
+from springmass.errors import SOME_FAILED, ProgramError
 from springmass.runs.processes import cores, pool
 
 Task = TypeVar("Task")
@@ -61,13 +61,13 @@ def _dask(address: str) -> Iterator[Workers]:
     try:
         from distributed import Client, KilledWorker
     except ImportError as error:
-        raise ProgramError("--dask needs dask.distributed; pip install 'springmass[dask]'", USAGE) from error
+        raise ProgramError("--dask needs dask.distributed; pip install 'springmass[dask]'") from error
     connect: Any = Client
     try:
         client = connect(address, set_as_default=False, timeout=20)
     except (OSError, ValueError, TimeoutError) as error:
         reason = " ".join(str(error).split())
-        raise ProgramError(f"{address}: no dask scheduler answers ({reason}); start dask scheduler", USAGE) from error
+        raise ProgramError(f"{address}: no dask scheduler answers ({reason}); start dask scheduler") from error
 
     @contextlib.contextmanager
     def start() -> Iterator[Executor]:

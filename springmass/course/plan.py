@@ -18,7 +18,7 @@ from acquisition.regular_file import open_regular, open_regular_text, read_regul
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.errors import SceneError
 from springmass.course.runs_csv import ANSWERS, POSITION, Values, join, read_table
-from springmass.errors import UNREADABLE, USAGE, ProgramError
+from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
 from springmass.runs.about import about_path
 from springmass.runs.analysing import Task
@@ -145,7 +145,7 @@ def _listed(path: Path) -> list[str]:
         with open_regular_text(path, "utf-8-sig") as file:
             lines = file.read().splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise ProgramError(f"{path}: expected a list of paths, one a line ({error})", USAGE) from error
+        raise ProgramError(f"{path}: expected a list of paths, one a line ({error})") from error
     return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
 
 
@@ -161,7 +161,7 @@ def _scene(values: Values, shared: Scene | None, where: str) -> Scene | None:
     try:
         return Scene.from_mapping(tables, where=where) if tables else None
     except SceneError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(str(error)) from error
 
 
 def names_of(jobs: Sequence[Job]) -> list[str]:

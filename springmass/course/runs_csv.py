@@ -17,7 +17,7 @@ from typing import Any
 from pipeline.bench.scene import PLACES
 from pipeline.registry.laws import law_names
 from springmass.course.rows import RESERVED
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.runs.inputs import InputFile
 from springmass.runs.table_lines import table_lines
 from springmass.values import ANY_LAW
@@ -79,7 +79,7 @@ def read_table(path: str | Path) -> RunsTable:
     path = Path(path)
     table = list(table_lines(path, "table of runs"))
     if not table:
-        raise ProgramError(f"{path}: expected a table of runs, got an empty file; see batch --template", USAGE)
+        raise ProgramError(f"{path}: expected a table of runs, got an empty file; see batch --template")
     (_, head, comma), *lines = table
     names = [name.strip() for name in head]
     while names and not names[-1]:
@@ -90,10 +90,10 @@ def read_table(path: str | Path) -> RunsTable:
         where = f"{path}, line {line}"
         if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
             wrong = f"expected {len(names)} columns, got {len(cells)}; put quotes around a text with a separator"
-            raise ProgramError(f"{where}: {wrong}", USAGE)
+            raise ProgramError(f"{where}: {wrong}")
         texts = {name: cell.strip() for name, cell in zip(names, cells, strict=False) if cell.strip()}
         if texts and "path" not in texts:
-            raise ProgramError(f"{where}: the path of the run is missing; fill it in", USAGE)
+            raise ProgramError(f"{where}: the path of the run is missing; fill it in")
         if texts:
             rows.append((line, texts["path"], _values(path.parent, where, texts, decimal_comma=comma)))
     return RunsTable(path, tags, tuple(rows))
@@ -102,19 +102,19 @@ def read_table(path: str | Path) -> RunsTable:
 def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
     """Return the tags among the column names; refuse unknown or repeated columns."""
     if "path" not in names:
-        raise ProgramError(f"{path}: no column path, got {', '.join(names)}; see batch --template", USAGE)
+        raise ProgramError(f"{path}: no column path, got {', '.join(names)}; see batch --template")
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ProgramError(f"{path}: the column {twice[0]} is there twice; leave one out", USAGE)
+        raise ProgramError(f"{path}: the column {twice[0]} is there twice; leave one out")
     tags = tuple(name for name in names if name not in KNOWN)
     for name in tags:
         near = get_close_matches(name, KNOWN, n=1, cutoff=0.85)
         if near or _UNIT.search(name):
             hint = f"did you mean {near[0]}?" if near else f"allowed with a unit are {', '.join(PLACES)}"
-            raise ProgramError(f"{path}: unknown column {name!r}; {hint}", USAGE)
+            raise ProgramError(f"{path}: unknown column {name!r}; {hint}")
         if name in RESERVED:
-            raise ProgramError(f"{path}: {name!r} is a column of the results; rename the column", USAGE)
+            raise ProgramError(f"{path}: {name!r} is a column of the results; rename the column")
         if not _TAG.fullmatch(name):
-            raise ProgramError(f"{path}: a tag has lower-case letters, digits and _, got {name!r}; rename it", USAGE)
+            raise ProgramError(f"{path}: a tag has lower-case letters, digits and _, got {name!r}; rename it")
     return tags
 
 
@@ -126,7 +126,7 @@ def _values(folder: Path, where: str, texts: Mapping[str, str], *, decimal_comma
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise ProgramError(f"{where}: {name} must be a finite number, got {texts[name]!r}", USAGE)
+            raise ProgramError(f"{where}: {name} must be a finite number, got {texts[name]!r}")
         return value
 
     values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
@@ -136,10 +136,10 @@ def _values(folder: Path, where: str, texts: Mapping[str, str], *, decimal_comma
         if name in texts:
             values[name] = (number(name), number(f"{name}_u") if f"{name}_u" in texts else 0.0)
         elif f"{name}_u" in texts:
-            raise ProgramError(f"{where}: {name}_u is there without {name}; fill in both", USAGE)
+            raise ProgramError(f"{where}: {name}_u is there without {name}; fill in both")
     if (law := texts.get(LAW)) not in (None, ANY_LAW, *law_names()):
         laws = ", ".join((*law_names(), ANY_LAW))
-        raise ProgramError(f"{where}: {LAW} must be one of {laws}, got {law!r}", USAGE)
+        raise ProgramError(f"{where}: {LAW} must be one of {laws}, got {law!r}")
     return values
 
 
@@ -168,7 +168,7 @@ def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[Input
                 continue
             if clash := sorted(x for x in base.keys() & values.keys() if base[x] != values[x]):
                 wrong = f"lines {first} and {line} both match {file.path} and differ in {clash[0]}"
-                raise ProgramError(f"{table.path}: {wrong}; narrow one of the patterns", USAGE)
+                raise ProgramError(f"{table.path}: {wrong}; narrow one of the patterns")
             base, first = {**base, **values}, first or line
             used.add(line)
         lines: dict[tuple[Any, Any], int] = {}
@@ -176,7 +176,7 @@ def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[Input
             which = (values.get("run"), values.get("channel"))
             if which in lines:
                 wrong = f"lines {lines[which]} and {line} both name {file.path}"
-                raise ProgramError(f"{table.path}: {wrong}; leave one out, or give each another run or channel", USAGE)
+                raise ProgramError(f"{table.path}: {wrong}; leave one out, or give each another run or channel")
             lines[which] = line
             joined.append((file, line, {**base, **values}))
         used |= set(lines.values())

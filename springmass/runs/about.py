@@ -19,7 +19,7 @@ from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.recordings.identify import sniff
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.runs.scenes import read_tables
 from storage.atomic import write_whole
 
@@ -88,16 +88,16 @@ def about_of(recording: Path) -> About:
         return About(path)
     tables = read_tables(path)
     if unknown := sorted(set(tables) - {"scene", "notes", "marks"}):
-        raise ProgramError(f"{path}: unknown key {unknown[0]!r}; allowed are scene, notes, marks", USAGE)
+        raise ProgramError(f"{path}: unknown key {unknown[0]!r}; allowed are scene, notes, marks")
     try:
         scene = Scene.from_mapping(tables["scene"], where=f"{path} [scene]") if "scene" in tables else None
         marks = tuple((float(mark["t_s"]), str(mark["text"])) for mark in tables.get("marks", ()))
         notes = tuple(str(note) for note in tables.get("notes", ()))
     except SceneError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(str(error)) from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         demand = "notes are a list of texts, marks are [[marks]] with t_s and text"
-        raise ProgramError(f"{path}: {demand}; mend or remove the file", USAGE) from error
+        raise ProgramError(f"{path}: {demand}; mend or remove the file") from error
     return About(path, scene, notes, marks)
 
 

@@ -17,7 +17,7 @@ from pipeline.registry.found import Found
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.derive import limited
 from pipeline.results.masses import Hooke, MassLine, mass_line
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.runs.frames import comparison_frame
 from springmass.runs.hooke import read_hooke
 from springmass.runs.json_results import SCHEMA, parameters_json, picked, plain
@@ -78,16 +78,14 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
     if missing:
         raise ProgramError(
             f"compare needs the mass of every run's bob; no [bob] mass_kg for {', '.join(missing)}: "
-            "give --scene FILE, one for all runs or one for each in their order",
-            USAGE,
+            "give --scene FILE, one for all runs or one for each in their order"
         )
     first, *others = scenes
     for name, scene in others:
         if scene.spring_mass_kg != first[1].spring_mass_kg:
             raise ProgramError(
                 f"compare takes runs of one spring; [spring] mass_kg is {first[1].spring_mass_kg or 'not given'} for "
-                f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}: state the same in both scenes",
-                USAGE,
+                f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}: state the same in both scenes"
             )
 
 
@@ -110,9 +108,7 @@ def compare_runs(
         for (name, motion), run in zip(motions, runs, strict=True)
     ]
     comparison = compare_springs(
-        springs,
-        spring_mass_kg=runs[0].scene.spring_mass_kg,
-        mass_correlation=mass_correlation,
+        springs, spring_mass_kg=runs[0].scene.spring_mass_kg, mass_correlation=mass_correlation
     )
     joint = tuple(
         join([(name, m.damping, float(m.demodulated.t[-1]) - m.damping.t0) for name, m in group])

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.results.masses import Hooke, hooke
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.runs.table_lines import table_lines
 
 _COLUMN = re.compile(r"(mass|position)[\s_(/\[]*(kg|g|m|cm|mm)[)\]]?", re.IGNORECASE)
@@ -22,7 +22,7 @@ def read_hooke(path: str | os.PathLike[str]) -> Hooke:
     head = [_COLUMN.fullmatch(cell.strip()) for cell in table[0][1]] if table else []
     columns = {found[1].lower(): (i, _SI[found[2].lower()]) for i, found in enumerate(head) if found}
     if len(columns) < 2:
-        raise ProgramError(f"{path}: expected the columns mass_kg and position_m (or mass (g), position (cm))", USAGE)
+        raise ProgramError(f"{path}: expected the columns mass_kg and position_m (or mass (g), position (cm))")
     values: dict[str, list[float]] = {"mass": [], "position": []}
     for line, cells, comma in table[1:]:
         if not any(cell.strip() for cell in cells):
@@ -32,8 +32,8 @@ def read_hooke(path: str | os.PathLike[str]) -> Hooke:
             try:
                 values[name].append(float(text.replace(",", ".") if comma else text) * factor)
             except ValueError:
-                raise ProgramError(f"{path}, line {line}: {name} must be a number, got {text!r}", USAGE) from None
+                raise ProgramError(f"{path}, line {line}: {name} must be a number, got {text!r}") from None
     mass, position = (np.array(values[name]) for name in ("mass", "position"))
     if not (np.isfinite(mass).all() and np.isfinite(position).all()):
-        raise ProgramError(f"{path}: masses and positions must be finite; correct the table", USAGE)
+        raise ProgramError(f"{path}: masses and positions must be finite; correct the table")
     return hooke(mass, position)

@@ -23,7 +23,7 @@ from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
 from acquisition.source import SourceInfo
 from pipeline.track import Track
-from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, detail, tell
+from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
 from springmass.layout import STDIN, part
 from springmass.runs.about import about_of
 from springmass.runs.options import READ, ReadOptions
@@ -164,7 +164,7 @@ def _refuse(path: Path, what: str, options: ReadOptions, allowed: Sequence[str])
     """Refuse options that describe a file which already states everything itself."""
     given = [name for name in options.given() if name in _OF_FILES and name not in allowed]
     if given:
-        raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out", USAGE)
+        raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out")
 
 
 def _from_recording(path: Path, recording: Recording) -> Loaded:
@@ -268,7 +268,7 @@ def cut(track: Track, from_s: float | None, to_s: float | None, *, where: object
     if not len(part) and (from_s, to_s) != (None, None):
         times = track.t[np.isfinite(track.t)]
         span = f"spans {times.min():g} to {times.max():g} s" if times.size else "holds no sample"
-        raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s; the record {span}", USAGE)
+        raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s; the record {span}")
     return part
 
 

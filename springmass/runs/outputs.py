@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquisition.block import Block
 from springmass import __version__
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.layout import STDIN
 from springmass.runs.loading import Loaded
 from storage.run_file.writing import write_run
@@ -83,7 +83,7 @@ def make_folder(path: str | Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ProgramError(
-            f"{folder}: cannot make the folder for results ({error.strerror}); name another with -o", USAGE
+            f"{folder}: cannot make the folder for results ({error.strerror}); name another with -o"
         ) from error
     return folder
 

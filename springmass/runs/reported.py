@@ -18,7 +18,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.registry.found import Found
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.classic import CYCLES, READING_S, STATED_ERROR_M
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.runs.run import Run
 from springmass.runs.table_lines import table_lines
 
@@ -58,7 +58,7 @@ def read_reported(path: str | os.PathLike[str], runs: Sequence[Run]) -> list[Rep
     table = [(line, [cell.strip() for cell in cells], comma) for line, cells, comma in table_lines(Path(path), "table")]
     head = [name.lower() for name in table[0][1]] if table else []
     if not {"run", "name", "value"} <= set(head):
-        raise ProgramError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {', '.join(head)}", USAGE)
+        raise ProgramError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {', '.join(head)}")
     rows = []
     for line, cells, comma in table[1:]:
         text = dict.fromkeys(COLUMNS, "") | dict(zip(head, cells, strict=False))
@@ -77,12 +77,12 @@ def _row(where: str, text: Mapping[str, str], runs: Sequence[Run], *, decimal_co
             numbers[column] = Decimal("nan")
         number = numbers[column]
         if not (number.is_finite() and abs(number.adjusted()) < 100) or (column == "u" and number < 0):
-            raise ProgramError(f"{where}: {column} must be a number such as 14.0 or 1e-3, got {text[column]!r}", USAGE)
+            raise ProgramError(f"{where}: {column} must be a number such as 14.0 or 1e-3, got {text[column]!r}")
     names = [run.name for run in runs]
     begun = [name for name in names if name.lower().startswith(text["run"].lower())]
     of = [text["run"]] if text["run"] in names else begun
     if len(of) != 1:
-        raise ProgramError(f"{where}: {text['run']!r} must be one of {', '.join(names)}, or its beginning", USAGE)
+        raise ProgramError(f"{where}: {text['run']!r} must be one of {', '.join(names)}, or its beginning")
     name, unit = _NAMES.get(text["name"], text["name"]), text["unit"]
     (recorded,) = (run.loaded.track.unit for run in runs if run.name == of[0])
     si = QUANTITIES[name].unit_in(recorded) if name in QUANTITIES else unit
@@ -90,7 +90,7 @@ def _row(where: str, text: Mapping[str, str], runs: Sequence[Run], *, decimal_co
     if unit and unit != si and unit not in _SAME.get(si, ()):
         measure = time_unit(unit) if si == "s" else measure_of(unit)
         if measure is None or measure.si != si:
-            raise ProgramError(f"{where}: {unit!r} is no unit of {_word(name)}; give {si or 'none'}", USAGE)
+            raise ProgramError(f"{where}: {unit!r} is no unit of {_word(name)}; give {si or 'none'}")
         factor = float(10.0**measure.power * measure.factor)
     rounding = 0.5 * 10.0 ** float(numbers["value"].as_tuple().exponent)
     printed = " ".join(filter(None, [text["value"], text["u"] and f"+- {text['u']}", unit]))

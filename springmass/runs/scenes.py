@@ -14,7 +14,7 @@ from acquisition.errors import visible
 from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
-from springmass.errors import USAGE, ProgramError, complain
+from springmass.errors import ProgramError, complain
 
 Amendments = Mapping[tuple[str, str], Any]
 """Mapping of a scene's (table, key) to a value as a scene file states it."""
@@ -26,8 +26,7 @@ def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
     if len(paths) not in (0, 1, count):
         raise ProgramError(
             f"--scene was given {len(paths)} times for {count} runs; give it once for all of them, "
-            "or once for each in their order",
-            USAGE,
+            "or once for each in their order"
         )
     scenes: list[Scene | None] = [read_scene(path) for path in paths] or [None]
     return scenes * count if len(scenes) == 1 else scenes
@@ -46,7 +45,7 @@ def scene_from(given: Any) -> Scene | None:
         return Scene.from_mapping(given)
     if not isinstance(given, str | os.PathLike):
         demand = f"scene must be a Scene, a mapping of its tables or a path, got {visible(repr(given)[:80])}"
-        raise ProgramError(f"{demand}; name a file", USAGE)
+        raise ProgramError(f"{demand}; name a file")
     return read_scene(Path(given))
 
 
@@ -56,12 +55,11 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         with open_regular(path) as file:
             content = file.read(LONGEST_SCENE + 1) or b""
     except OSError as error:
-        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name", USAGE) from error
+        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name") from error
     if len(content) > LONGEST_SCENE:
         raise ProgramError(
             f"{path}: expected a scene file of at most {LONGEST_SCENE} bytes, got a longer one; "
-            "name the scene, not the recording",
-            USAGE,
+            "name the scene, not the recording"
         )
     text = ""
     try:
@@ -73,17 +71,17 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         if unfilled := re.search(r"^\s*(\w+)\s*=[^#\n]*\.\.\.", text, re.MULTILINE):
             demand = f"{unfilled[1]} has no number yet; put yours for the dots, or # before the line"
-            raise ProgramError(f"{path}: {demand}", USAGE) from error
+            raise ProgramError(f"{path}: {demand}") from error
         reason = " ".join(str(error).split())
         demand = f"not a TOML file ({reason}); see the scene file in the reference"
-        raise ProgramError(f"{path}: {demand}", USAGE) from error
+        raise ProgramError(f"{path}: {demand}") from error
 
 
 def _scene_of(tables: Any, where: str) -> Scene:
     try:
         return Scene.from_mapping(tables, where=where)
     except SceneError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(str(error)) from error
 
 
 def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
@@ -94,7 +92,7 @@ def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
     try:
         return Scene.from_mapping(tables, where=where)
     except SceneError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(str(error)) from error
 
 
 def stated_keys(scene: Scene) -> str:

@@ -21,7 +21,7 @@ from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.results.effects import Effect
 from pipeline.track import F8
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 
 if TYPE_CHECKING:
     from pipeline.analysis import Analysis
@@ -119,7 +119,7 @@ def count_of(seconds: float, spacing_s: float) -> int:
     count = round(seconds / spacing_s) if spacing_s > 0 else 0
     if not 1 <= count <= MOST_SAMPLES:
         raise ProgramError(
-            f"--seconds {seconds:g} at --dt {spacing_s:g} makes {count} steps; allowed are 1 to {MOST_SAMPLES}", USAGE
+            f"--seconds {seconds:g} at --dt {spacing_s:g} makes {count} steps; allowed are 1 to {MOST_SAMPLES}"
         )
     return count
 
@@ -179,8 +179,7 @@ def demand_stable(problem: Problem, method: str, step_s: float | None, *, where:
     step = "a step" if step_s is None else f"a step of {step_s:g} s"
     raise ProgramError(
         f"{where}: {integrator.words} is unstable with {step}: {known}; {remedy}--method {other}, "
-        "or --force to run it all the same",
-        USAGE,
+        "or --force to run it all the same"
     )
 
 
