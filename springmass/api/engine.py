@@ -11,7 +11,7 @@ from xarray.backends import BackendEntrypoint
 
 from acquisition.recordings.identify import inspect
 from springmass.api.sources import load
-from springmass.runs.loading import kind_of
+from springmass.runs.inputs import kind_of
 
 
 class Engine(BackendEntrypoint):

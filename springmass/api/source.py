@@ -20,12 +20,11 @@ from acquisition.replay import Replay
 from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.runs.loading import Loaded, load
+from springmass.runs.loading import Loaded, load, to_track
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import made_now, save_run
 from springmass.runs.scenes import scene_from
 from springmass.runs.simulating.bench import bench_position
-from springmass.runs.tracks import to_track
 from springmass.session.finding import name_sensors
 from springmass.session.output import demand_new
 from springmass.session.sensors import Sensor

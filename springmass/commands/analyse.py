@@ -17,19 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from pipeline.numerics.estimate import Estimate
-from springmass.commands.options import (
-    FURTHER,
-    BenchOptions,
-    Figures,
-    File,
-    Json,
-    Scenes,
-    Strict,
-    argument,
-    flag,
-    option,
-    output,
-)
+from springmass.commands.options import FURTHER, BenchOptions, Figures, File, Json, Scenes, Strict
 from springmass.errors import (
     OK,
     REJECTED,
@@ -43,8 +31,7 @@ from springmass.errors import (
     tell,
 )
 from springmass.layout import STDIN
-from springmass.runs.about import remember_scene
-from springmass.runs.analysing import Failed, Task, analyse_all, law_line
+from springmass.runs.analysing import Failed, Task, analyse_all, law_lines
 from springmass.runs.inputs import files_of
 from springmass.runs.json_results import rejected
 from springmass.runs.options import How
@@ -52,6 +39,7 @@ from springmass.runs.outputs import distinct_names, make_folder, results_name
 from springmass.runs.questions import for_command
 from springmass.runs.run import Run
 from springmass.runs.scenes import read_scenes
+from springmass.values import argument, flag, option, output
 from storage.errors import WriteFailed
 
 if TYPE_CHECKING:
@@ -64,13 +52,12 @@ LONGEST_INPUTS = 48  # maximum length of input names repeated in a suggested com
 
 @dataclass(frozen=True, slots=True)
 class _Done:
-    """What is printed at the end of one of several runs."""
+    """What is printed at the end of several runs, by name; their samples are not kept."""
 
-    name: str
-    result: Mapping[str, Any] = field(default_factory=dict)
-    table: Mapping[TableKey, Estimate] = field(default_factory=dict)
-    numbers: Mapping[str, Estimate] = field(default_factory=dict)
-    law: str = ""
+    results: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    tables: dict[str, Mapping[TableKey, Estimate]] = field(default_factory=dict)
+    numbers: dict[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    laws: dict[str, None] = field(default_factory=dict)
 
 
 @Parameter(name="*")
@@ -79,9 +66,6 @@ class AnalyseOptions:
     """The options of ``springmass analyse``."""
 
     scene: Scenes = ()
-    save_scene: Annotated[bool, flag("note the stated scene next to the recording, for later commands"), FURTHER] = (
-        False
-    )
     method: Annotated[
         Literal["classic"] | None, option("NAME", "also apply the lab report's classic method, for comparison"), FURTHER
     ] = None
@@ -117,16 +101,13 @@ def analyse(
     alone = len(found) == 1
     names = [""] if alone else distinct_names(["stdin" if one.path == STDIN else one.path for one in found])
     how = replace(how, method=options.method)
+    hows = [how if one.velocity is None else replace(how, velocity=one.velocity) for one in found]
     tasks = [
-        Task(
-            one.path, name, scenes[one.of], how if one.velocity is None else replace(how, velocity=one.velocity), values
-        )
-        for one, name in zip(found, names, strict=True)
+        Task(one.path, name, scenes[one.of], its, values) for one, name, its in zip(found, names, hows, strict=True)
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
-    files = [options.scene[one.of if len(options.scene) > 1 else 0] if options.scene else None for one in found]
     if not alone:
-        return _several(tasks, files, inputs, options, out)
+        return _several(tasks, inputs, options, out)
     (run,) = analyse_all(tasks)
     if isinstance(run, Failed):
         if run.question is not None and inputs == [found[0].path]:
@@ -135,51 +116,40 @@ def analyse(
     if options.json:
         print(json.dumps(run.result, allow_nan=False), flush=True)
     else:
-        if line := law_line(run, files[0]):
-            print(line)
         _print_text(run, options)
-    if options.save_scene:
-        _save_scene(run)
     written = OK if out is None else _write(out / results_name(run), [run], options)
     return max(_judged(run, options), written)
 
 
-def _several(
-    tasks: Sequence[Task],
-    files: Sequence[File | None],
-    inputs: Sequence[str],
-    options: AnalyseOptions,
-    out: Path | None,
-) -> int:
+def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:
     """Analyse many inputs: one Table 1, one file of numbers and, if they are few, one report."""
     from springmass.runs.rows import every_number, table_estimates
     from springmass.terminal.progress import counted
 
-    done: list[_Done] = []
+    done = _Done()
     runs: list[Run] = []
     codes: list[int] = []
-    analysed = counted(analyse_all(tasks), len(tasks), "runs", quiet=manner()[0])
-    for run, file in zip(analysed, files, strict=True):
+    for run in counted(analyse_all(tasks), len(tasks), "runs", quiet=manner()[0]):
         if isinstance(run, Failed):
             codes.append(_failed(run))
             continue
         if options.json:
             print(json.dumps(run.result, allow_nan=False), flush=True)
-        if options.save_scene:
-            _save_scene(run)
         codes.append(_judged(run, options))
-        table, numbers = table_estimates(run.analysis), every_number(run.analysis)
-        done.append(_Done(run.name, run.result, table, numbers, law_line(run, file)))
+        done.results[run.name] = run.result
+        done.tables[run.name] = table_estimates(run.analysis)
+        done.numbers[run.name] = every_number(run.analysis)
+        done.laws.update(dict.fromkeys(law_lines([run])))
         if len(tasks) <= MOST_TOGETHER:
             runs.append(run)
-    if done and not options.json:
+    if done.results and not options.json:
         _print_together(done, options)
     written = OK
     if runs and out is not None:
         written = _write(out / TOGETHER, runs, options)
-    elif done and out is not None:
+    elif done.results and out is not None:
         written = _written(lambda: f"written: {_write_numbers(out / TOGETHER, done)}", out)
-    if len(done) > 1:
+    if len(done.results) > 1:
         named = shlex.join(inputs)
         suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
@@ -212,18 +182,6 @@ def _judged(run: Run, options: AnalyseOptions) -> int:
     return OK
 
 
-def _save_scene(run: Run) -> None:
-    """Note the scene next to the recording; if that is impossible, print a message and continue."""
-    if run.loaded.path == Path(STDIN):
-        tell("--save-scene notes a scene next to a file; standard input has none, save the recording first")
-        return
-    try:
-        if noted := remember_scene(run.loaded.path, run.loaded.scene, run.scene):
-            tell(f"scene saved for this recording: {noted}")
-    except WriteFailed as error:
-        complain(error)
-
-
 def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.budgets import budget_text
@@ -235,7 +193,7 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     from springmass.typeset import typeset
 
     style = style_of(sys.stdout, si=options.si)
-    print(text_table([run.name], [run.analysis], style))
+    print(*law_lines([run]), text_table([run.name], [run.analysis], style), sep="\n")
     if run.classic is not None:
         print(f"{classic_text(run.classic)}\n")
     if options.full and (budget := budget_text(run.analysis)):
@@ -246,17 +204,15 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     print(findings_text(run.result["findings"], typeset if style.unicode else str, full=options.full))
 
 
-def _print_together(done: Sequence[_Done], options: AnalyseOptions) -> None:
+def _print_together(done: _Done, options: AnalyseOptions) -> None:
     from springmass.terminal.printing import shared_findings_text
     from springmass.terminal.style import style_of
     from springmass.terminal.table1 import text_table
     from springmass.typeset import typeset
 
-    for line in dict.fromkeys(one.law for one in done if one.law):
-        print(line)
     style = style_of(sys.stdout, si=options.si)
-    print(text_table([one.name for one in done], [one.table for one in done], style))
-    findings = {one.name: one.result["findings"] for one in done}
+    print(*done.laws, text_table([*done.tables], [*done.tables.values()], style), sep="\n")
+    findings = {name: result["findings"] for name, result in done.results.items()}
     print(shared_findings_text(findings, typeset if style.unicode else str))
 
 
@@ -280,14 +236,14 @@ def _written(write: Callable[[], str], folder: Path) -> int:
     return OK
 
 
-def _write_numbers(folder: Path, done: Sequence[_Done]) -> Path:
+def _write_numbers(folder: Path, done: _Done) -> Path:
     """Write the numbers of all runs: results.csv for a table, results.json for programs."""
     from springmass.runs.rows import results_csv
     from storage.atomic import write_whole
     from storage.folder import whole_folder
 
-    text = json.dumps([one.result for one in done], indent=2, allow_nan=False, ensure_ascii=False)
+    text = json.dumps([*done.results.values()], indent=2, allow_nan=False, ensure_ascii=False)
     with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
         write_whole(part / "results.json", f"{text}\n".encode("utf-8", "backslashreplace"))
-        write_whole(part / "results.csv", results_csv([one.name for one in done], [one.numbers for one in done]))
+        write_whole(part / "results.csv", results_csv([*done.numbers], [*done.numbers.values()]))
     return folder / "results.csv"

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from springmass.commands.options import File, argument, flag, option, output, refuse
+from springmass.commands.options import File, refuse
 from springmass.course.page import GROUPS, PAGE
 from springmass.course.plan import plan
 from springmass.course.rows import CSV, FAILED
@@ -23,7 +23,7 @@ from springmass.runs.options import How
 from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
 from springmass.terminal.progress import TaskProgress
-from springmass.values import Count, WholeNumber
+from springmass.values import Count, WholeNumber, argument, flag, option, output
 
 
 @Parameter(name="*")

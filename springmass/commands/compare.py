@@ -8,23 +8,22 @@ import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from acquisition.errors import visible
-from springmass.commands.options import Figures, File, Json, Scenes, Strict, argument, option, output, refuse
+from springmass.commands.options import Figures, File, Json, Scenes, Strict, refuse
 from springmass.course.rows import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
-from springmass.runs.analysing import Task, analysed, law_line
+from springmass.runs.analysing import Task, analysed, law_lines
 from springmass.runs.comparing import Compared, beside, compare_runs, comparison_json
 from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
 from springmass.runs.options import How
 from springmass.runs.outputs import distinct_names, make_folder, now_utc
 from springmass.runs.run import Run
 from springmass.runs.scenes import read_scenes
-from springmass.values import Share
+from springmass.values import Share, argument, option, output
 
 if TYPE_CHECKING:
     from springmass.course.benches import CourseComparison
@@ -78,11 +77,6 @@ def compare(
     if options.json:
         print(json.dumps(result, allow_nan=False), flush=True)
     else:
-        every: list[str | Path | None] = [*options.scene] or [None]
-        files = every if len(every) == len(runs) else every * len(runs)
-        lines = [law_line(run, file) for run, file in zip(runs, files, strict=True)]
-        for line in dict.fromkeys(line for line in lines if line):
-            print(line)
         _print_text(compared, runs)
     if out is not None:
         from springmass.report.write import write_report
@@ -128,7 +122,8 @@ def _print_text(compared: Compared, runs: list[Run]) -> None:
     from springmass.terminal.printing import comparison_text, findings_text, reported_text, wrapped
     from springmass.terminal.style import style_of
 
-    print(comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout)))
+    text = comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout))
+    print(*law_lines(runs), text, sep="\n")
     for message in (*beside(compared), *(joint.message for joint in compared.joint)):
         print(f"\n{wrapped(message)}")
     if compared.reported:

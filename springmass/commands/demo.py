@@ -8,7 +8,7 @@ from typing import Annotated
 
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import File, output
+from springmass.commands.options import File
 from springmass.errors import OK, suggest
 from springmass.report.write import write_report
 from springmass.runs.analysing import Task, analysed
@@ -21,6 +21,7 @@ from springmass.runs.scenes import read_scene
 from springmass.terminal.printing import findings_text
 from springmass.terminal.style import style_of
 from springmass.terminal.table1 import text_table
+from springmass.values import output
 
 RUNS = ("undamped", "damped")
 

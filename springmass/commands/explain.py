@@ -9,9 +9,10 @@ from typing import Annotated
 
 from pipeline.findings.finding import Kind, kinds, usual_advice, word
 from pipeline.registry.found import Found
-from springmass.commands.options import Json, argument
+from springmass.commands.options import Json
 from springmass.errors import OK, ProgramError
 from springmass.terminal.printing import wrapped
+from springmass.values import argument
 
 COLUMNS = 80
 INDENT = " " * 9

@@ -17,10 +17,9 @@ from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.errors import visible
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
-from springmass.commands.options import flag, option
 from springmass.errors import OK, SENSOR, ProgramError, suggest, tell
 from springmass.session.sensors import outdated, settings_of
-from springmass.values import Whole
+from springmass.values import Whole, flag, option
 
 ANSWER_S = 5.0
 """Longest time until a board answers: opening the port restarts it, and its bootloader waits for two seconds."""

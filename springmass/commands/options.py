@@ -13,33 +13,13 @@ from cyclopts import Group, Parameter, Token
 from springmass.errors import ProgramError
 from springmass.runs.options import ReadOptions
 from springmass.runs.questions import option_of
-from springmass.values import LawName, Positive, TcpPort
+from springmass.values import LawName, Positive, TcpPort, argument, flag, option
 
 File = str | Path
 """The name of a file; a shell completes it."""
 THE_PAGE = Group("The page", sort_key=4)
 FURTHER = Parameter(group=Group("Further options", sort_key=4))
 """Marks an option that few people use, which the help shows below the others."""
-
-
-def argument(name: str, words: str, *, required: bool | None = None) -> Parameter:
-    """Return the declaration of a positional argument."""
-    return Parameter(name=name, metavar=name, help=words, required=required)
-
-
-def option(metavar: str, words: str, *names: str) -> Parameter:
-    """Return the declaration of an option that takes a value."""
-    return Parameter(name=names, metavar=metavar, help=words)
-
-
-def output(metavar: str, words: str) -> Parameter:
-    """Return the declaration of the option that names the output."""
-    return option(metavar, words, "-o", "--output")
-
-
-def flag(words: str) -> Parameter:
-    """Return the declaration of an option without a value."""
-    return Parameter(help=words)
 
 
 def converted(metavar: str, words: str, convert: Callable[[str], Any]) -> Parameter:
@@ -148,9 +128,7 @@ class PageOptions:
         Positive | None, option("U", "target uncertainty of the period, us (default: 40 ppm of the period)")
     ] = None
     lan: Annotated[bool, flag("let other devices on the local network view the page")] = False
-    law: Annotated[
-        LawName | None, option("NAME", "damping law, if known: linear, quadratic ...; any: choose from the data")
-    ] = None
+    law: LawName = None
 
 
 PART = ("from_s", "to_s", "clock_ppm")

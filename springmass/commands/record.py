@@ -25,7 +25,7 @@ from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
-from springmass.commands.options import File, PageOptions, converted, flag, option, output
+from springmass.commands.options import File, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
 from springmass.runs.outputs import made_now
@@ -42,7 +42,7 @@ from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import ProgressLine
 from springmass.terminal.style import style_of
-from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole
+from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
 from storage.recovery.recover import recover

@@ -16,7 +16,7 @@ from acquisition.errors import visible
 from pipeline.dynamics.band import Band
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
-from springmass.commands.options import Figures, File, Json, Overwrite, flag, option, output
+from springmass.commands.options import Figures, File, Json, Overwrite
 from springmass.errors import OK, ProgramError, suggest, tell
 from springmass.runs.json_results import picked
 from springmass.runs.options import How, ReadOptions
@@ -36,7 +36,7 @@ from springmass.runs.simulating.simulation import (
     summary,
 )
 from springmass.terminal.printing import wrapped
-from springmass.values import Finite, Positive, Whole
+from springmass.values import Finite, Positive, Whole, flag, option, output
 
 GROWTH = ("method", "predicted", "measured", "fails_above_s")
 FAR_BELOW = 1e-3  # of the band; a smaller tolerance gives no benefit

@@ -16,7 +16,6 @@ from typing import Any
 from acquisition.recordings.base import dialect_folder
 from acquisition.regular_file import open_regular, open_regular_text, read_regular
 from pipeline.bench.scene import PLACES, Scene
-from pipeline.errors import SceneError
 from springmass.course.runs_csv import ANSWERS, POSITION, Values, join, read_table
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
@@ -158,10 +157,7 @@ def _scene(values: Values, shared: Scene | None, where: str) -> Scene | None:
     for name in PLACES.keys() & values.keys():
         (table, key), (value, u) = PLACES[name], values[name]
         tables.setdefault(table, {})[key] = {"value": value, "u": u} if u else value
-    try:
-        return Scene.from_mapping(tables, where=where) if tables else None
-    except SceneError as error:
-        raise ProgramError(str(error)) from error
+    return Scene.from_mapping(tables, where=where) if tables else None
 
 
 def names_of(jobs: Sequence[Job]) -> list[str]:

@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.bench.scene import PLACES
-from pipeline.registry.laws import law_names
+from pipeline.registry.laws import ANY_LAW, law_names
 from springmass.course.rows import RESERVED
 from springmass.errors import ProgramError
 from springmass.runs.inputs import InputFile
-from springmass.runs.table_lines import table_lines
-from springmass.values import ANY_LAW
+from springmass.runs.tables import table_lines
 
 NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
 LAW = "law"

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from acquisition.errors import AcquisitionError, UnknownFormat
-from acquisition.recordings.identify import sniff
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import ProgramError
+from springmass.runs.inputs import is_recording
 from springmass.runs.scenes import read_tables
 from storage.atomic import write_whole
 
@@ -60,7 +59,7 @@ def about_path(recording: Path) -> Path:
     if recording.suffix.lower() in RUNS:
         return by_stem
     # Path.exists would raise for a name that is too long.
-    if os.path.exists(by_name) or not os.path.exists(by_stem) or any(map(_is_recording, _namesakes(recording))):
+    if os.path.exists(by_name) or not os.path.exists(by_stem) or any(map(is_recording, _namesakes(recording))):
         return by_name
     return by_stem
 
@@ -69,16 +68,6 @@ def _namesakes(recording: Path) -> Iterator[Path]:
     for other in sorted(recording.parent.glob(f"{glob.escape(recording.stem)}.*")):
         if other.stem == recording.stem and other.name != recording.name and other.is_file():
             yield other
-
-
-def _is_recording(path: Path) -> bool:
-    if path.suffix.lower() in RUNS:
-        return True
-    try:
-        sniff(path)
-    except AcquisitionError as error:
-        return not isinstance(error, UnknownFormat)
-    return True
 
 
 def about_of(recording: Path) -> About:
@@ -99,13 +88,6 @@ def about_of(recording: Path) -> About:
         demand = "notes are a list of texts, marks are [[marks]] with t_s and text"
         raise ProgramError(f"{path}: {demand}; mend or remove the file") from error
     return About(path, scene, notes, marks)
-
-
-def remember_scene(recording: Path, own: Mapping[str, Any] | None, used: Scene) -> Path | None:
-    """Note a scene next to its recording for later commands; return the file, or None if it is ``own`` already."""
-    if used.to_mapping() == Scene.from_mapping(own or {}, where=str(recording)).to_mapping():
-        return None
-    return write_about(about_of(recording).with_more(used, (), ()))
 
 
 def write_about(about: About) -> Path:

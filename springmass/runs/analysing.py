@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
 from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, ProgramError, internal_error
-from springmass.runs.about import about_of
 from springmass.runs.options import HOW, How
 from springmass.runs.run import Run
 from springmass.runs.scenes import Amendments, amended
@@ -71,15 +69,7 @@ def analysed(tasks: Iterable[Task]) -> list[Run]:
     return runs
 
 
-def law_line(run: Run, scene_file: str | Path | None) -> str:
-    """Return a line naming the damping law that the scene states; empty if it states none, or an option set the law.
-
-    ``scene_file`` was given for the recording; without one the scene is noted next to it or stored inside it.
-    """
-    law = run.scene.damping_law
-    if law is None or run.how.law not in (None, law):
-        return ""
-    if scene_file is None:
-        noted = about_of(run.loaded.path)
-        scene_file = run.loaded.path if noted.scene is None else noted.path
-    return f"damping law {law}: stated in {scene_file}"
+def law_lines(runs: Iterable[Run]) -> list[str]:
+    """Return a line for each damping law that a scene states, unless an option set another."""
+    laws = [run.scene.damping_law for run in runs if run.how.law in (None, run.scene.damping_law)]
+    return [f"damping law {law}: stated in the scene" for law in dict.fromkeys(filter(None, laws))]

@@ -19,10 +19,10 @@ from pipeline.results.derive import limited
 from pipeline.results.masses import Hooke, MassLine, mass_line
 from springmass.errors import ProgramError
 from springmass.runs.frames import comparison_frame
-from springmass.runs.hooke import read_hooke
 from springmass.runs.json_results import SCHEMA, parameters_json, picked, plain
 from springmass.runs.reported import Reported, judge, read_reported
 from springmass.runs.run import Run
+from springmass.runs.tables import read_hooke
 
 if TYPE_CHECKING:
     import pandas as pd

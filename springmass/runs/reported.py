@@ -20,7 +20,7 @@ from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.classic import CYCLES, READING_S, STATED_ERROR_M
 from springmass.errors import ProgramError
 from springmass.runs.run import Run
-from springmass.runs.table_lines import table_lines
+from springmass.runs.tables import table_lines
 
 COLUMNS = ("run", "name", "value", "u", "unit")
 APART = 4.0  # differences beyond so many standard uncertainties are no chance

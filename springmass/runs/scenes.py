@@ -34,7 +34,7 @@ def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
 
 def read_scene(path: str | Path) -> Scene:
     """Read a scene file (TOML)."""
-    return _scene_of(read_tables(path), str(path))
+    return Scene.from_mapping(read_tables(path), where=str(path))
 
 
 def scene_from(given: Any) -> Scene | None:
@@ -75,13 +75,6 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         reason = " ".join(str(error).split())
         demand = f"not a TOML file ({reason}); see the scene file in the reference"
         raise ProgramError(f"{path}: {demand}") from error
-
-
-def _scene_of(tables: Any, where: str) -> Scene:
-    try:
-        return Scene.from_mapping(tables, where=where)
-    except SceneError as error:
-        raise ProgramError(str(error)) from error
 
 
 def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
