@@ -144,7 +144,7 @@ def _file(path: Path, found: Inspection) -> dict[str, Any]:
 def _facts(loaded: Loaded) -> dict[str, Any]:
     t = loaded.samples.t
     finite = t[np.isfinite(t)]
-    ends = {"from_s": float(finite.min()), "to_s": float(finite.max()), "span_s": float(np.ptp(finite))}
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (None, None)
     return {
         "title": loaded.title or None,
         "start_time": loaded.provenance.get("start_time"),
@@ -154,7 +154,9 @@ def _facts(loaded: Loaded) -> dict[str, Any]:
         "samples": len(loaded.samples),
         "missing": int(np.count_nonzero(~np.isfinite(loaded.samples.distance))),
         "malformed_rows": loaded.malformed_rows,
-        **(ends if finite.size else dict.fromkeys(ends)),
+        "from_s": low,
+        "to_s": high,
+        "span_s": None if low is None or high is None else high - low,
         **picked(loaded.info, ("rate_hz", "clock", "quantum_m", "stated_error_m")),
         "sha256": loaded.sha256,
         "traps": plain(loaded.traps),

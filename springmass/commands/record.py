@@ -8,7 +8,7 @@ import queue
 import shlex
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -29,6 +29,7 @@ from springmass.commands.options import File, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
 from springmass.runs.outputs import made_now
+from springmass.runs.questions import as_options
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.bench import EXAMPLE, REST_M, Release, bench_position
 from springmass.session.finding import name_sensors
@@ -140,7 +141,11 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
             page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
             ended = _Bench(session, options, log, console, release, page).record()
             session.stop()
-            for line in _failed(ended, session):
+            failed, status = session.failures.describe(), ended.status
+            if status.error:
+                failed.append(f"springmass: {status.error}")
+                failed.append(f"springmass: {status.dropped_records} records that came later were not kept")
+            for line in failed:
                 console.line(line)
             code, run_file, sentences = _built(ended, out, session)
             for line in sentences:
@@ -164,15 +169,6 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
             return INTERRUPTED
         finally:
             session.stop()
-
-
-def _failed(ended: Ended, session: Session) -> list[str]:
-    """Return what went wrong during the recording."""
-    lines, status = session.failures.describe(), ended.status
-    if status.error:
-        lines.append(f"springmass: {status.error}")
-        lines.append(f"springmass: {status.dropped_records} records that came later were not kept")
-    return lines
 
 
 def _built(ended: Ended, out: Path, session: Session) -> tuple[int, Path | None, list[str]]:
@@ -257,12 +253,8 @@ def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
 
 def _page(options: PageOptions, log: Path, session: Session, console: Console) -> PageProcess:
     """Return the page that runs during the recording."""
-    given = ["--page-port", str(options.page_port)]
-    given += [] if options.want_us is None else ["--want-us", str(options.want_us)]
-    given += ["--lan"] if options.lan else []
-    given += [] if options.law is None else ["--law", options.law]
-    given += ["--no-browser"] if options.no_browser else []
-    return PageProcess(given, log, queue.SimpleQueue(), session.stops, session.failures, console.line)
+    given = as_options({each.name: getattr(options, each.name) for each in fields(options)})
+    return PageProcess(shlex.split(given), log, queue.SimpleQueue(), session.stops, session.failures, console.line)
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,12 +270,17 @@ class _Bench:
 
     def record(self) -> Ended:
         """Run the session, with a page from before its beginning to its end."""
+        options = self.options
         self.session.listen(self.console.line)
         operator = None if self.page is None else Operator(self.session, self.page, self.log)
         try:
             if operator is not None:
                 operator.begin()
-            ended = self._recorded(self._limits(), operator)
+            rest = None if options.still is None else self._rest(options.still)
+            trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
+            if not options.ready:
+                self._release(trigger)
+            ended = self._recorded(RunLimits(options.seconds, trigger, rest), operator)
         finally:
             if operator is not None:
                 operator.end()
@@ -292,15 +289,6 @@ class _Bench:
             if ended.by is not EndReason.PAGE:
                 self.page.ended()
         return ended
-
-    def _limits(self) -> RunLimits:
-        """Measure the rest position if requested, and return when the run begins and ends."""
-        options = self.options
-        rest = None if options.still is None else self._rest(options.still)
-        trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-        if not options.ready:
-            self._release(trigger)
-        return RunLimits(options.seconds, trigger, rest)
 
     def _release(self, trigger: Trigger | None) -> None:
         self.release.after(0.0 if trigger is None else trigger.keep_s + 0.5)

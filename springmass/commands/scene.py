@@ -75,8 +75,7 @@ def scene(
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from pipeline.bench.scene import Scene
-    from springmass.runs.about import about_of, write_about
-    from springmass.runs.scenes import ask_about, read_scene, stated_keys
+    from springmass.runs.scenes import about_of, ask_about, read_scene, stated_keys, write_about
 
     noted = scene is not None or note or mark
     if check is not None:

@@ -19,12 +19,11 @@ from pipeline.bench.scene import PLACES, Scene
 from springmass.course.runs_csv import ANSWERS, POSITION, Values, join, read_table
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
-from springmass.runs.about import about_path
 from springmass.runs.analysing import Task
 from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.options import HOW, How
 from springmass.runs.outputs import numbered
-from springmass.runs.scenes import read_scene
+from springmass.runs.scenes import about_path, read_scene
 
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
 _CODE = (".py", ".toml", ".j2", ".css", ".js")

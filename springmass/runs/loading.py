@@ -27,9 +27,9 @@ from acquisition.source import SourceInfo
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
 from springmass.layout import STDIN, part
-from springmass.runs.about import about_of
 from springmass.runs.inputs import kind_of
 from springmass.runs.options import READ, ReadOptions
+from springmass.runs.scenes import about_of
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
 from storage.run_file.reading import CHECKED, open_run

@@ -24,11 +24,7 @@ LONGEST_NAME = 255
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:
-    """Return a name for each input: its file name without the suffix, with repeated names numbered.
-
-    >>> distinct_names(["a/bob.txt", "b/bob.txt", "disc.h5"])
-    ['bob', 'bob-2', 'disc']
-    """
+    """Return a name for each input: its file name without the suffix, with repeated names numbered."""
     return numbered([Path(path).stem for path in paths])
 
 
@@ -46,13 +42,7 @@ def numbered(stems: Sequence[str]) -> list[str]:
 
 
 def in_a_name(name: str, suffix: str) -> str:
-    """Return a name with a suffix added, with the name cut if both exceed the 255 bytes that a file name may have.
-
-    >>> in_a_name("bob", ".results")
-    'bob.results'
-    >>> len(in_a_name("b" * 255, ".results"))
-    255
-    """
+    """Return a name with a suffix added, with the name cut if both exceed the 255 bytes that a file name may have."""
     whole = os.fsencode(name)
     if len(whole) + len(suffix) <= LONGEST_NAME:
         return name + suffix

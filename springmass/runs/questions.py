@@ -26,11 +26,7 @@ def quoted(word: str) -> str:
 
 
 def as_options(answers: Mapping[str, object]) -> str:
-    """Return keyword arguments of :func:`springmass.load` as command-line options.
-
-    >>> as_options({"channel": "column 2", "rate_hz": 50.0, "unverified": False, "unit": None})
-    '--channel "column 2" --rate-hz 50'
-    """
+    """Return keyword arguments of :func:`springmass.load` as command-line options."""
     words = []
     for name, value in answers.items():
         if value is True:
@@ -43,22 +39,12 @@ def as_options(answers: Mapping[str, object]) -> str:
 
 
 def as_arguments(answers: Mapping[str, object]) -> str:
-    """Return keyword arguments of :func:`springmass.load` as Python source text.
-
-    >>> as_arguments({"channel": "column 2", "rate_hz": 50.0})
-    'channel="column 2", rate_hz=50.0'
-    """
+    """Return keyword arguments of :func:`springmass.load` as Python source text."""
     return ", ".join(f"{name}={_literal(value)}" for name, value in answers.items() if _is_given(value))
 
 
 def for_command(question: Question, words: Sequence[str], given: Mapping[str, object]) -> str:
-    """Return the command line that answers a question.
-
-    >>> from acquisition.recordings.questions import Missing, MissingItem
-    >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
-    >>> for_command(question, ["springmass", "convert", "run.csv", "run.h5"], {"channel": "theta"})
-    'springmass convert run.csv run.h5 --channel theta --unit rad'
-    """
+    """Return the command line that answers a question."""
     kept = as_options(_without(given, question))
     if "--" in words:
         # Options follow, so ``./`` is put before a file name that begins with a minus sign.
@@ -74,13 +60,7 @@ def for_course(question: Question) -> str:
 
 
 def for_python(question: Question, function: str, given: Mapping[str, object]) -> str:
-    """Return the Python call that answers a question.
-
-    >>> from acquisition.recordings.questions import Missing, MissingItem
-    >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
-    >>> for_python(question, "springmass.load", {"channel": "theta"})
-    'springmass.load("run.csv", channel="theta", unit="rad")'
-    """
+    """Return the Python call that answers a question."""
     kept = as_arguments(_without(given, question))
     examples = as_arguments(question.examples)
     return f"{function}({', '.join(each for each in (_literal(question.path), kept, examples) if each)})"
