@@ -39,7 +39,7 @@ FURTHER = {
     "formats": "List the formats of recordings, or identify that of a file.",
     "simulate": "Solve the equation of motion of a scene.",
     "trade": "Measure what accuracy costs on this machine, in two tables.",
-    "firmware": "Wire, flash and set the 100 Hz rangefinder.",
+    "firmware": "Wire and set the 100 Hz rangefinder; how to flash it.",
     "doctor": "Check this installation.",
 }
 COMMANDS = (*FIRST, *FURTHER)

@@ -1,7 +1,7 @@
 """``springmass analyse``: from recordings to Table 1, findings and a report.
 
 Several inputs are analysed one after the other: twenty records of two minutes take 1.4 s, and a second process would
-take longer to begin (``benchmarks/many.py``).
+take longer to begin (``benchmarks/many.py``). Their samples are in memory together; ``springmass batch`` is for more.
 """
 
 from __future__ import annotations
@@ -9,14 +9,13 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from pipeline.numerics.estimate import Estimate
 from springmass.commands.options import FURTHER, BenchOptions, Figures, File, Json, Scenes, Strict
 from springmass.errors import (
     OK,
@@ -43,21 +42,10 @@ from springmass.values import argument, flag, option, output
 from storage.errors import WriteFailed
 
 if TYPE_CHECKING:
-    from springmass.runs.rows import TableKey
+    pass
 
 TOGETHER = "together.results"
-MOST_TOGETHER = 20  # inputs in one report: their samples are in memory together; batch is for more
 LONGEST_INPUTS = 48  # maximum length of input names repeated in a suggested command
-
-
-@dataclass(frozen=True, slots=True)
-class _Done:
-    """What is printed at the end of several runs, by name; their samples are not kept."""
-
-    results: dict[str, Mapping[str, Any]] = field(default_factory=dict)
-    tables: dict[str, Mapping[TableKey, Estimate]] = field(default_factory=dict)
-    numbers: dict[str, Mapping[str, Estimate]] = field(default_factory=dict)
-    laws: dict[str, None] = field(default_factory=dict)
 
 
 @Parameter(name="*")
@@ -122,11 +110,9 @@ def analyse(
 
 
 def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:
-    """Analyse many inputs: one Table 1, one file of numbers and, if they are few, one report."""
-    from springmass.runs.rows import every_number, table_estimates
+    """Analyse many inputs: one Table 1 and one report."""
     from springmass.terminal.progress import counted
 
-    done = _Done()
     runs: list[Run] = []
     codes: list[int] = []
     for run in counted(analyse_all(tasks), len(tasks), "runs", quiet=manner()[0]):
@@ -136,20 +122,11 @@ def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptio
         if options.json:
             print(json.dumps(run.result, allow_nan=False), flush=True)
         codes.append(_judged(run, options))
-        done.results[run.name] = run.result
-        done.tables[run.name] = table_estimates(run.analysis)
-        done.numbers[run.name] = every_number(run.analysis)
-        done.laws.update(dict.fromkeys(law_lines([run])))
-        if len(tasks) <= MOST_TOGETHER:
-            runs.append(run)
-    if done.results and not options.json:
-        _print_together(done, options)
-    written = OK
-    if runs and out is not None:
-        written = _write(out / TOGETHER, runs, options)
-    elif done.results and out is not None:
-        written = _written(lambda: f"written: {_write_numbers(out / TOGETHER, done)}", out)
-    if len(done.results) > 1:
+        runs.append(run)
+    if runs and not options.json:
+        _print_together(runs, options)
+    written = _write(out / TOGETHER, runs, options) if runs and out is not None else OK
+    if len(runs) > 1:
         named = shlex.join(inputs)
         suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
@@ -204,46 +181,28 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     print(findings_text(run.result["findings"], typeset if style.unicode else str, full=options.full))
 
 
-def _print_together(done: _Done, options: AnalyseOptions) -> None:
+def _print_together(runs: Sequence[Run], options: AnalyseOptions) -> None:
     from springmass.terminal.printing import shared_findings_text
     from springmass.terminal.style import style_of
     from springmass.terminal.table1 import text_table
     from springmass.typeset import typeset
 
     style = style_of(sys.stdout, si=options.si)
-    print(*done.laws, text_table([*done.tables], [*done.tables.values()], style), sep="\n")
-    findings = {name: result["findings"] for name, result in done.results.items()}
+    table = text_table([run.name for run in runs], [run.analysis for run in runs], style)
+    print(*law_lines(runs), table, sep="\n")
+    findings = {run.name: run.result["findings"] for run in runs}
     print(shared_findings_text(findings, typeset if style.unicode else str))
 
 
 def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> int:
+    """Write the report, and return an exit code: a folder that takes none costs one line, and not the result."""
     from springmass.report.write import write_report
 
     template = options.template if len(runs) == 1 else None
-    return _written(
-        lambda: f"report: {write_report(folder, runs, figures=options.figures, template=template)}", folder.parent
-    )
-
-
-def _written(write: Callable[[], str], folder: Path) -> int:
-    """Write files, and return an exit code: a folder that takes none costs one line, and not the result."""
     try:
-        make_folder(folder)
-        tell(write())
+        make_folder(folder.parent)
+        tell(f"report: {write_report(folder, runs, figures=options.figures, template=template)}")
     except (ProgramError, WriteFailed) as error:
         complain(f"{error}; --no-report writes no files")
         return USAGE
     return OK
-
-
-def _write_numbers(folder: Path, done: _Done) -> Path:
-    """Write the numbers of all runs: results.csv for a table, results.json for programs."""
-    from springmass.runs.rows import results_csv
-    from storage.atomic import write_whole
-    from storage.folder import whole_folder
-
-    text = json.dumps([*done.results.values()], indent=2, allow_nan=False, ensure_ascii=False)
-    with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
-        write_whole(part / "results.json", f"{text}\n".encode("utf-8", "backslashreplace"))
-        write_whole(part / "results.csv", results_csv([*done.numbers], [*done.numbers.values()]))
-    return folder / "results.csv"

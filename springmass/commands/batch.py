@@ -45,9 +45,7 @@ class BatchOptions:
 
 
 def batch(
-    *recordings: Annotated[
-        File, argument("INPUT", "recordings, folders (with subfolders), patterns, or @FILE (a list)")
-    ],
+    *recordings: Annotated[File, argument("INPUT", "recordings, folders (with subfolders), or patterns")],
     options: BatchOptions = BatchOptions(),
     how: How = How(),
 ) -> int:

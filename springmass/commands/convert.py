@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path, PurePath
 from typing import Annotated
 
-from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
 from springmass.commands.options import PART, File, Overwrite, refuse
 from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
-from springmass.runs.outputs import save_run
+from springmass.runs.outputs import numbered, save_run
 from springmass.runs.scenes import read_scene
 from springmass.values import argument, option, output
 from storage.atomic import write_whole
@@ -103,7 +102,10 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
     if not loaded.originals:
         raise ProgramError(f"{loaded.path}: no original file travels inside this run; nothing to give back", UNREADABLE)
     if out.is_dir():
-        targets = [out / name for name in _names_apart(loaded.originals)]
+        # Names are external input, so only their last part is used for the path.
+        inside = [PurePath(each.name) for each in loaded.originals]
+        stems = numbered([each.stem for each in inside])
+        targets = [out / f"{stem}{each.suffix}" for stem, each in zip(stems, inside, strict=True)]
     elif len(loaded.originals) == 1:
         targets = [out]
     else:
@@ -114,15 +116,3 @@ def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
         write_whole(target, original.data, overwrite=overwrite)
         for target, original in zip(targets, loaded.originals, strict=True)
     ]
-
-
-def _names_apart(originals: Sequence[Original]) -> list[str]:
-    """Name the originals of a pair; if both have the same name, in separate folders, number the second."""
-    names: list[str] = []
-    for original in originals:
-        # Names are external input, so only their last part is used for the path.
-        path, count = PurePath(original.name), 1
-        while (name := path.name if count == 1 else f"{path.stem}-{count}{path.suffix}") in names:
-            count += 1
-        names.append(name)
-    return names

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.recordings.base import dialect_folder
-from acquisition.regular_file import open_regular, open_regular_text, read_regular
+from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from springmass.course.runs_csv import ANSWERS, POSITION, Values, join, read_table
 from springmass.errors import UNREADABLE, ProgramError
@@ -90,9 +90,9 @@ def plan(
 ) -> Plan:
     """Find the runs of a course and the known values of each.
 
-    Inputs are files, folders with all their contents, patterns, and lists: ``@FILE`` names a file with one path per
-    line; without inputs, the files that the table of runs names. Scene and options are for all runs, and the table
-    takes precedence. ``known`` are paths that an earlier pass identified as recordings, ``output`` is left out.
+    Inputs are files, folders with all their contents, and patterns; without inputs, the files that the table of runs
+    names. Scene and options are for all runs, and the table takes precedence. ``known`` are paths that an earlier pass
+    identified as recordings, ``output`` is left out.
     """
     table = None if runs_csv is None else read_table(runs_csv)
     out = {os.path.abspath(path) for path in (output, runs_csv) if path is not None}
@@ -126,9 +126,7 @@ def plan(
 def _expanded(inputs: Sequence[str]) -> list[str]:
     texts: list[str] = []
     for text in inputs:
-        if text.startswith("@") and not os.path.exists(text):
-            texts += _listed(Path(text[1:]))
-        elif any(mark in text for mark in "*?[") and not os.path.exists(text):
+        if any(mark in text for mark in "*?[") and not os.path.exists(text):
             matched = sorted(glob.glob(text, recursive=True))
             if not matched:
                 raise ProgramError(f"{text}: no file matches this pattern", UNREADABLE)
@@ -136,15 +134,6 @@ def _expanded(inputs: Sequence[str]) -> list[str]:
         else:
             texts.append(text)
     return texts
-
-
-def _listed(path: Path) -> list[str]:
-    try:
-        with open_regular_text(path, "utf-8-sig") as file:
-            lines = file.read().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProgramError(f"{path}: expected a list of paths, one a line ({error})") from error
-    return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
 
 
 def _scene(values: Values, shared: Scene | None, where: str) -> Scene | None:

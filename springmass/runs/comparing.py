@@ -146,7 +146,7 @@ def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[s
     derived = [_moving(run).derived for run in runs]
     each = zip(found.names, derived, found.each, found.own_u, found.pulls, strict=True)
     numbers = ("chi2", "dof", "largest_deviation", "exchanged", "exchanged_chi2", "message")
-    content = {
+    content: dict[str, Any] = {
         "schema": SCHEMA,
         "comparison": {
             "agree": found.agree,
@@ -174,20 +174,14 @@ def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[s
             for joint in compared.joint
         ],
         "findings": compared.findings,
-        **(
-            {"mass_line": picked(compared.line, ("constant", "effective_mass", "chi2", "dof"))}
-            if compared.line is not None
-            else {}
-        ),
-        **(
-            {"hooke": {"constant": compared.hooke.constant, "normalised_error": compared.normalised_error}}
-            if compared.hooke
-            else {}
-        ),
-        **({"reported": compared.reported} if compared.reported else {}),
-        "runs": [run.result for run in runs],
-        "provenance": provenance,
     }
+    if compared.line is not None:
+        content["mass_line"] = picked(compared.line, ("constant", "effective_mass", "chi2", "dof"))
+    if compared.hooke is not None:
+        content["hooke"] = {"constant": compared.hooke.constant, "normalised_error": compared.normalised_error}
+    if compared.reported:
+        content["reported"] = compared.reported
+    content |= {"runs": [run.result for run in runs], "provenance": provenance}
     return {key: plain(value) for key, value in content.items()}
 
 

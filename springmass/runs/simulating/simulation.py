@@ -22,6 +22,7 @@ from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.results.effects import Effect
 from pipeline.track import F8
 from springmass.errors import ProgramError
+from springmass.runs.json_results import picked
 
 if TYPE_CHECKING:
     from pipeline.analysis import Analysis
@@ -365,11 +366,8 @@ def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | Non
         "running_s": solution.running_s,
         "amplitude_m": found.problem.amplitude_m(),
         "prediction": prediction(found),
-        "equation": {name: getattr(found.problem.equation, name) for name in found.problem.equation.__slots__},
-        "effects": [
-            {key: getattr(effect, key) for key in ("name", "predicted", "measured", "unit", "included", "why")}
-            for effect in effects
-        ],
+        "equation": picked(found.problem.equation, found.problem.equation.__slots__),
+        "effects": [picked(each, ("name", "predicted", "measured", "unit", "included", "why")) for each in effects],
         "against": None,
         "band": None if band is None else _band_summary(band, found.trajectory.t),
     }
