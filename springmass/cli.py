@@ -77,7 +77,7 @@ def _call(words: Sequence[str]) -> int:
     """Call a command; answer command-line errors and a reader's questions, because both need the command line."""
     from cyclopts import CycloptsError
 
-    from springmass.commands import call, without_reading
+    from springmass.commands import call
 
     try:
         with STOPS.raised():
@@ -94,8 +94,7 @@ def _call(words: Sequence[str]) -> int:
             raise
         from springmass.runs.questions import for_command
 
-        others, given = without_reading(words)
-        raise error.with_remedy(for_command(error.question, ["springmass", *others], given)) from None
+        raise error.with_remedy(for_command(error.question, ["springmass", *words])) from None
 
 
 _OUTPUT_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})

@@ -30,13 +30,12 @@ from springmass.errors import (
     tell,
 )
 from springmass.layout import STDIN
-from springmass.runs.analysing import Failed, Task, analyse_all, law_lines
 from springmass.runs.inputs import files_of
 from springmass.runs.json_results import rejected
 from springmass.runs.options import How
 from springmass.runs.outputs import distinct_names, make_folder, results_name
-from springmass.runs.questions import for_command
-from springmass.runs.run import Run
+from springmass.runs.questions import for_command, option_words
+from springmass.runs.run import Failed, Run, Task, analyse_all, law_lines
 from springmass.runs.scenes import read_scenes
 from springmass.values import argument, flag, option, output
 from storage.errors import WriteFailed
@@ -139,10 +138,8 @@ def _failed(failed: Failed) -> int:
     task, message = failed.task, failed.message
     if failed.question is not None:
         path = f"./{task.path}" if task.path.startswith("-") else task.path
-        velocity = () if task.how.velocity is None else ("--velocity", str(task.how.velocity))
-        given = {name: value for name, value in task.how.given().items() if name != "velocity"}
-        words = ["springmass", "analyse", path, *velocity]
-        message = str(failed.question.with_remedy(for_command(failed.question.question, words, given)))
+        words = ["springmass", "analyse", path, *option_words(task.how.given())]
+        message = str(failed.question.with_remedy(for_command(failed.question.question, words)))
     complain(message)
     return failed.code
 

@@ -13,10 +13,9 @@ from cyclopts import Parameter
 
 from springmass.commands.options import File, refuse
 from springmass.course.page import GROUPS, PAGE
-from springmass.course.plan import plan
+from springmass.course.plan import plan, template
 from springmass.course.rows import CSV, FAILED
 from springmass.course.running import run_course
-from springmass.course.runs_csv import template
 from springmass.course.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, manner, suggest, tell
 from springmass.runs.options import How

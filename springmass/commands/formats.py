@@ -20,7 +20,7 @@ from springmass.runs.inputs import kind_of
 from springmass.runs.json_results import picked, plain
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import READ, ReadOptions
-from springmass.runs.questions import for_command, option_of
+from springmass.runs.questions import for_command, option_of, option_words
 from springmass.values import argument
 from storage.errors import StorageError
 
@@ -123,8 +123,8 @@ def _describe(path: Path, read: ReadOptions, *, as_json: bool = False) -> dict[s
         return {**facts, **_facts(load(path, read))}
     except NeedsAnswer as error:
         traps = list(dict.fromkeys(trap for survey in found.surveys for trap in survey.traps))
-        words = ["springmass", "formats", str(path), *(["--json"] if as_json else [])]
-        answered = error.with_remedy(for_command(error.question, words, read.given()))
+        words = ["springmass", "formats", str(path), *(["--json"] if as_json else []), *option_words(read.given())]
+        answered = error.with_remedy(for_command(error.question, words))
         question = [plain(need) for need in error.question.needs]
         needs = visible(f"{answered.problem} {answered.remedy}")
         return {**facts, "needs": needs, "question": question, "traps": plain(traps)}

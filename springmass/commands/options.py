@@ -139,7 +139,3 @@ def refuse(command: str, read: ReadOptions, *names: str) -> None:
     """Refuse options of reading that mean nothing to a command."""
     if given := [option_of(name) for name in read.given() if name in names]:
         raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out")
-
-
-def only_reading(*, read: ReadOptions = ReadOptions()) -> None:
-    """Declare a command that has the options of reading alone, by which they are parted from the others of a line."""

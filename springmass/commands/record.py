@@ -29,7 +29,7 @@ from springmass.commands.options import File, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
 from springmass.runs.outputs import made_now
-from springmass.runs.questions import as_options
+from springmass.runs.questions import option_words
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.bench import EXAMPLE, REST_M, Release, bench_position
 from springmass.session.finding import name_sensors
@@ -253,8 +253,8 @@ def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
 
 def _page(options: PageOptions, log: Path, session: Session, console: Console) -> PageProcess:
     """Return the page that runs during the recording."""
-    given = as_options({each.name: getattr(options, each.name) for each in fields(options)})
-    return PageProcess(shlex.split(given), log, queue.SimpleQueue(), session.stops, session.failures, console.line)
+    given = option_words({each.name: getattr(options, each.name) for each in fields(options)})
+    return PageProcess(given, log, queue.SimpleQueue(), session.stops, session.failures, console.line)
 
 
 @dataclass(frozen=True, slots=True)

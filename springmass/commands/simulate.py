@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
-
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band
 from pipeline.errors import DynamicsError
@@ -39,7 +37,6 @@ from springmass.terminal.printing import wrapped
 from springmass.values import Finite, Positive, Whole, flag, option, output
 
 GROWTH = ("method", "predicted", "measured", "fails_above_s")
-FAR_BELOW = 1e-3  # of the band; a smaller tolerance gives no benefit
 
 
 def simulate(
@@ -140,21 +137,12 @@ def simulate(
 
 
 def _tolerance(tolerance: float | None, band: Band | None, *, given: bool) -> str:
-    """Say where the tolerance comes from, or that it is far below the band."""
+    """Say what the tolerance is, and where it comes from."""
     if tolerance is None:
         return ""
     words = f"tolerance        {tolerance:g} of the amplitude"
-    if not given:
-        of_band = "" if band is None else f"a hundredth of the band, {band.relative_u:.1g} of the amplitude"
-        return f"{words}: {of_band or 'the default'}"
-    if band is not None and 0.0 < tolerance < FAR_BELOW * band.relative_u:
-        turns = dict(zip(band.quantities, np.abs(band.of_log[:, -1].imag).tolist(), strict=True))
-        name = max(turns, key=lambda each: turns[each])
-        words += (
-            f", far below the band: u({name}) alone is {turns[name]:.1g} rad after {band.t[-1]:.3g} s; "
-            f"{default_tolerance(band):.0e} is enough here"
-        )
-    return words
+    of_band = "the default" if band is None else f"a hundredth of the band, {band.relative_u:.1g} of the amplitude"
+    return words if given else f"{words}: {of_band}"
 
 
 def _before(tolerance: str, effects: Sequence[Effect]) -> str:

@@ -1,14 +1,20 @@
-"""Turn inputs into jobs: find the runs and the known values of each, and what its row depends on."""
+"""Turn inputs, and the table of runs with the known values of each, into jobs; and what a row depends on."""
 
 from __future__ import annotations
 
+import csv
 import functools
 import glob
 import hashlib
+import io
 import json
+import math
 import os
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -16,14 +22,16 @@ from typing import Any
 from acquisition.recordings.base import dialect_folder
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
-from springmass.course.runs_csv import ANSWERS, POSITION, Values, join, read_table
+from pipeline.registry.laws import ANY_LAW, law_names
+from springmass.course.rows import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
-from springmass.runs.analysing import Task
 from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.options import HOW, How
 from springmass.runs.outputs import numbered
+from springmass.runs.run import Task
 from springmass.runs.scenes import about_path, read_scene
+from springmass.runs.tables import table_lines
 
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
 _CODE = (".py", ".toml", ".j2", ".css", ".js")
@@ -180,3 +188,169 @@ def digest_of(path: str) -> str:
 
 def _digest(value: object) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+
+
+NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
+LAW = "law"
+ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", LAW, *NUMBERS)
+POSITION = "sensor_position"
+_U = tuple(f"{name}_u" for name in PLACES)
+KNOWN = ("path", "scene", POSITION, *ANSWERS, *PLACES, *_U)
+TEMPLATE = (
+    "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
+    "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
+)  # fmt: skip
+Values = Mapping[str, Any]
+_UNIT = re.compile(r"_(kg|g|m|mm|cm|s|hz|c|pa|n_per_m|per_s)(_u)?$")
+_TAG = re.compile(r"[a-z][a-z0-9_]*")
+
+
+@dataclass(frozen=True, slots=True)
+class RunsTable:
+    """A table of runs: its file, the columns that are tags, and for each row line, path or pattern, and values.
+
+    Values are by column, those of a quantity with its standard uncertainty.
+    """
+
+    path: Path
+    tags: tuple[str, ...]
+    rows: tuple[tuple[int, str, Values], ...]
+
+    def files(self) -> list[str]:
+        """Return the files named without a pattern; relative paths start from the table's folder."""
+        named = [os.path.join(self.path.parent, text) for _, text, _ in self.rows if not self.is_pattern(text)]
+        return list(dict.fromkeys(named))
+
+    def is_pattern(self, text: str) -> bool:
+        """Return whether a row's path is a pattern rather than the name of a file such as ``run [1].txt``."""
+        return any(mark in text for mark in "*?[") and not os.path.exists(self.whole(text))
+
+    def whole(self, text: str) -> str:
+        """Return the absolute path or pattern of a row."""
+        return os.path.abspath(os.path.join(self.path.parent, text))
+
+
+def template(paths: Sequence[str]) -> str:
+    """Return a ``runs.csv`` to fill in, with one row per path."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(TEMPLATE)
+    writer.writerows([path, *[""] * (len(TEMPLATE) - 1)] for path in paths)
+    return out.getvalue()
+
+
+def read_table(path: str | Path) -> RunsTable:
+    """Read a table of runs separated by commas, semicolons or tabs; errors name row, column and value.
+
+    Numbers may have a decimal comma unless commas separate the columns.
+    """
+    path = Path(path)
+    table = list(table_lines(path, "table of runs"))
+    if not table:
+        raise ProgramError(f"{path}: expected a table of runs, got an empty file; see batch --template")
+    (_, head, comma), *lines = table
+    names = [name.strip() for name in head]
+    while names and not names[-1]:
+        names.pop()
+    tags = _tags(path, names)
+    rows = []
+    for line, cells, _ in lines:
+        where = f"{path}, line {line}"
+        if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
+            wrong = f"expected {len(names)} columns, got {len(cells)}; put quotes around a text with a separator"
+            raise ProgramError(f"{where}: {wrong}")
+        texts = {name: cell.strip() for name, cell in zip(names, cells, strict=False) if cell.strip()}
+        if texts and "path" not in texts:
+            raise ProgramError(f"{where}: the path of the run is missing; fill it in")
+        if texts:
+            rows.append((line, texts["path"], _values(path.parent, where, texts, decimal_comma=comma)))
+    return RunsTable(path, tags, tuple(rows))
+
+
+def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the tags among the column names; refuse unknown or repeated columns."""
+    if "path" not in names:
+        raise ProgramError(f"{path}: no column path, got {', '.join(names)}; see batch --template")
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ProgramError(f"{path}: the column {twice[0]} is there twice; leave one out")
+    tags = tuple(name for name in names if name not in KNOWN)
+    for name in tags:
+        near = get_close_matches(name, KNOWN, n=1, cutoff=0.85)
+        if near or _UNIT.search(name):
+            hint = f"did you mean {near[0]}?" if near else f"allowed with a unit are {', '.join(PLACES)}"
+            raise ProgramError(f"{path}: unknown column {name!r}; {hint}")
+        if name in RESERVED:
+            raise ProgramError(f"{path}: {name!r} is a column of the results; rename the column")
+        if not _TAG.fullmatch(name):
+            raise ProgramError(f"{path}: a tag has lower-case letters, digits and _, got {name!r}; rename it")
+    return tags
+
+
+def _values(folder: Path, where: str, texts: Mapping[str, str], *, decimal_comma: bool) -> Values:
+    def number(name: str) -> float:
+        text = texts[name].replace(",", ".") if decimal_comma else texts[name]
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise ProgramError(f"{where}: {name} must be a finite number, got {texts[name]!r}")
+        return value
+
+    values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
+    values |= {name: number(name) for name in NUMBERS if name in texts}
+    values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
+    for name in PLACES:
+        if name in texts:
+            values[name] = (number(name), number(f"{name}_u") if f"{name}_u" in texts else 0.0)
+        elif f"{name}_u" in texts:
+            raise ProgramError(f"{where}: {name}_u is there without {name}; fill in both")
+    if (law := texts.get(LAW)) not in (None, ANY_LAW, *law_names()):
+        laws = ", ".join((*law_names(), ANY_LAW))
+        raise ProgramError(f"{where}: {LAW} must be one of {laws}, got {law!r}")
+    return values
+
+
+def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[InputFile, int, Values]], list[str]]:
+    """Return each file with line and values from the table; a note for each row without file and file without row.
+
+    A file has one run for each row that names its path with a different ``run`` or ``channel``. A row with a path
+    takes precedence over a row with a pattern; other rows that contradict each other are refused.
+    """
+    exact: dict[str, list[tuple[int, Values]]] = {}
+    patterns: list[tuple[int, str, Values]] = []
+    for line, text, values in table.rows:
+        if table.is_pattern(text):
+            patterns.append((line, text if "/" not in text else table.whole(text), values))
+        else:
+            exact.setdefault(table.whole(text), []).append((line, values))
+    used: set[int] = set()
+    joined: list[tuple[InputFile, int, Values]] = []
+    notes = []
+    for file in files:
+        path, first = os.path.abspath(file.path), 0
+        base: Values = {}
+        for line, text, values in patterns:
+            # A pattern without a slash is compared only with the file name.
+            if not fnmatchcase(path if "/" in text else os.path.basename(path), text):
+                continue
+            if clash := sorted(x for x in base.keys() & values.keys() if base[x] != values[x]):
+                wrong = f"lines {first} and {line} both match {file.path} and differ in {clash[0]}"
+                raise ProgramError(f"{table.path}: {wrong}; narrow one of the patterns")
+            base, first = {**base, **values}, first or line
+            used.add(line)
+        lines: dict[tuple[Any, Any], int] = {}
+        for line, values in exact.get(path, []):
+            which = (values.get("run"), values.get("channel"))
+            if which in lines:
+                wrong = f"lines {lines[which]} and {line} both name {file.path}"
+                raise ProgramError(f"{table.path}: {wrong}; leave one out, or give each another run or channel")
+            lines[which] = line
+            joined.append((file, line, {**base, **values}))
+        used |= set(lines.values())
+        if not lines:
+            joined.append((file, first, base))
+        if not lines and not first:
+            notes.append(f"{table.path}: no row belongs to {file.path}")
+    unused = [f"line {line}: {text}" for line, text, _ in table.rows if line not in used]
+    return joined, [*(f"{table.path}, {row}: no file of the inputs belongs to this row" for row in unused), *notes]

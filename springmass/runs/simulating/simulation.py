@@ -104,10 +104,14 @@ class Check:
 class Simulation:
     """A solved problem, its measured error if that was requested, and the time spent on choosing method and step."""
 
-    problem: Problem
     solution: Solution
     check: Check | None = None
     choosing_s: float = 0.0
+
+    @property
+    def problem(self) -> Problem:
+        """The equation and its start."""
+        return self.solution.problem
 
     @property
     def trajectory(self) -> Trajectory:
@@ -191,7 +195,7 @@ def simulated(
     started = time.perf_counter()
     solution = solve(problem, method, spacing_s, count, tolerance)
     choosing_s = time.perf_counter() - started - solution.running_s
-    return Simulation(problem, solution, _checked(problem, solution, spacing_s, count) if check else None, choosing_s)
+    return Simulation(solution, _checked(problem, solution, spacing_s, count) if check else None, choosing_s)
 
 
 def _checked(problem: Problem, solution: Solution, spacing_s: float, count: int) -> Check:
