@@ -1,4 +1,4 @@
-"""``springmass formats``: the families of recordings, what one file is, or what a folder holds."""
+"""``springmass formats``: the families of recordings, or what one file is."""
 
 from __future__ import annotations
 
@@ -10,37 +10,34 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from acquisition.errors import AcquisitionError, NeedsAnswer, UnknownFormat, visible
+from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.base import Survey
 from acquisition.recordings.identify import Inspection, inspect
 from acquisition.recordings.identify import formats as every_format
 from springmass.commands.options import PART, File, Json, refuse
-from springmass.errors import OK, ProgramError, suggest
+from springmass.errors import OK, suggest
 from springmass.runs.inputs import kind_of
 from springmass.runs.json_results import picked, plain
 from springmass.runs.loading import Loaded, load
-from springmass.runs.options import READ, ReadOptions
-from springmass.runs.questions import for_command, option_of, option_words
+from springmass.runs.options import ReadOptions
+from springmass.runs.questions import for_command, option_words
 from springmass.values import argument
-from storage.errors import StorageError
 
 OURS = {
     "run": "springmass run file (HDF5, opens in xarray, h5py and NeXus tools)",
     "wire": "springmass wire log: what was on disk while a run was recorded",
 }
 WHY = {"run": "it begins with the signature of HDF5", "wire": "it begins with the mark of a log's record"}
-WIDEST = 44  # characters of a cell in the table of a folder, but of the last
-COLUMNS = ["file", "family", "channels", "rate", "span", "missing"]
 
 
 def formats(
-    file: Annotated[File | None, argument("FILE", "identify this file, or every file in this folder")] = None,
+    file: Annotated[File | None, argument("FILE", "identify this file")] = None,
     /,
     *,
     as_json: Json = False,
     read: ReadOptions = ReadOptions(),
 ) -> int:
-    """List the formats, or describe a file, or every file of a folder."""
+    """List the formats, or describe a file."""
     refuse("formats", read, *PART)
     if file is None:
         table = {**{f.name: f.title for f in every_format()}, **OURS}
@@ -49,13 +46,6 @@ def formats(
         print(json.dumps(titles) if as_json else "\n".join(lines))
         return OK
     path = Path(file)
-    if path.is_dir():
-        entries = [_entry(each) for each in _files(path)]
-        if as_json:
-            print("\n".join(json.dumps(each, allow_nan=False) for each in entries))
-        else:
-            print(_table([_cells(path, each) for each in entries]))
-        return OK
     facts = _describe(path, read, as_json=as_json)
     if as_json:
         print(json.dumps(facts, allow_nan=False))
@@ -67,49 +57,7 @@ def formats(
     return OK
 
 
-def _files(folder: Path) -> list[Path]:
-    """Return the files of a folder and its subfolders, except hidden ones."""
-    hidden = set(folder.rglob(".*"))
-    return sorted(each for each in folder.rglob("*") if each.is_file() and not hidden & {each, *each.parents})
-
-
-def _entry(path: Path) -> dict[str, Any]:
-    """Return what is known of a file, or why it cannot be read."""
-    try:
-        return _describe(path, READ)
-    except (AcquisitionError, StorageError, ProgramError) as error:
-        unknown = isinstance(error, UnknownFormat)
-        why = "no format recognises it" if unknown else str(error).removeprefix(str(path)).lstrip(":, ")
-        return {"path": str(path), "format": None, "error": why}
-
-
-def _cells(folder: Path, facts: dict[str, Any]) -> list[str]:
-    """Return the row of a file: its channel, or those to choose from, and the options that are missing."""
-    channels = facts.get("channels", ())
-    names = [facts["channel"]] if "channel" in facts else dict.fromkeys(each["name"] for each in channels)
-    first = {"rate_hz": None, "span_s": None, **next(iter(channels), {}), **facts}
-    missing = [each["what"] for each in facts.get("question", ())]
-    timed = not {"rate_hz", "time_unit"} & {*missing}
-    rate, span = (first["rate_hz"], first["span_s"]) if timed else (None, None)
-    options = ", ".join(map(option_of, missing))
-    cells = [str(Path(facts["path"]).relative_to(folder)), facts["format"] or "none", ", ".join(names)]
-    cells += ["" if rate is None else f"{rate:.4g} Hz", "" if span is None else f"{span:.4g} s"]
-    return [*cells, facts.get("error", options)]
-
-
-def _table(rows: list[list[str]]) -> str:
-    """Return rows in columns, with long cells cut."""
-    cut = [[*(_fitted(cell, WIDEST) for cell in cells), _fitted(last, 100)] for *cells, last in (COLUMNS, *rows)]
-    widths = [max(map(len, column)) for column in zip(*cut, strict=True)]
-    return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in cut)
-
-
-def _fitted(cell: str, width: int) -> str:
-    shown = visible(cell)
-    return shown if len(shown) <= width else f"{shown[: width - 3]}..."
-
-
-def _describe(path: Path, read: ReadOptions, *, as_json: bool = False) -> dict[str, Any]:
+def _describe(path: Path, read: ReadOptions, *, as_json: bool) -> dict[str, Any]:
     """Identify a file; if one channel can be used as distance, also describe its samples."""
     kind = kind_of(path)
     if kind != "recording":
@@ -133,7 +81,7 @@ def _describe(path: Path, read: ReadOptions, *, as_json: bool = False) -> dict[s
 def _file(path: Path, found: Inspection) -> dict[str, Any]:
     channels = [
         {"run": each.run or None, "name": each.channel, "unit": each.unit or None}
-        | picked(each, ("samples", "rate_hz", "span_s"))
+        | picked(each, ("samples", "rate_hz"))
         | {"traps": [trap.code for trap in each.traps]}
         for each in found.surveys
     ]
@@ -156,7 +104,6 @@ def _facts(loaded: Loaded) -> dict[str, Any]:
         "malformed_rows": loaded.malformed_rows,
         "from_s": low,
         "to_s": high,
-        "span_s": None if low is None or high is None else high - low,
         **picked(loaded.info, ("rate_hz", "clock", "quantum_m", "stated_error_m")),
         "sha256": loaded.sha256,
         "traps": plain(loaded.traps),
