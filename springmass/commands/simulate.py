@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band
+from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import Figures, File, Json, Overwrite
@@ -26,8 +27,8 @@ from springmass.runs.simulating.simulation import (
     band_of,
     count_of,
     default_tolerance,
-    demand_stable,
     growths,
+    instability,
     prediction,
     prepare,
     simulated,
@@ -91,8 +92,12 @@ def simulate(
         tell(f"from {against}: {', '.join(ready.from_run)}")
     band, of_band = band_of(ready, longest_s)
     wanted = default_tolerance(band) if tolerance is None and method == "auto" else tolerance
-    if not force:
-        demand_stable(ready.problem, method, dt if tolerance is None else None, where=where)
+    wrong, limit = instability(ready.problem, method, dt if tolerance is None else None)
+    if wrong and not force:
+        smaller = f"take --dt {limit} or less, " if limit else "take "
+        other = "auto" if method == STRANG.name else "strang"
+        other += "" if math.isfinite(STRANG.stable_step(ready.problem)) else ", which has no limit"
+        raise ProgramError(f"{where}: {wrong}; {smaller}--method {other}, or --force to run it all the same")
     effects = simulated_effects(ready.stated, ready.problem, dt * count, ready.drag)
     try:
         simulation = simulated(ready.problem, method, dt, count, wanted, check=check)

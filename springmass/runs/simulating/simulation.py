@@ -165,27 +165,22 @@ def default_tolerance(band: Band | None) -> float:
     return float(f"{min(max(BAND_SHARE * band.relative_u, DEFAULT_TOLERANCE), LARGEST_DEFAULT):.1g}")
 
 
-def demand_stable(problem: Problem, method: str, step_s: float | None, *, where: str) -> None:
-    """Refuse a step beyond the limit of its method; without a step it may take any that is short enough."""
-    if method == "auto":
-        return
-    integrator = get_integrator(method)
-    limit = integrator.stable_step(problem)
-    if limit > 0.0 and (step_s is None or step_s <= limit):
-        return
-    known, remedy = "it grows at any step without damping", "take "
+def instability(problem: Problem, method: str, step_s: float | None) -> tuple[str, str]:
+    """Say what is wrong with a step beyond the limit of its method, and return the limit, s, rounded down.
+
+    Both are empty if it is stable, and the limit if there is none. Without a step it may be as short as needed.
+    """
+    integrator = None if method == "auto" else get_integrator(method)
+    limit = math.inf if integrator is None else integrator.stable_step(problem)
+    if integrator is None or (limit > 0.0 and (step_s is None or step_s <= limit)):
+        return "", ""
+    known, rounded = "it grows at any step without damping", ""
     if limit > 0.0:
         power = 10.0 ** (math.floor(math.log10(limit)) - 2)
-        rounded = f"{math.floor(limit / power) * power:.3g}"  # down, so that it is stable
-        known, remedy = f"its limit here is {rounded} s", f"take --dt {rounded} or less, "
-    other = "auto" if integrator is STRANG else "strang"
-    if math.isinf(STRANG.stable_step(problem)):
-        other += ", which has no limit"
+        rounded = f"{math.floor(limit / power) * power:.3g}"
+        known = f"its limit here is {rounded} s"
     step = "a step" if step_s is None else f"a step of {step_s:g} s"
-    raise ProgramError(
-        f"{where}: {integrator.words} is unstable with {step}: {known}; {remedy}--method {other}, "
-        "or --force to run it all the same"
-    )
+    return f"{integrator.words} is unstable with {step}: {known}", rounded
 
 
 def simulated(
