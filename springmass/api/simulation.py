@@ -6,20 +6,19 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import DynamicsError
+from springmass.api.sources import AnyScene
 from springmass.runs.scenes import scene_from
 from springmass.runs.simulating.simulation import band_of, default_tolerance, instability, prepare, solve
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike
 
-    from springmass.api.sources import AnyScene
-
-    Step = Callable[[float, float, float, Callable[[float, float], float]], tuple[float, float]]
+Step = Callable[[float, float, float, Callable[[float, float], float]], tuple[float, float]]
 
 
 def simulate(

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self, Unpack
+from typing import Any, Protocol, Self, Unpack
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from acquisition.live.serial_port import SerialPort
 from acquisition.replay import Replay
 from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
+from springmass.api.sources import AnyScene, Reading
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.runs.loading import Loaded, load, to_track
 from springmass.runs.options import ReadOptions
@@ -31,9 +32,6 @@ from springmass.session.sensors import Sensor
 from springmass.session.session import Session
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
-
-if TYPE_CHECKING:
-    from springmass.api.sources import AnyScene, Reading
 
 RATE_HZ, BLOCK = 100.0, 16
 SIGMA_M = 8e-5  # noise of a simulated rangefinder if its scene states none

@@ -7,12 +7,13 @@ take longer to begin (``benchmarks/many.py``). Their samples are in memory toget
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -33,15 +34,12 @@ from springmass.layout import STDIN
 from springmass.runs.inputs import files_of
 from springmass.runs.json_results import rejected
 from springmass.runs.options import How
-from springmass.runs.outputs import distinct_names, make_folder, results_name
+from springmass.runs.outputs import distinct_names, in_a_name, make_folder
 from springmass.runs.questions import for_command, option_words
 from springmass.runs.run import Failed, Run, Task, analyse_all, law_lines
 from springmass.runs.scenes import read_scenes
 from springmass.values import argument, flag, option, output
 from storage.errors import WriteFailed
-
-if TYPE_CHECKING:
-    pass
 
 TOGETHER = "together.results"
 LONGEST_INPUTS = 48  # maximum length of input names repeated in a suggested command
@@ -104,8 +102,20 @@ def analyse(
         print(json.dumps(run.result, allow_nan=False), flush=True)
     else:
         _print_text(run, options)
-    written = OK if out is None else _write(out / results_name(run), [run], options)
+    written = OK if out is None else _write(out / _results_name(run), [run], options)
     return max(_judged(run, options), written)
+
+
+def _results_name(run: Run) -> str:
+    """Return the name of the folder for a run's report.
+
+    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the channel that was chosen
+    follows, because each has its own results.
+    """
+    path, channel = run.loaded.path, run.how.channel
+    name = "stdin" if str(path) == STDIN else path.stem if run.loaded.format in ("run", "wire") else path.name
+    safe = "" if channel is None else re.sub(r"[^A-Za-z0-9.+-]+", "_", channel).strip("._")[:60]
+    return in_a_name(f"{name}.{safe}" if safe else name, ".results")
 
 
 def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:

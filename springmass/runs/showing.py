@@ -25,23 +25,9 @@ WIDTH = 79
 MOST_ROWS = 10
 # Quantities that the text summary may show, in this order; it shows at most MOST_ROWS of them.
 FIRST = (
-    "period",
-    "spring_constant",
-    "amplitude",
-    "damping_rate",
-    "relaxation_rate",
-    "relaxation_rate_slow",
-    "relaxation_rate_fast",
-    "gamma",
-    "beta",
-    "mu",
-    "c",
-    "n",
-    "offset",
-    "noise",
-    "quality_factor",
-    "drag_coefficient",
-)
+    "period", "spring_constant", "amplitude", "damping_rate", "relaxation_rate", "relaxation_rate_slow",
+    "relaxation_rate_fast", "gamma", "beta", "mu", "c", "n", "offset", "noise", "quality_factor", "drag_coefficient",
+)  # fmt: skip
 
 
 def text_summary(run: Run) -> str:

@@ -6,10 +6,11 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from pipeline.analysis import Analysis
 from pipeline.bench.derived_drag import DerivedDrag, derive_drag, needs_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Integrator, Problem, Trajectory, get_integrator
@@ -23,9 +24,6 @@ from pipeline.results.effects import Effect
 from pipeline.track import F8
 from springmass.errors import ProgramError
 from springmass.runs.json_results import picked
-
-if TYPE_CHECKING:
-    from pipeline.analysis import Analysis
 
 DEFAULT_TOLERANCE = 1e-6
 FINE = 24.0  # states per radian; interpolation between them has an error of 1e-8 of the amplitude
