@@ -8,7 +8,6 @@ import glob
 import hashlib
 import io
 import json
-import math
 import os
 import re
 from collections.abc import Collection, Mapping, Sequence
@@ -31,7 +30,7 @@ from springmass.runs.options import HOW, How
 from springmass.runs.outputs import numbered
 from springmass.runs.run import Task
 from springmass.runs.scenes import about_path, read_scene
-from springmass.runs.tables import table_lines
+from springmass.runs.tables import Row, read_rows
 
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
 _CODE = (".py", ".toml", ".j2", ".css", ".js")
@@ -240,31 +239,14 @@ def template(paths: Sequence[str]) -> str:
 
 
 def read_table(path: str | Path) -> RunsTable:
-    """Read a table of runs separated by commas, semicolons or tabs; errors name row, column and value.
-
-    Numbers may have a decimal comma unless commas separate the columns.
-    """
+    """Read a table of runs; errors name row, column and value."""
     path = Path(path)
-    table = list(table_lines(path, "table of runs"))
-    if not table:
-        raise ProgramError(f"{path}: expected a table of runs, got an empty file; see batch --template")
-    (_, head, comma), *lines = table
-    names = [name.strip() for name in head]
-    while names and not names[-1]:
-        names.pop()
+    names, rows = read_rows(path, "table of runs")
     tags = _tags(path, names)
-    rows = []
-    for line, cells, _ in lines:
-        where = f"{path}, line {line}"
-        if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
-            wrong = f"expected {len(names)} columns, got {len(cells)}; put quotes around a text with a separator"
-            raise ProgramError(f"{where}: {wrong}")
-        texts = {name: cell.strip() for name, cell in zip(names, cells, strict=False) if cell.strip()}
-        if texts and "path" not in texts:
-            raise ProgramError(f"{where}: the path of the run is missing; fill it in")
-        if texts:
-            rows.append((line, texts["path"], _values(path.parent, where, texts, decimal_comma=comma)))
-    return RunsTable(path, tags, tuple(rows))
+    for row in rows:
+        if "path" not in row.cells:
+            raise ProgramError(f"{row.where}: the path of the run is missing; fill it in")
+    return RunsTable(path, tags, tuple((row.line, row.cells["path"], _values(path.parent, row)) for row in rows))
 
 
 def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
@@ -286,28 +268,19 @@ def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
     return tags
 
 
-def _values(folder: Path, where: str, texts: Mapping[str, str], *, decimal_comma: bool) -> Values:
-    def number(name: str) -> float:
-        text = texts[name].replace(",", ".") if decimal_comma else texts[name]
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise ProgramError(f"{where}: {name} must be a finite number, got {texts[name]!r}")
-        return value
-
+def _values(folder: Path, row: Row) -> Values:
+    texts = row.cells
     values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
-    values |= {name: number(name) for name in NUMBERS if name in texts}
+    values |= {name: row.number(name) for name in NUMBERS if name in texts}
     values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
     for name in PLACES:
         if name in texts:
-            values[name] = (number(name), number(f"{name}_u") if f"{name}_u" in texts else 0.0)
+            values[name] = (row.number(name), row.number(f"{name}_u") if f"{name}_u" in texts else 0.0)
         elif f"{name}_u" in texts:
-            raise ProgramError(f"{where}: {name}_u is there without {name}; fill in both")
+            raise ProgramError(f"{row.where}: {name}_u is there without {name}; fill in both")
     if (law := texts.get(LAW)) not in (None, ANY_LAW, *law_names()):
         laws = ", ".join((*law_names(), ANY_LAW))
-        raise ProgramError(f"{where}: {LAW} must be one of {laws}, got {law!r}")
+        raise ProgramError(f"{row.where}: {LAW} must be one of {laws}, got {law!r}")
     return values
 
 

@@ -7,7 +7,6 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
-from pathlib import Path
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.classic import CYCLES, READING_S, STATED_ERROR_M
 from springmass.errors import ProgramError
 from springmass.runs.run import Run
-from springmass.runs.tables import table_lines
+from springmass.runs.tables import Row, read_rows
 
 COLUMNS = ("run", "name", "value", "u", "unit")
 APART = 4.0  # differences beyond so many standard uncertainties are no chance
@@ -55,29 +54,22 @@ class Reported:
 
 def read_reported(path: str | os.PathLike[str], runs: Sequence[Run]) -> list[Reported]:
     """Read a table with the columns run, name, value, u, unit; errors name the line and what to write."""
-    table = [(line, [cell.strip() for cell in cells], comma) for line, cells, comma in table_lines(Path(path), "table")]
-    head = [name.lower() for name in table[0][1]] if table else []
+    head, rows = read_rows(path, "table")
     if not {"run", "name", "value"} <= set(head):
         raise ProgramError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {', '.join(head)}")
-    rows = []
-    for line, cells, comma in table[1:]:
-        text = dict.fromkeys(COLUMNS, "") | dict(zip(head, cells, strict=False))
-        if any(cells):
-            rows.append(_row(f"{path}, line {line}", text, runs, decimal_comma=comma))
-    return rows
+    return [_row(row, runs) for row in rows]
 
 
-def _row(where: str, text: Mapping[str, str], runs: Sequence[Run], *, decimal_comma: bool) -> Reported:
-    numbers = {}
+def _row(row: Row, runs: Sequence[Run]) -> Reported:
+    where, text, numbers = row.where, dict.fromkeys(COLUMNS, "") | dict(row.cells), {}
     for column, empty in (("value", "nan"), ("u", "0")):
-        given = text[column].replace(",", ".") if decimal_comma else text[column]
         try:
-            numbers[column] = Decimal(given or empty)
+            number = Decimal(row.plain(column) or empty)
         except InvalidOperation:
-            numbers[column] = Decimal("nan")
-        number = numbers[column]
+            number = Decimal("nan")
         if not (number.is_finite() and abs(number.adjusted()) < 100) or (column == "u" and number < 0):
             raise ProgramError(f"{where}: {column} must be a number such as 14.0 or 1e-3, got {text[column]!r}")
+        numbers[column] = number
     names = [run.name for run in runs]
     begun = [name for name in names if name.lower().startswith(text["run"].lower())]
     of = [text["run"]] if text["run"] in names else begun

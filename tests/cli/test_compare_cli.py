@@ -133,7 +133,7 @@ def test_many_masses_and_hookes_law(head: str, tmp_path: Path, cli: Cli) -> None
     ("table", "words"),
     [
         ("weight,position_m\n1,2\n", "expected the columns mass_kg and position_m"),
-        ("mass_kg,position_m\n0.1,far\n", "line 2: position must be a number"),
+        ("mass_kg,position_m\n0.1,far\n", "line 2: position_m must be a finite number"),
         ("mass_kg,position_m\n0.1,0.5\n0.2,0.4\n", "three masses"),
         ("mass_kg,position_m\n0.1,0.5\n0.2,0.4\n0.3,0.52\n", "do not follow the masses"),
     ],
