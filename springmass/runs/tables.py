@@ -58,7 +58,7 @@ def read_rows(path: str | os.PathLike[str], what: str) -> tuple[list[str], list[
         raise ProgramError(f"{path}: no {what} can be read ({error.strerror}); check the name") from error
     except UnicodeDecodeError as error:
         raise ProgramError(f"{path}: not in UTF-8; save the sheet as CSV UTF-8") from error
-    first = text.partition("\n")[0]
+    first = next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
     mark = max(",;\t", key=first.count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=mark)
     names: list[str] = []
