@@ -16,7 +16,7 @@ from acquisition.block import Block
 from acquisition.recordings.recording import Trap
 from acquisition.source import ClockKind, SourceInfo
 from pipeline.track import Track
-from springmass.runs.tracks import to_track
+from springmass.runs.loading import to_track
 from storage.wire_log.wire_samples import Origin
 
 VERSION = 2  # of the messages

@@ -24,9 +24,9 @@ from springmass.report.trust import trust_of
 from springmass.report.words import method
 from springmass.runs.comparing import Compared, beside
 from springmass.runs.json_results import picked
-from springmass.runs.laws import laws_across, laws_of
 from springmass.runs.rows import table_rows
 from springmass.runs.run import Run
+from springmass.runs.showing import laws_across, laws_of
 from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset
 
 if TYPE_CHECKING:

@@ -128,7 +128,7 @@ def test_the_amplitude_of_a_small_pendulum_is_corrected_for(degrees: int) -> Non
 
 @pytest.mark.parametrize("step", [0.2, 0.35, 0.5, 0.8])
 def test_steps_as_large_as_the_motion_are_part_of_the_uncertainties(step: float) -> None:
-    """Amplitude, rest position and damping rate hold, and no law is rejected, for steps of up to 0.8 of the amplitude."""
+    """Amplitude, rest position and damping rate hold, and no law is rejected, for steps up to 0.8 of the amplitude."""
     t, amplitude, pulls = np.arange(3000) / 100, 0.03, []
     for seed in range(12):
         rng = np.random.default_rng([seed, 7])
