@@ -113,8 +113,8 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
     _demand_sense(options, page_options)
     _fill_standard_streams()
     if not options.simulate:
-        named = name_sensors(options.port, options.sensor, options.baud)
-        options = replace(options, port=named.ports, sensor=named.sensors, baud=named.baud)
+        ports, names, baud = name_sensors(options.port, options.sensor, options.baud)
+        options = replace(options, port=ports, sensor=names, baud=baud)
     demand_new(out, len(options.port))
     scene = EXAMPLE if options.simulate else None
     if options.scene is not None:

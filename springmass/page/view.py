@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import secrets
 import struct
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from acquisition.block import Block
 from acquisition.recordings.recording import Trap
 from acquisition.source import ClockKind, SourceInfo
 from pipeline.track import Track
+from springmass.runs.json_results import plain
 from springmass.runs.tracks import to_track
 from storage.wire_log.wire_samples import Origin
 
@@ -131,12 +131,4 @@ def json_of(content: Any) -> str:
     try:
         return json.dumps(content, allow_nan=False)
     except ValueError:  # rare; checking every number in advance would double the time
-        return json.dumps(_finite(content), allow_nan=False)
-
-
-def _finite(content: Any) -> Any:
-    if isinstance(content, dict):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [_finite(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content
+        return json.dumps(plain(content))

@@ -1,7 +1,7 @@
 """Run a recording session: listen to the sensors on open ports, and record their bytes until the end.
 
 The reading thread passes bytes unchanged to the recorder, and then through the decoders. The session's own thread waits
-for the end and puts marks into the run. The displayed values are calculated on a separate thread (``display``), which
+for the end and puts marks into the run. The displayed values are calculated on a separate thread, which
 takes samples once a second. It cannot delay or end the other two threads, not even by an exception.
 """
 
@@ -23,11 +23,11 @@ from acquisition.block import Block
 from acquisition.clock import Clock
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortReader
+from pipeline.streaming import LiveMotion, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
-from springmass.session.display import Display, Samples
-from springmass.session.failures import Failures
-from springmass.session.progress import SECOND_NS, LiveState, Progress, progress_of
+from springmass.session.failures import Failures, Worker
+from springmass.session.progress import SECOND_NS, LiveState, Progress, free_bytes, trouble_of
 from springmass.session.reads import Tee
 from springmass.session.sensors import ANSWERED, Sensor, meeting
 from springmass.session.trigger import Disarmed, Trigger, Watch
@@ -42,7 +42,10 @@ HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
 HEARD = 3  # number of readings after which a sensor counts as heard
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # maximum number of blocks kept for the display before the run begins
+LAST_TURN = "the last turn has not ended"
 BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
+
+Samples = Sequence[tuple[int, Block]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +212,7 @@ class Session:
         self._chains = [sensor.chain() for sensor in self.sensors]
         with self.stops.counted():
             recorder = self.recorder = Recorder(log, self._header(), self._clock)
-            display = self._display(listeners.progress)
+            display = self._display()
             start_ns = self._clock.now_ns()
             self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
             try:
@@ -221,11 +224,11 @@ class Session:
                     facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
                     # The time of the sample itself, because an analysis leaves out the rest before it.
                     recorder.event(0, moment_ns, "trigger", facts)
-                by = self._loop(recorder, display, start_ns, limits.seconds, listeners.marks)
+                by = self._loop(recorder, display, start_ns, limits.seconds, listeners)
             finally:
                 self._tee.stop()
                 end_ns = self._clock.now_ns()
-                display.close()
+                display.close(LAST_TURN)
                 self.failures.tell = None
             counts = self.failures.counts
             recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
@@ -252,16 +255,17 @@ class Session:
     def _loop(
         self,
         recorder: Recorder,
-        display: Display,
+        display: Worker,
         start_ns: int,
         seconds: float | None,
-        marks: queue.SimpleQueue[str] | None,
+        listeners: RunListeners,
     ) -> EndReason:
         """Wait for the end of the recording, and return the reason for it."""
 
         def show(*, tick: bool = True) -> None:
-            self._ring(display, self._tee.blocks, start_ns, recorder, tick=tick)
+            self._ring(display, listeners, self._tee.blocks, start_ns, recorder, tick=tick)
 
+        marks = listeners.marks
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
         # Without marks, one turn per second suffices: samples are shown once a second, and a disk error persists.
         wait_ns, tick_ns = int((1.0 if marks is None else LOOK_FOR_MARKS_S) * 1e9), start_ns + SECOND_NS
@@ -293,7 +297,7 @@ class Session:
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
         self._tee.keep(True)
-        display, tick_ns = self._display(listeners.progress), start_ns + SECOND_NS
+        display, tick_ns = self._display(), start_ns + SECOND_NS
         seen: deque[tuple[int, Block]] = deque(maxlen=HELD_BLOCKS)
         try:
             while True:
@@ -308,10 +312,10 @@ class Session:
                 # One second more than needed, because samples may wait for a moment before they are examined.
                 self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)
                 if self._clock.now_ns() >= tick_ns:
-                    self._ring(display, lambda: [seen.popleft() for _ in range(len(seen))], start_ns, None)
+                    self._ring(display, listeners, lambda: [seen.popleft() for _ in range(len(seen))], start_ns, None)
                     tick_ns += SECOND_NS
         finally:
-            display.close()
+            display.close(LAST_TURN)
 
     def _wait_until(self, deadline_ns: int) -> None:
         """Wait until a deadline or a request to end, and record a failure of the reader, if any."""
@@ -322,22 +326,65 @@ class Session:
             self._reader_failure = failure
             self.failures.note("reader", failure)
 
-    def _display(self, progress: Callable[[Progress], None]) -> Display:
+    def _display(self) -> Worker:
+        """Return the thread that shows the recording: a display that is busy or fails cannot delay or end it."""
         self.shown = LiveState(self._chains[0].timebase.rate_hz)
-        return Display(self.shown, progress, self.failures)
+        return Worker("display", lambda error: self.failures.note("display", error))
 
     def _ring(
         self,
-        display: Display,
+        display: Worker,
+        listeners: RunListeners,
         take: Callable[[], Samples],
         start_ns: int,
         recorder: Recorder | None,
         *,
         tick: bool = True,
     ) -> None:
-        now_ns = self._clock.now_ns()
-        state = (self.failures, self._chains, self._tee, recorder, start_ns, now_ns, tuple(self._marks))
-        display.ring(take, lambda shown: progress_of(shown, *state, tick=tick))
+        """Request a turn of the display, which shows the latest state; one that waits already suffices."""
+        shown, now_ns = self.shown, self._clock.now_ns()
+        assert shown is not None
+
+        def turn() -> None:
+            shown.push(take())
+            listeners.progress(self._progress(shown, start_ns, now_ns, recorder, tick=tick))
+
+        if display.idle:
+            display.put(turn)
+
+    def _progress(
+        self, shown: LiveState, start_ns: int, now_ns: int, recorder: Recorder | None, *, tick: bool
+    ) -> Progress:
+        """Return the progress of the recording; without a recorder, it is waiting for its trigger."""
+
+        def motion() -> LiveMotion | NotYet:
+            """Return the motion, or the reason why its calculation failed; the rest of the line is not affected."""
+            try:
+                return shown.motion(now_ns)
+            except BaseException as error:
+                self.failures.note("analysis", error)
+                return NotYet(f"no motion shown ({type(error).__name__})")
+
+        tee, chains, waiting = self._tee, self._chains, recorder is None
+        shown.follow(tee.first)
+        zero_ns = start_ns if shown.origin.ns is None else shown.origin.ns
+        return Progress(
+            seconds=(now_ns - start_ns) * 1e-9,
+            missing=shown.missing,
+            gaps=sum(len(chain.timebase.gaps) + int(chain.timebase.gaps_left_out["count"]) for chain in chains),
+            rate_hz=shown.rate_hz(now_ns),
+            motion=motion,
+            status=None if recorder is None else recorder.status,
+            disk_free_bytes=None if recorder is None else free_bytes(recorder.path.parent),
+            waiting=waiting,
+            unshown=tee.unshown,
+            gone=tuple(tee.gone.values()),
+            silent_s=shown.silent_s(now_ns),
+            missing_share=shown.missing_share,
+            trouble=trouble_of(shown, chains, waiting=waiting),
+            marks=[((host_ns - zero_ns) * 1e-9, text) for host_ns, text in self._marks],
+            tick=tick,
+        )
 
     def _header(self) -> LogHeader:
         return LogHeader(
