@@ -17,7 +17,6 @@ from pipeline.results.curves import Curve
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
 from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
-from springmass.charts.spectrum import peaks_of, spectrum_of
 from springmass.typeset import law_status, pretty
 
 REASONS: tuple[tuple[int, str], ...] = (
@@ -39,7 +38,6 @@ MOST_STRETCHES, LEAST_WINDOWS = 24, 6
 TURNS_OF_SAMPLES = 24  # more would cover each other
 MOST_TURNS = 230  # of the phase plot: 6000 points, of which none may be left out
 MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
-MOST_MEANS = 120  # of kinetic and potential energy; of more periods, one mean covers several
 
 
 def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
@@ -278,15 +276,14 @@ def _with_band(curve: Curve, x: float, y: float, points: str, law: str) -> tuple
     )
 
 
-def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
-    """Mechanical energy with its band, means of its two parts, and the deviation of single amplitudes from the law."""
+def energy(a: Analysis) -> Chart | None:
+    """Mechanical energy with its band, and the deviation of single amplitudes from the law."""
     if not isinstance(a.motion, Oscillation):
         return None
     motion = a.motion
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
     if curve is None:
         return None
-    parts = _energy_means(motion, smoothed or _smoothed(a)) if a.track.unit == "m" else ()
     low, high = float(np.min(curve.y - curve.u)), float(np.max(curve.y))
     law = np.interp(curve.x_points, curve.x, curve.y)
     # Where friction has stopped the motion, the law predicts no energy for comparison.
@@ -295,7 +292,7 @@ def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     width = 100.0 * curve.u[moves] / curve.y[moves]
     label = "energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)"
     series = _with_band(curve, 1.0, 1e3, "from single amplitudes", f"law {motion.damping.selected}")
-    above = Panel(label, (*series, *parts), 2.6, log=low < high / 20.0 if low > 0.0 else None)
+    above = Panel(label, series, 2.6, log=low < high / 20.0 if low > 0.0 else None)
     band = band_of("± u of the law", curve.x[moves], np.zeros(width.size), width)
     points = Series("deviation", curve.x_points[there], off, u=100.0 * curve.u_points[there] / law[there])
     below = Panel("deviation / %", (band, points), 1.3, zero=True)
@@ -303,29 +300,6 @@ def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     of = f"the mass that oscillates, {pretty(mass)}" if mass is not None else "one kilogram, as no mass was given"
     caption = f"Energy m ω² A²/2 of {of}; below, the deviation of single amplitudes from the law."
     return Chart("energy", "Energy", caption, (above, below))
-
-
-def _energy_means(motion: Oscillation, smoothed: Smoothed | None) -> tuple[Series, ...]:
-    """Means of kinetic and potential energy over whole periods: each is half of the energy."""
-    stiffness = motion.derived.half_stiffness
-    if stiffness is None or smoothed is None:
-        return ()
-    rows = np.flatnonzero(np.isfinite(smoothed.position))
-    rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
-    t, f = smoothed.t[rows], motion.cycles.frequency_hz
-    together = max(1, int(np.ceil(motion.cycles.count / MOST_MEANS)))
-    turn = np.floor((t - t[0]) * f / together).astype(np.intp)
-    counts = np.bincount(turn)
-    whole = counts >= np.median(counts) - 1  # a period is not a whole number of samples
-    times = np.bincount(turn, t)[whole] / counts[whole]
-    # Both energies use the same constant, because m v^2 / 2 = k (v/omega)^2 / 2.
-    squares = {
-        "kinetic, mean of a period": (smoothed.velocity[rows] / motion.phase.angular_frequency.value) ** 2,
-        "potential, mean of a period": (smoothed.position[rows] - motion.rest.at(t)) ** 2,
-    }
-    means = {name: 1e3 * stiffness.value * np.bincount(turn, x)[whole] / counts[whole] for name, x in squares.items()}
-    # The means lie on one line, so their points alternate and neither covers the other.
-    return tuple(Series(name, times[i::2], y[i::2], "other") for i, (name, y) in enumerate(means.items()))
 
 
 def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
@@ -462,7 +436,6 @@ def charts_of(
     makers: dict[str, Callable[[Analysis], Chart | None]] = {
         **CHARTS,
         "position": partial(position, notes=notes),
-        "energy": partial(energy, smoothed=smoothed),
         "motion": partial(motion, smoothed=smoothed),
         "phase": partial(phase, smoothed=smoothed),
     }
@@ -470,3 +443,57 @@ def charts_of(
     if classic is not None:
         charts["classic"] = classic_method(a, classic)
     return {name: chart for name, chart in charts.items() if chart is not None}
+
+
+SHOWN_MULTIPLES = 8.0  # range of the spectrum in multiples of the oscillation's frequency
+LEAST_ROWS = 8
+MOST_PEAKS, MOST_TRIED = 5, 200
+FALSE_ALARM = 1e-3  # probability that white noise has a labelled peak
+SURROUNDINGS = 101  # rows whose median is the noise level around a peak
+APART = 0.03  # of the range of frequencies; of two peaks that are nearer, the higher is labelled
+
+
+def spectrum_of(a: Analysis, motion: Oscillation) -> tuple[F8, F8, F8] | None:
+    """Return frequencies in Hz, and the amplitudes of recording and residuals in the recording's unit.
+
+    The discrete Fourier transform with a Hann window is scaled so that a steady sinusoid shows its amplitude. Omitted
+    samples and gaps are filled with the fit in the recording, and with zero in the residuals.
+    """
+    track, waveform = a.track, motion.waveform
+    used = ((a.flags & UNUSABLE) == 0) & np.isfinite(track.y) & np.isfinite(waveform.residual)
+    start, end = float(track.t[used][0]), float(track.t[used][-1])
+    count = max(round((end - start) * track.rate_hz) + 1, 8)
+    grid = np.linspace(start, end, count)
+    at = np.clip(np.round((track.t[used] - start) / (end - start) * (count - 1)).astype(np.intp), 0, count - 1)
+    residual = np.zeros(count)
+    residual[at] = waveform.residual[used]
+    swing = motion.damping.best.amplitude(grid - motion.phase.t0) * np.cos(motion.phase.total(grid))
+    whole = motion.rest.at(grid) + swing
+    whole[at] = track.y[used]
+    window = np.hanning(count)
+    scale = 2.0 / window.sum()
+    f: F8 = np.asarray(np.fft.rfftfreq(count, 1.0 / track.rate_hz), np.float64)
+    keep = (f > 0.0) & (f <= SHOWN_MULTIPLES * motion.cycles.frequency_hz)
+    if np.count_nonzero(keep) < LEAST_ROWS:
+        return None
+    whole, residual = (scale * np.abs(np.fft.rfft(window * (y - y.mean())))[keep] for y in (whole, residual))
+    return f[keep], whole, residual
+
+
+def peaks_of(amplitude: F8) -> list[int]:
+    """Return the rows of the highest peaks that exceed the noise around them.
+
+    The amplitudes of white noise have a Rayleigh distribution: with probability :math:`\\alpha`, the largest of n
+    exceeds :math:`\\sqrt{\\ln(n/\\alpha)/\\ln 2}` times their median.
+    """
+    limit = np.sqrt(np.log(amplitude.size / FALSE_ALARM) / np.log(2.0))
+    inner = amplitude[1:-1]
+    # scipy has functions for both, but they take longer to import than all charts take to make.
+    tops = np.flatnonzero((inner > amplitude[:-2]) & (inner >= amplitude[2:])) + 1
+    taken: list[int] = []
+    for row in tops[np.argsort(amplitude[tops])[::-1]][:MOST_TRIED].tolist():
+        noise = float(np.median(amplitude[max(row - SURROUNDINGS // 2, 0) : row + SURROUNDINGS // 2 + 1]))
+        alone = all(abs(row - other) > APART * amplitude.size for other in taken)
+        if len(taken) < MOST_PEAKS and alone and amplitude[row] > limit * max(noise, 1e-30):
+            taken.append(row)
+    return taken

@@ -14,8 +14,7 @@ from springmass.commands.options import PART, PageOptions, Recording, flag, refu
 from springmass.errors import OK, USAGE, ProgramError, manner, tell
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
-from springmass.page.web.server import serve
-from springmass.page.web.sharing import address_in_network, code_for_terminal
+from springmass.page.web.server import address_in_network, code_for_terminal, serve
 from springmass.runs.loading import kind_of, load
 from springmass.runs.options import ReadOptions
 from springmass.stops import STOPS

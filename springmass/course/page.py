@@ -40,8 +40,7 @@ def write_page(
     folder: Path, rows: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]], tags: Sequence[str]
 ) -> None:
     """Write ``index.html``; the link of a line is empty if its run has no report."""
-    from springmass.report.html import Figures, drawn_by_script, template
-    from springmass.report.script import SHARED
+    from springmass.report.html import SHARED, Figures, drawn_by_script, template
 
     there = [name for name in SHOWN if any(line["cells"][name] for line in lines)]  # only with numbers
     shown = [{**line, "link": quote(line["link"])} for line in lines]

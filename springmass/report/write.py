@@ -18,7 +18,7 @@ from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import amplitude_csv, motion_csv
 from springmass.report.recorded import notes_of
-from springmass.report.summary import summary as sentences
+from springmass.report.words import summary as sentences
 from springmass.runs.comparing import Compared
 from springmass.runs.frames import smoothed_or_why
 from springmass.runs.json_results import plain

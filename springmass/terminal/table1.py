@@ -9,8 +9,7 @@ from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate
 from springmass.runs.rows import TableKey, table_rows
-from springmass.terminal.quantities import concise, shown
-from springmass.terminal.style import PLAIN, TerminalStyle
+from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 
 NARROW, NARROWEST = 24, 12  # width of the column for the names of quantities, which wrap, for several runs and for one
 

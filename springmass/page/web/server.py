@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import json
 import logging
 import socket
@@ -18,11 +19,10 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from springmass.errors import complain
+from springmass.errors import SENSOR, ProgramError, complain
 from springmass.page.state import PageState
 from springmass.page.view import View, json_of
 from springmass.page.web.security import ACT, REPORT, Access, guarded
-from springmass.page.web.sharing import code_svg
 from springmass.session.failures import raised_at
 from storage.errors import one_line
 
@@ -304,3 +304,35 @@ class _Lines(logging.Handler):
             text += f" ({self._left_out} earlier messages were left out)"
             self._left_out = 0
         complain(f"page: {text}")
+
+
+ELSEWHERE = ("192.0.2.1", 9)
+"""An address for documentation (RFC 5737): nothing is sent to it; the system only chooses the route to it."""
+
+
+def address_in_network() -> str:
+    """Return this computer's address in the network through which it would send."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(ELSEWHERE)
+        except OSError as error:
+            raise ProgramError(f"--lan: no network ({error.strerror}); join one, or leave --lan out", SENSOR) from error
+        return str(probe.getsockname()[0])
+
+
+def code_svg(address: str) -> bytes:
+    """Return an address as a QR code in SVG format, dark on light and with a quiet zone."""
+    import segno
+
+    made = io.BytesIO()
+    segno.make(address, micro=False).save(made, kind="svg", scale=5, border=4, light="#ffffff", dark="#000000")
+    return made.getvalue()
+
+
+def code_for_terminal(address: str) -> str:
+    """Return an address as a QR code of block characters."""
+    import segno
+
+    made = io.StringIO()
+    segno.make(address, micro=False).terminal(made, compact=True)
+    return made.getvalue()

@@ -113,13 +113,10 @@ def test_frequency_and_spectrum(charts: dict[str, Drawn], damped: Analysis) -> N
 
 
 def test_drag_and_energy(charts: dict[str, Drawn], damped: Analysis) -> None:
-    """The energy begins at k A²/2, kinetic and potential are half of it each; the drag is above its quadratic part."""
+    """The energy begins at k A²/2; the drag is above its quadratic part."""
     start = 0.5e3 * damped.estimates["spring_constant"].value * damped.estimates["amplitude"].value ** 2
-    t, law = charts["energy"].xy("law")
+    _, law = charts["energy"].xy("law")
     assert law[0] == pytest.approx(start, rel=1e-3)
-    for part in ("kinetic", "potential"):
-        at, mean = charts["energy"].xy(part)
-        np.testing.assert_allclose(mean, 0.5 * np.interp(at, t, law), rtol=0.02)
     _, drag = charts["drag"].xy("law")
     assert drag.min() > damped.estimates["drag_coefficient"].value
 
