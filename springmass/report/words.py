@@ -8,9 +8,10 @@ from pipeline.analyse import Analysis, Oscillation, Still
 from pipeline.damping.laws import words_of
 from pipeline.numerics.quantity import noun
 from pipeline.registry.quantities import INPUTS
+from pipeline.results.budget import Contribution
 from pipeline.track import UNUSABLE
 from springmass.report.advice import harm_of, sentence, trust_of, trust_text
-from springmass.report.budgets import BudgetRow, budgets_of
+from springmass.report.budgets import budgets_of
 from springmass.runs.rows import is_about
 from springmass.typeset import kept, prefixed, pretty_number, typeset, unbroken
 
@@ -86,9 +87,7 @@ def damping_sentence(analysis: Analysis) -> str:
     else:
         text = f"The amplitude falls by {chosen}"
     if damping.by_statement:
-        text += ", as you stated"
-    if damping.by_statement:
-        return f"{text}."
+        return f"{text}, as you stated."
     if possible:
         more = len(possible) - NAMED_LAWS
         if more > 1:
@@ -101,12 +100,9 @@ def damping_sentence(analysis: Analysis) -> str:
     others, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
     if not others:
         return f"{text}; no other law was tried."
-    if others == 1:
-        return f"{text}; the other law is {'rejected' if rejected else 'unlikely'}."
-    if rejected == others:
-        return f"{text}; the recording rejects all {others} other laws."
-    if not rejected:
-        return f"{text}; all {others} other laws are unlikely."
+    if rejected in (0, others):
+        all_others = "the other law is" if others == 1 else f"all {others} other laws are"
+        return f"{text}; {all_others} {'rejected' if rejected else 'unlikely'}."
     ruled_out = f"{rejected} {'is' if rejected == 1 else 'are'} rejected and {others - rejected} unlikely"
     return f"{text}; of {others} other laws {ruled_out}."
 
@@ -126,20 +122,25 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
         if isinstance(motion, Still) and "first_mode_period" not in analysis.estimates:
             why = "Nothing oscillates in this recording; it gives mean and noise only."
         return (("Result", why), *((("What to do", to_do),) if to_do else ()))
-    row = _largest(analysis)
+    greatest = _greatest(analysis)
     if not to_do:
-        to_do = f"Nothing needs attention. {_improvement(row)}".rstrip()
-    if "spring_constant" not in analysis.estimates and analysis.scene.bob_mass_kg is None and _is_length(analysis):
+        to_do = "Nothing needs attention."
+        if greatest is not None:
+            symbol, it = greatest
+            way = "record longer" if it.kind == "A" else f"find the {INPUTS[it.name].label} more accurately"
+            to_do += f" To know {symbol} better, {way}."
+    if (
+        "spring_constant" not in analysis.estimates
+        and analysis.scene.bob_mass_kg is None
+        and analysis.track.unit == "m"
+    ):
         to_do += " For the spring constant, state the mass: --mass-kg KG."
-    return (("Values", _values(analysis, motion)), ("How sure", _trust(analysis, row)), ("What to do", to_do))
-
-
-def _is_length(analysis: Analysis) -> bool:
-    return analysis.track.unit == "m"
+    return (("Values", _values(analysis, motion)), ("How sure", _trust(analysis, greatest)), ("What to do", to_do))
 
 
 def _values(analysis: Analysis, motion: Oscillation) -> str:
-    x, moves = analysis.estimates, "bob swings" if _is_length(analysis) else f"{noun(analysis.track.unit)} oscillates"
+    x, unit = analysis.estimates, analysis.track.unit
+    moves = "bob swings" if unit == "m" else f"{noun(unit)} oscillates"
     parts = [f"the {moves} with the period T\u00a0=\u00a0{kept(x['period'])}"]
     if "spring_constant" in x:
         parts.append(f"the mass gives the spring constant k\u00a0=\u00a0{kept(x['spring_constant'])}")
@@ -152,24 +153,17 @@ def _values(analysis: Analysis, motion: Oscillation) -> str:
     return f"{sentence('; '.join(parts))} {damping_sentence(analysis)}"
 
 
-def _trust(analysis: Analysis, row: BudgetRow | None) -> str:
+def _trust(analysis: Analysis, greatest: tuple[str, Contribution] | None) -> str:
     noise = "more than noise" if is_about(analysis, "residuals") else "only noise"
     text = f"{trust_text(analysis, page=True)} The fit leaves {noise} in the residuals"
-    if row is not None:
-        greatest, symbol = row.contributions[0], "k" if row.name == "spring_constant" else "T"
-        text += f"; {100.0 * greatest.share:.0f}\u00a0% of u({symbol})² comes from the {INPUTS[greatest.name].label}"
+    if greatest is not None:
+        symbol, it = greatest
+        text += f"; {100.0 * it.share:.0f}\u00a0% of u({symbol})² comes from the {INPUTS[it.name].label}"
     return f"{text}."
 
 
-def _largest(analysis: Analysis) -> BudgetRow | None:
-    """Return the budget of the spring constant, or else of the period."""
-    rows = {row.name: row for row in budgets_of(analysis) if row.contributions}
-    return rows.get("spring_constant") or rows.get("period")
-
-
-def _improvement(row: BudgetRow | None) -> str:
-    if row is None:
-        return ""
-    greatest, symbol = row.contributions[0], "k" if row.name == "spring_constant" else "T"
-    way = "record longer" if greatest.kind == "A" else f"find the {INPUTS[greatest.name].label} more accurately"
-    return f"To know {symbol} better, {way}."
+def _greatest(analysis: Analysis) -> tuple[str, Contribution] | None:
+    """Return the largest part of the variance of the spring constant, or else of the period, with its symbol."""
+    rows = {row.name: row.contributions for row in budgets_of(analysis)}
+    chosen = ((symbol, rows[name][0]) for name, symbol in (("spring_constant", "k"), ("period", "T")) if rows.get(name))
+    return next(chosen, None)
