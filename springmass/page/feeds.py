@@ -12,6 +12,7 @@ from typing import Any
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from springmass.page.view import Series, View
+from springmass.report.recorded import event_words
 from springmass.runs.loading import Loaded
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
@@ -101,7 +102,7 @@ class LogFeed:
             if content["kind"] == "still":
                 self.view.zero = _zero_of(content)
             if content["kind"] not in NOT_LISTED:
-                self.view.notes.append(_in_words(content["kind"], content["facts"]))
+                self.view.notes.append(event_words(content["kind"], content["facts"], named=True))
 
     def _place_marks(self) -> None:
         """Give marks and triggers the times that the run file will give them, which the first samples improve."""
@@ -112,21 +113,6 @@ class LogFeed:
         self.view.marks = [(t_s, record.text()) for t_s, record in timed if record.kind is Kind.MARK]
         events = [{"t_s": t_s, **event_content(record.payload)} for t_s, record in timed if record.kind is Kind.EVENT]
         self.view.provenance = {**self.view.provenance, "events": events}
-
-
-def _in_words(kind: str, facts: Mapping[str, Any]) -> str:
-    """Return an event in words; for other kinds, return the names and values of its facts."""
-    try:
-        if kind == "still":
-            return f"Zero {1e3 * facts['rest_m']:.1f} mm, noise {1e3 * facts['noise_m']:.2f} mm"
-        if kind == "trigger":
-            return f"Trigger at {1e3 * facts['threshold_m']:.0f} mm, {facts['keep_s']:g} s kept"
-        if kind == "note":
-            return f"Note: {facts['text']}"
-    except (KeyError, TypeError, ValueError):  # a log by another program may state other facts
-        pass
-    named = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in facts.items())
-    return f"{kind}: {named}" if named else kind
 
 
 def _zero_of(event: Mapping[str, Any]) -> dict[str, float]:

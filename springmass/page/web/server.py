@@ -69,23 +69,16 @@ def checked(text: str | None) -> dict[str, Any]:
         request = json.loads(text or "")
         found = {"type": request["type"]}
         for name, limits in REQUESTS[request["type"]].items():
-            found[name] = _text(request[name]) if limits is None else _number(request[name], *limits)
+            if limits is None:
+                found[name] = " ".join(request[name].split())[:LONGEST_TEXT]
+            elif limits[0] <= (number := float(request[name])) <= limits[1]:
+                found[name] = number
+            else:
+                raise ValueError
     # These include the errors for integers of thousands of digits and for deeply nested lists.
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise Refused("a message that is none of the page's") from error
     return found
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise TypeError
-    return " ".join(value.split())[:LONGEST_TEXT]
-
-
-def _number(value: Any, least: float, greatest: float) -> float:
-    if not least <= (number := float(value)) <= greatest:
-        raise ValueError
-    return number
 
 
 class Server:
@@ -182,7 +175,10 @@ class Server:
             if self._page.view is not None and view is not self._page.view:
                 view = self._page.view
                 sent, texts = [0] * len(view.series), {}
-                await browser.send_text(json_of(self._hello(view, acts=ACT in browser.auth.scopes)))
+                acts = ACT in browser.auth.scopes
+                hello = view.hello(controls=acts and self._page.controls is not None)
+                role = {"role": "controller" if acts else "viewer", "share": self._share}
+                await browser.send_text(json_of(hello | role))
             if view is not None:
                 for number, series in enumerate(view.series):
                     while sent[number] < len(series):
@@ -203,10 +199,6 @@ class Server:
         if key not in self._frames:
             self._frames[key] = view.series[number].message(number, first)
         return self._frames[key]
-
-    def _hello(self, view: View, *, acts: bool) -> dict[str, Any]:
-        hello = view.hello(controls=acts and self._page.controls is not None)
-        return {**hello, "role": "controller" if acts else "viewer", "share": self._share}
 
 
 def application(page: PageState, share: str = "", polled: Callable[[int], None] = lambda _: None) -> Starlette:

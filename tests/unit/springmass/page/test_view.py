@@ -64,7 +64,7 @@ def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
         ((moment, text),) = feed.view.marks
         assert text == "released"
         assert moment == pytest.approx(2.0, abs=0.2)
-        assert feed.view.notes == ["timeout: after_s 1"]
+        assert feed.view.notes == ["timeout: after s 1"]
         assert not feed.view.ended
     feed.poll()
     assert feed.view.ended
