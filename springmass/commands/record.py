@@ -41,7 +41,7 @@ from springmass.stops import STOPS, EndReason
 from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import ProgressLine
-from springmass.terminal.style import style_of
+from springmass.terminal.style import style_of, watched
 from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole
 from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
@@ -146,7 +146,7 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
             code, run_file, sentences = _built(ended, out, session)
             for line in sentences:
                 console.line(line)
-            if console.terminal and run_file is not None:
+            if run_file is not None and watched(sys.stderr):
                 console.line(f"next: springmass analyse {shlex.quote(str(run_file))}")
             session.recorder = None
             if page is not None and run_file is not None and ended.by is EndReason.PAGE:

@@ -14,7 +14,7 @@ from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.course import LITTLE
 from springmass.charts.chart import Chart
-from springmass.charts.drag_map import DragRun, drag_map
+from springmass.charts.drag_map import drag_map
 from springmass.charts.several import course
 from springmass.course.benches import BENCHES, CourseComparison
 from springmass.course.rows import COURSE, FAILED
@@ -72,7 +72,7 @@ def _of_drag(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     """Return the map of the drag coefficients of all runs that have some."""
     return drag_map(
         [
-            DragRun(row.get("disc") or f"{1e3 * row['disc_diameter_m']:.4g} mm", np.array(json.loads(points)))
+            (row.get("disc") or f"{1e3 * row['disc_diameter_m']:.4g} mm", np.array(json.loads(points)))
             for row in rows
             if (points := row.get("drag_points"))
         ]

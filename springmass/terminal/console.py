@@ -34,14 +34,6 @@ class Console:
         self._worker = Worker("console", failed)
 
     @property
-    def terminal(self) -> bool:
-        """Whether the stream is a terminal."""
-        try:
-            return self._stream is not None and self._stream.isatty()
-        except (OSError, ValueError):
-            return False
-
-    @property
     def columns(self) -> int:
         """Current width of the terminal, columns."""
         try:

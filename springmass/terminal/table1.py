@@ -21,14 +21,6 @@ def text_table(
 
     Names that are wider than their column are shortened. If the runs do not fit side by side, the uncertainty is given
     as digits in parentheses.
-
-    >>> import numpy as np
-    >>> from pipeline.analyse import analyse
-    >>> from pipeline.track import Track
-    >>> t = np.arange(1000) / 100
-    >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 1e-4 * np.random.default_rng(1).standard_normal(1000)
-    >>> text_table(["bob"], [analyse(Track.from_arrays(t, y))]).splitlines()[2].split()[::4]
-    ['period', '0.000022']
     """
     rows = table_rows(runs, missing=True)
     symbols = [row.on_screen if style.unicode else row.symbol for row in rows]

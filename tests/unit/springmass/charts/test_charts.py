@@ -14,7 +14,7 @@ from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Note, Panel, Series, decoded, to_json
-from springmass.charts.drag_map import DragRun, drag_map
+from springmass.charts.drag_map import drag_map
 from springmass.charts.draw import render
 from springmass.charts.run import charts_of
 from springmass.charts.several import comparison, course, overlay
@@ -157,7 +157,7 @@ def test_several_runs(damped: Analysis, motion: Oscillation) -> None:
 def test_a_map_of_drag() -> None:
     """A line for each disc against both numbers, the gap between its runs kept."""
     points = np.array([[100.0, 1.0, 3.0, 0.1], [200.0, 2.0, 2.5, 0.1]])
-    chart = drag_map([DragRun("10 cm", points), DragRun("10 cm", 2.0 * points)])
+    chart = drag_map([("10 cm", points), ("10 cm", 2.0 * points)])
     assert chart is not None
     found = Drawn(chart)
     for panel, column in enumerate((0, 1)):
@@ -165,7 +165,7 @@ def test_a_map_of_drag() -> None:
         np.testing.assert_allclose(x[:2], points[:, column])
         np.testing.assert_allclose(y[:2], points[:, 2], rtol=1e-6)
         assert np.isnan(y[2])
-    assert drag_map([DragRun("", np.zeros((0, 4)))]) is None
+    assert drag_map([("", np.zeros((0, 4)))]) is None
 
 
 def test_a_long_series_keeps_its_extremes() -> None:
