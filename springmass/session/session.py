@@ -11,7 +11,7 @@ import contextlib
 import math
 import queue
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -42,7 +42,6 @@ HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
 HEARD = 3  # number of readings after which a sensor counts as heard
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # maximum number of blocks kept for the display before the run begins
-LAST_TURN = "the last turn has not ended"
 BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
 
 Samples = Sequence[tuple[int, Block]]
@@ -212,24 +211,22 @@ class Session:
         self._chains = [sensor.chain() for sensor in self.sensors]
         with self.stops.counted():
             recorder = self.recorder = Recorder(log, self._header(), self._clock)
-            display = self._display()
             start_ns = self._clock.now_ns()
             self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
-            try:
-                self._tee.start(recorder, self._chains, since_ns)
-                listeners.begun(recorder.path)
-                if rest is not None:
-                    recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
-                if trigger is not None:
-                    facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
-                    # The time of the sample itself, because an analysis leaves out the rest before it.
-                    recorder.event(0, moment_ns, "trigger", facts)
-                by = self._loop(recorder, display, start_ns, limits.seconds, listeners)
-            finally:
-                self._tee.stop()
-                end_ns = self._clock.now_ns()
-                display.close(LAST_TURN)
-                self.failures.tell = None
+            with self._display(listeners, start_ns, recorder) as show:
+                try:
+                    self._tee.start(recorder, self._chains, since_ns)
+                    listeners.begun(recorder.path)
+                    if rest is not None:
+                        recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
+                    if trigger is not None:
+                        facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
+                        # The time of the sample itself, because an analysis leaves out the rest before it.
+                        recorder.event(0, moment_ns, "trigger", facts)
+                    by = self._loop(recorder, show, start_ns, limits.seconds, listeners.marks)
+                finally:
+                    self._tee.stop()
+                    end_ns = self._clock.now_ns()
             counts = self.failures.counts
             recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
             with contextlib.suppress(WriteFailed):  # the status states the error
@@ -255,21 +252,16 @@ class Session:
     def _loop(
         self,
         recorder: Recorder,
-        display: Worker,
+        show: Callable[..., None],
         start_ns: int,
         seconds: float | None,
-        listeners: RunListeners,
+        marks: queue.SimpleQueue[str] | None,
     ) -> EndReason:
         """Wait for the end of the recording, and return the reason for it."""
-
-        def show(*, tick: bool = True) -> None:
-            self._ring(display, listeners, self._tee.blocks, start_ns, recorder, tick=tick)
-
-        marks = listeners.marks
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
         # Without marks, one turn per second suffices: samples are shown once a second, and a disk error persists.
         wait_ns, tick_ns = int((1.0 if marks is None else LOOK_FOR_MARKS_S) * 1e9), start_ns + SECOND_NS
-        show(tick=False)
+        show(self._tee.blocks, tick=False)
         while end_ns is None or self._clock.now_ns() < end_ns:
             turn_ns = min(self._clock.now_ns() + wait_ns, tick_ns, tick_ns if end_ns is None else end_ns)
             try:
@@ -282,14 +274,14 @@ class Session:
                 now_ns, text = self._clock.now_ns(), marks.get()
                 recorder.mark(text, host_ns=now_ns)
                 self._marks.append((now_ns, text))
-                show(tick=False)
+                show(self._tee.blocks, tick=False)
             if turn_ns == end_ns:
                 break
             if turn_ns == tick_ns:
-                show()
+                show(self._tee.blocks)
                 tick_ns += SECOND_NS
         self._tee.stop()  # data received while the last line is shown are not part of the run
-        show()
+        show(self._tee.blocks)
         return EndReason.SECONDS
 
     def _wait_for(self, trigger: Trigger, rest: StillPoint | None, listeners: RunListeners) -> int:
@@ -297,9 +289,9 @@ class Session:
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
         self._tee.keep(True)
-        display, tick_ns = self._display(), start_ns + SECOND_NS
+        tick_ns = start_ns + SECOND_NS
         seen: deque[tuple[int, Block]] = deque(maxlen=HELD_BLOCKS)
-        try:
+        with self._display(listeners, start_ns, None) as show:
             while True:
                 for channel, block in self.poll(LOOK_FOR_TRIGGER_S):
                     seen.append((channel, block))
@@ -312,10 +304,8 @@ class Session:
                 # One second more than needed, because samples may wait for a moment before they are examined.
                 self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)
                 if self._clock.now_ns() >= tick_ns:
-                    self._ring(display, listeners, lambda: [seen.popleft() for _ in range(len(seen))], start_ns, None)
+                    show(lambda: [seen.popleft() for _ in range(len(seen))])
                     tick_ns += SECOND_NS
-        finally:
-            display.close(LAST_TURN)
 
     def _wait_until(self, deadline_ns: int) -> None:
         """Wait until a deadline or a request to end, and record a failure of the reader, if any."""
@@ -326,31 +316,32 @@ class Session:
             self._reader_failure = failure
             self.failures.note("reader", failure)
 
-    def _display(self) -> Worker:
-        """Return the thread that shows the recording: a display that is busy or fails cannot delay or end it."""
-        self.shown = LiveState(self._chains[0].timebase.rate_hz)
-        return Worker("display", lambda error: self.failures.note("display", error))
+    @contextlib.contextmanager
+    def _display(
+        self, listeners: RunListeners, start_ns: int, recorder: Recorder | None
+    ) -> Iterator[Callable[..., None]]:
+        """Yield a function that takes samples and shows the state, on a thread that cannot delay or end the recording.
 
-    def _ring(
-        self,
-        display: Worker,
-        listeners: RunListeners,
-        take: Callable[[], Samples],
-        start_ns: int,
-        recorder: Recorder | None,
-        *,
-        tick: bool = True,
-    ) -> None:
-        """Request a turn of the display, which shows the latest state; one that waits already suffices."""
-        shown, now_ns = self.shown, self._clock.now_ns()
-        assert shown is not None
+        A display that is still busy skips a turn, and shows the latest state at its next one.
+        """
+        self.shown = shown = LiveState(self._chains[0].timebase.rate_hz)
+        worker = Worker("display", lambda error: self.failures.note("display", error))
 
-        def turn() -> None:
-            shown.push(take())
-            listeners.progress(self._progress(shown, start_ns, now_ns, recorder, tick=tick))
+        def show(take: Callable[[], Samples], *, tick: bool = True) -> None:
+            now_ns = self._clock.now_ns()
 
-        if display.idle:
-            display.put(turn)
+            def turn() -> None:
+                shown.push(take())
+                listeners.progress(self._progress(shown, start_ns, now_ns, recorder, tick=tick))
+
+            if worker.idle:
+                worker.put(turn)
+
+        try:
+            yield show
+        finally:
+            worker.close("the last turn has not ended")
+            self.failures.tell = None  # the log takes no more events
 
     def _progress(
         self, shown: LiveState, start_ns: int, now_ns: int, recorder: Recorder | None, *, tick: bool
