@@ -23,7 +23,6 @@ from storage.wire_log.wire_samples import LogDecoder, chain_of
 
 AT_ONCE = 10_000
 """Maximum number of records per call: 100 s of a sensor at 100 Hz. A long log is therefore shown piece by piece."""
-MOST_NOTES = 1000
 NOT_LISTED = frozenset({"calibration", "ended"})
 """Kinds of events that the page does not list, because a person at the bench need not read them."""
 
@@ -96,7 +95,7 @@ class LogFeed:
     def _note(self, record: Record, content: dict[str, Any]) -> None:
         if record.kind is Kind.MARK:
             self._timed.append(record)
-        elif record.kind is Kind.EVENT and len(self.view.notes) < MOST_NOTES:
+        elif record.kind is Kind.EVENT:
             if content["kind"] == "trigger":
                 self._timed.append(record)
             if content["kind"] == "still":

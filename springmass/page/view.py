@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import secrets
 import struct
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -21,6 +22,7 @@ from storage.wire_log.wire_samples import Origin
 
 VERSION = 2  # of the messages
 MOST_PER_MESSAGE = 50_000
+SHOWN_NOTES = 20  # the latest
 _HEAD = struct.Struct("<4I")
 
 
@@ -88,7 +90,7 @@ class View:
     series: list[Series] = field(default_factory=list)
     session: str = field(default_factory=lambda: secrets.token_hex(8))
     marks: list[tuple[float, str]] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    notes: deque[str] = field(default_factory=lambda: deque(maxlen=SHOWN_NOTES))
     ended: bool = False
     error: str = ""
     recorded: Track | None = None
@@ -120,7 +122,7 @@ class View:
             "samples": [len(series) for series in self.series],
             "missing": sum(series.missing for series in self.series),
             "marks": [[t, text] for t, text in self.marks],
-            "notes": self.notes[-20:],
+            "notes": list(self.notes),
             "ended": self.ended,
             "error": self.error,
         }

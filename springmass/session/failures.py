@@ -14,9 +14,6 @@ from typing import Any
 
 from storage.errors import one_line
 
-KINDS = 20
-"""Maximum number of kinds of failure counted separately; all further kinds are counted together."""
-OTHERS = "others"
 PATIENCE_S = 1.0
 """Maximum time that the end of a recording waits for a worker's last step, s."""
 
@@ -37,11 +34,8 @@ class Failures:
         where = raised_at(error)
         name = f"{what}: {type(error).__name__} at {where}"
         with self._lock:
-            known = name in self._counts
-            if not known and len(self._counts) >= KINDS:
-                name, known = OTHERS, True
+            tell = None if name in self._counts else self.tell
             self._counts[name] = self._counts.get(name, 0) + 1
-            tell = None if known else self.tell
         if tell is not None:
             tell(f"{what}_failed", {"error": type(error).__name__, "why": one_line(error), "where": where})
 

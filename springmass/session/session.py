@@ -37,7 +37,6 @@ from storage.recorder import Recorder, RecorderStatus
 from storage.wire_log.records import LogHeader
 from storage.wire_log.scanning import LogContents
 
-SAY_NS = 1_500_000_000  # silence before a run that is reported, ns
 HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
 HEARD = 3  # number of readings after which a sensor counts as heard
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
@@ -106,7 +105,7 @@ class Session:
         self._marks: list[tuple[int, str]] = []
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
-        """Start reading, and wait until every sensor has been heard; ``say`` gets lines about silence and identities.
+        """Start reading, and wait until every sensor has been heard; ``say`` gets lines about what they are.
 
         A sensor that is not heard after 3 s, or after five periods of a slow sensor, raises a ProgramError that
         describes what was received instead.
@@ -120,14 +119,9 @@ class Session:
         # A slow sensor can be distinguished from silence only after several of its periods.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
-        due_ns: int | None = self._clock.now_ns() + SAY_NS
         while self._waits_for_word() or any(getattr(chain.decoder, "undecided", False) for chain in self._chains):
-            mute = next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)
-            if mute is not None and due_ns is not None and self._clock.now_ns() > due_ns:
-                say(f"{self.sensors[mute].port.name}: nothing readable so far; check power, wiring and --baud")
-                due_ns = None
             if self._clock.now_ns() > deadline:
-                if mute is None:
+                if (mute := next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)) is None:
                     break
                 self._end_unheard(mute)
             self._wait_until(self._clock.now_ns() + 50_000_000)
