@@ -57,8 +57,8 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
     places = np.where(np.isfinite(y[out]), y[out], middle)
     flagged = [Series(f"left out ({out.size})", t[out], places, "flagged", why=why)] if out.size else []
     series = [samples, *flagged, *_marks(notes)]
-    sigma = pretty(_in_shown(a, a.estimates["noise"]))
-    motion = a.motion
+    noise, motion = a.estimates["noise"], a.motion
+    sigma = pretty(Estimate(factor * noise.value, factor * noise.u, SHOWN[track.unit].unit))
     if isinstance(motion, Overdamped):
         grid, curve = _relaxing(a, motion)
         series.insert(0, line_of("fit", grid, curve * factor))
@@ -66,7 +66,7 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
         caption = f"The recording. Samples scatter by {sigma}."
         return Chart("position", "Position", caption, (Panel(value_label(what, track.unit), tuple(series)),))
     series[:0] = _fit_lines(a, motion, factor)
-    residual = np.where(used, motion.waveform.residual[rows], np.nan) / (a.estimates["noise"].value or 1.0)
+    residual = np.where(used, motion.waveform.residual[rows], np.nan) / (noise.value or 1.0)
     panels = [
         Panel(value_label(what, track.unit), tuple(series)),
         Panel("residual / σ", (Series("residual", t, residual),), 1.3, zero=True),
@@ -87,11 +87,6 @@ def _reason(flags: int, y: float) -> str:
     if not np.isfinite(y):
         return "missing: the sensor gave no value"
     return next((words for bit, words in REASONS if flags & bit), "not usable")
-
-
-def _in_shown(a: Analysis, x: Estimate) -> Estimate:
-    shown = SHOWN[a.track.unit]
-    return Estimate(shown.factor * x.value, shown.factor * x.u, shown.unit)
 
 
 def _marks(notes: Sequence[Note]) -> list[Series]:
@@ -254,10 +249,9 @@ def drag(a: Analysis) -> Chart | None:
         return None
     # The long error bar of a stretch with hardly any damping would compress everything else.
     most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
-    ends = np.concatenate([curve.y - curve.u, curve.y + curve.u, curve.y_points - curve.u_points])
-    tops = curve.y_points + curve.u_points
-    low, high = min(0.0, max(float(np.min(ends)), -most)), min(float(np.max(tops, initial=0.0)), most)
-    high = max(high, float(np.max(curve.y + curve.u)))
+    both = ((curve.y, curve.u), (curve.y_points, curve.u_points))
+    ends = np.clip(np.concatenate([y + sign * u for y, u in both for sign in (-1, 1)]), -most, most)
+    low, high = min(0.0, float(np.min(ends))), float(np.max(ends))
     series = _with_band(curve, SHOWN[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}")
     shown = (low, high + 0.08 * (high - low))
     panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
@@ -333,8 +327,8 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     return Chart("motion", "Velocity and acceleration", caption, panels, end if end < t[-1] else None)
 
 
-def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
-    """Velocity against displacement: the fitted motion, of very many turns every n-th, and the values of samples."""
+def phase(a: Analysis) -> Chart | None:
+    """Velocity against displacement: the fitted motion, of very many turns every n-th, and recorded velocities."""
     if not isinstance(a.motion, Oscillation):
         return None
     motion, track, unit = a.motion, a.track, a.track.unit
@@ -342,14 +336,6 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     step = int(np.ceil(motion.cycles.count / MOST_TURNS))
     inside = (a.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
-    recorded = track.velocity is not None and np.isfinite(track.velocity).any()
-    smoothed = smoothed or _smoothed(a)
-    moving = track.velocity if recorded else np.nan if smoothed is None else smoothed.velocity
-    velocity = np.where(_used(a), np.asarray(moving, np.float64), np.nan)
-    words = "samples, velocity as recorded" if recorded else "samples, velocity by the fit"
-    displacement, turn = track.y - motion.rest.at(track.t), np.floor((track.t - first) / period)
-    few = int(np.ceil(motion.cycles.count / TURNS_OF_SAMPLES))
-    seen = np.flatnonzero(np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, few) == 0))
     turns = []
     for start in np.arange(first, end, period * step).tolist():
         t = np.linspace(start, min(start + period, end), PER_PERIOD)
@@ -357,13 +343,15 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
         turns.append(np.full((int(step > 1), 2), np.nan))  # lifts the pen
     line = np.concatenate(turns)
     fastest = 1.1 * float(np.nanmax(np.abs(line[:, 1])))
-    series = (
-        Series(words, displacement[seen] * factor, velocity[seen], "rest"),
-        line_of("fitted motion", line[:, 0] * factor, line[:, 1]),
-    )
+    series = [line_of("fitted motion", line[:, 0] * factor, line[:, 1])]
+    if track.velocity is not None:
+        few, turn = int(np.ceil(motion.cycles.count / TURNS_OF_SAMPLES)), np.floor((track.t - first) / period)
+        seen = _used(a) & np.isfinite(track.velocity) & (turn >= 0) & (np.mod(turn, few) == 0)
+        displacement = (track.y - motion.rest.at(track.t)) * factor
+        series.insert(0, Series("samples, velocity as recorded", displacement[seen], track.velocity[seen], "rest"))
     label = rate_label("velocity" if unit == "m" else "derivative", 1, unit)
     x_label = value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit)
-    panel = Panel(label, series, 4.4, x_label, equal=True, range=(-fastest, fastest))
+    panel = Panel(label, tuple(series), 4.4, x_label, equal=True, range=(-fastest, fastest))
     caption = "Velocity against displacement from rest." + (f" One turn in {step} is drawn." if step > 1 else "")
     return Chart("phase", "Phase plot", caption, (panel,))
 
@@ -432,12 +420,10 @@ def charts_of(
     smoothed: Smoothed | None = None,
 ) -> dict[str, Chart]:
     """Return all charts that a run allows, in the report's order; only the position if nothing oscillates."""
-    smoothed = smoothed or _smoothed(a)
     makers: dict[str, Callable[[Analysis], Chart | None]] = {
         **CHARTS,
         "position": partial(position, notes=notes),
         "motion": partial(motion, smoothed=smoothed),
-        "phase": partial(phase, smoothed=smoothed),
     }
     charts = {name: make(a) for name, make in makers.items()}
     if classic is not None:
