@@ -165,9 +165,9 @@ class _Live:
     """A sensor on a port."""
 
     def __init__(self, address: str, sensor: str | None, baud: int | None, scene: Scene | None) -> None:
-        named = name_sensors((address,), () if sensor is None else (sensor,), baud)
-        family = get_family(named.sensors[0])
-        baud = named.baud or family.baud
+        _, names, measured = name_sensors((address,), () if sensor is None else (sensor,), baud)
+        family = get_family(names[0])
+        baud = measured or family.baud
         self._port = SerialPort(address, baud)
         tables = None if scene is None else scene.to_mapping()
         self._session = Session([Sensor(family, self._port, baud=baud)], SystemClock(), scene=tables)

@@ -168,8 +168,8 @@ def _judged(run: Run, options: AnalyseOptions) -> int:
 
 def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
+    from springmass.report.advice import trust_text
     from springmass.report.budgets import budget_text
-    from springmass.report.trust import trust_text
     from springmass.report.words import damping_sentence
     from springmass.terminal.printing import classic_text, findings_text, fitted, wrapped
     from springmass.terminal.style import style_of

@@ -14,8 +14,7 @@ from springmass.commands.options import PART, PageOptions, Recording, refuse
 from springmass.errors import OK, ProgramError, manner, tell
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
-from springmass.page.web.server import serve
-from springmass.page.web.sharing import address_in_network, code_for_terminal
+from springmass.page.web.server import address_in_network, code_for_terminal, serve
 from springmass.runs.inputs import kind_of
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions

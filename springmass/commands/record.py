@@ -42,7 +42,7 @@ from springmass.stops import STOPS, EndReason
 from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import ProgressLine
-from springmass.terminal.style import style_of
+from springmass.terminal.style import style_of, watched
 from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
 from storage.errors import WriteFailed, one_line
 from storage.recorder import check_disk
@@ -113,8 +113,8 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
     _demand_sense(options, page_options)
     _fill_standard_streams()
     if not options.simulate:
-        named = name_sensors(options.port, options.sensor, options.baud)
-        options = replace(options, port=named.ports, sensor=named.sensors, baud=named.baud)
+        ports, names, baud = name_sensors(options.port, options.sensor, options.baud)
+        options = replace(options, port=ports, sensor=names, baud=baud)
     demand_new(out, len(options.port))
     scene = EXAMPLE if options.simulate else None
     if options.scene is not None:
@@ -150,7 +150,7 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
             code, run_file, sentences = _built(ended, out, session)
             for line in sentences:
                 console.line(line)
-            if console.terminal and run_file is not None:
+            if run_file is not None and watched(sys.stderr):
                 console.line(f"next: springmass analyse {shlex.quote(str(run_file))}")
             session.recorder = None
             if page is not None and run_file is not None and ended.by is EndReason.PAGE:

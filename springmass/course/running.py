@@ -18,7 +18,7 @@ from springmass.course.rows import COURSE, write_rows
 from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
 from springmass.errors import ProgramError
-from springmass.report.script import SHARED, report_script
+from springmass.report.html import SHARED, report_script
 from storage.atomic import write_whole, writing
 
 GROWTH = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
