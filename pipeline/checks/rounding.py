@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.checks.misfit import Misfit
-from pipeline.checks.residual import Outcome
+from pipeline.checks.residual import Misfit, Outcome
 from pipeline.motion.averaged import Fitted
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Conditioned

@@ -5,18 +5,25 @@ A threshold that follows from a probability is computed where it is used, for ex
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from statistics import NormalDist
 
 # Probability that a record that follows its model fails a test; it is chosen. A test of n things allows this
 # probability over n for each (Bonferroni).
 FALSE_ALARM = 1e-3
+# Probability of a false alarm of tests that end an analysis or name a cause, although the noise may not be white. If
+# two samples count as one, it rises to 5e-4.
+IMPROBABLE = 1e-6
 # Share of a standard uncertainty, or of any size, below which an effect is negligible. A bias of a tenth of u raises
 # the probability that a 95 % interval misses the truth from 5.0 to 5.1 %.
 NEGLIGIBLE = 0.1
 # Share of the amplitude from which an effect is a warning, although the uncertainties include it. It is chosen; the
 # amplitudes of the bundled recordings are ten times as certain, as measured by `springmass analyse`.
 NOTICEABLE = 0.01
+# Ratio of a model's residual to the noise above which the part that the model does not describe is larger than the
+# noise, because variances add (ISO/IEC Guide 98-3).
+MISFIT = math.sqrt(2.0)
 # Standard deviations from which a normal deviate is an outlier: probability 6e-7, so none in a million samples.
 OUTLIER = 5.0
 # Standard uncertainties by which one pair of values differs significantly: probability 0.3 %.
