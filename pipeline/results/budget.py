@@ -133,7 +133,7 @@ class Inputs:
         by_input = x.derivatives if isinstance(x, UFloat) else {}
         parts = sorted((of.tag, abs(float(slope) * of.std_dev), float(slope)) for of, slope in by_input.items())
         if not any(error for _, error, _ in parts):
-            return Budget(quantity, estimate_of(x, unit), ())
+            return Budget(quantity, Estimate.of_variable(x, unit), ())
         variances: dict[str, float] = {}
         slopes: dict[str, float] = {}
         for name, error, derivative in parts:
@@ -147,7 +147,7 @@ class Inputs:
                 slope = None if given is None else slopes[name]
                 u, share = math.sqrt(variance), variance / whole
                 lines.append(Contribution(name, self._kinds[name], given, slope, u, share, self._dofs[name]))
-        return Budget(quantity, Estimate(float(x.nominal_value), math.sqrt(whole), unit, x), tuple(lines))
+        return Budget(quantity, Estimate.of_variable(x, unit, math.sqrt(whole)), tuple(lines))
 
     def _register(self, name: str, kind: Kind, dof: float = math.inf) -> None:
         if name in self._kinds:
@@ -155,18 +155,11 @@ class Inputs:
         self._kinds[name], self._dofs[name] = kind, max(dof, 1.0)
 
 
-def estimate_of(x: Any, unit: str) -> Estimate:
-    """Return a variable or an exact number as an estimate with its standard uncertainty."""
-    from uncertainties import nominal_value, std_dev
-
-    return Estimate(float(nominal_value(x)), float(std_dev(x)), unit, x)
-
-
 def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
     """Return estimates with their covariance, from the inputs that they were calculated from.
 
     >>> period = Estimate(0.8, 0.001, "s")
-    >>> print(joint_of({"period": period, "frequency": estimate_of(1 / period, "Hz")}).correlation.round(6).tolist())
+    >>> print(joint_of({"period": period, "frequency": Estimate.of_variable(1 / period, "Hz")}).correlation.round(6).tolist())
     [[1.0, -1.0], [-1.0, 1.0]]
     """
     each = list(estimates.values())

@@ -27,7 +27,7 @@ from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
 from pipeline.numerics.robust import mad_sigma
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
-from pipeline.results.budget import Budget, Inputs, estimate_of, function_of, joint_of
+from pipeline.results.budget import Budget, Inputs, function_of, joint_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality, Track
@@ -86,7 +86,7 @@ class Derived:
         joint = scaled(fit).joint
         variables = list(correlated_values(joint.values.tolist(), joint.covariance))
         found = {
-            name: estimate_of(x, unit)
+            name: Estimate.of_variable(x, unit)
             for name, (x, unit) in _in_true_units(fit.law, joint, variables, *self._scales).items()
         }
         return {**{name: limited(fit.law, name, x) for name, x in found.items()}, **coefficients}
@@ -145,10 +145,10 @@ class Derived:
     @property
     def amplitude_scale(self) -> float:
         """Factor from amplitudes of the record to those of the motion, before the filter of a sensor."""
-        return estimate_of(self._scales[1], "").value
+        return Estimate.of_variable(self._scales[1], "").value
 
     def _part(self, name: str) -> Estimate | None:
-        return estimate_of(*self.parts[name]) if name in self.parts else None
+        return Estimate.of_variable(*self.parts[name]) if name in self.parts else None
 
     def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
         """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known.
