@@ -17,19 +17,12 @@ import numpy as np
 from pipeline.damping.law_fit import LawFit, Rejection, joint_of
 from pipeline.damping.laws import LAWS, Law
 from pipeline.numerics.least_squares import Fit
+from pipeline.numerics.levels import BARE_MENTION, COVERAGE, FALSE_ALARM, NEGLIGIBLE, normal_quantile
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 
-REJECTION = 1e-3  # probability with which chi-square rejects a true law
-# Difference of BIC below which evidence is "not worth more than a bare mention": Kass and Raftery, J. Am. Stat. Assoc.
-# 90 (1995) 773.
-BARE_MENTION = 2.0
-VERY_STRONG = 10.0  # difference from which it is "very strong" (the same)
-ALIKE = 0.1  # maximum relative difference in damping between two laws that count as equivalent
-SMALLEST_SHARE, LARGEST_SHARE = 0.1, 1.0 / 3.0  # limits of the lower end of this comparison, over the largest amplitude
-# A coefficient this many standard uncertainties below zero rejects its law: a probability of 0.023 if its true value is
-# zero.
-NEGATIVE = 2.0
+# A coefficient this many standard uncertainties below zero rejects its law: probability 0.023 if it is zero.
+NEGATIVE = normal_quantile(COVERAGE)
 
 
 def least_chi2(fits: Mapping[str, Fit], laws: Mapping[str, Law] = LAWS) -> dict[str, float]:
@@ -59,7 +52,7 @@ def weigh(law: Law, fit: Fit, least_chi2: float, points: int, correlation: float
     reduced = fit.cost / free if free > 0 else math.nan
     bic = least_chi2 / correlation + count * math.log(max(points / correlation, 2.0))
     rejection: Rejection = ""
-    if dof > 0 and reduced * dof > chi2_quantile(1.0 - REJECTION, dof):
+    if dof > 0 and reduced * dof > chi2_quantile(1.0 - FALSE_ALARM, dof):
         rejection = "misfit"
     elif np.any(fit.values < -NEGATIVE * np.sqrt(np.diag(covariance))):
         rejection = "negative"
@@ -127,10 +120,10 @@ def choose(fits: Mapping[str, Weighed], evidence: float, span: Callable[[str], F
     idle = {n for n in reach if selected in fits[n].law.cases and fits[n].bic - best.bic > BARE_MENTION}
     if idle:
         most, least_m = span(selected)
-        amplitudes = most * np.array([1.0, min(max(least_m / most, SMALLEST_SHARE), LARGEST_SHARE)])
+        amplitudes = most * np.array([1.0, min(max(least_m / most, NEGLIGIBLE), 1.0 / 3.0)])
         alone, _ = best.rates(amplitudes)
         for name in sorted(idle):
             rate, u = fits[name].rates(amplitudes)
-            if not np.all(np.abs(rate - alone) + 2.0 * u <= ALIKE * alone):
+            if not np.all(np.abs(rate - alone) + 2.0 * u <= NEGLIGIBLE * alone):
                 idle.remove(name)
     return selected, tuple(name for name in reach if name not in idle)

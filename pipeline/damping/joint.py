@@ -9,12 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, REJECTION, choose
+from pipeline.damping.evidence import NEGATIVE, choose
 from pipeline.damping.law_fit import LawFit, rates_of
 from pipeline.damping.laws import Law, words_of
-from pipeline.damping.select import EVIDENCE, Damping
+from pipeline.damping.select import Damping
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Joint
+from pipeline.numerics.levels import FALSE_ALARM, STRONG
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 
@@ -98,7 +99,7 @@ def join(runs: Sequence[tuple[str, Damping, float]]) -> JointDamping:
     def span(name: str) -> F8:
         return np.array([fits[name].largest_m, fits[name].smallest_m])
 
-    selected, admissible = choose(fits, EVIDENCE, span)
+    selected, admissible = choose(fits, STRONG, span)
     names = tuple(name for name, _, _ in runs)
     return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
 
@@ -115,9 +116,9 @@ def _joined(each: Sequence[LawFit], last_s: Sequence[float]) -> JointFit:
     chi2 = sum(fit.reduced_chi2 * fit.dof for fit in each if fit.dof > 0) + excess
     dof = sum(fit.dof for fit in each) + saved
     rejection: Rejection = ""
-    if dof >= 1.0 and chi2 > chi2_quantile(1.0 - REJECTION, dof):
+    if dof >= 1.0 and chi2 > chi2_quantile(1.0 - FALSE_ALARM, dof):
         rejection = "misfit"
-    elif saved and excess > chi2_quantile(1.0 - REJECTION, saved):
+    elif saved and excess > chi2_quantile(1.0 - FALSE_ALARM, saved):
         rejection = "differ"
     elif np.any(mean < -NEGATIVE * np.sqrt(np.diag(covariance))):
         rejection = "negative"

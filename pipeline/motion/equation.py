@@ -23,6 +23,7 @@ from pipeline.motion.fit import Rows, clipped, fit
 from pipeline.motion.solved import STATE, FreeMotion, Solved, envelope
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit, central_differences
+from pipeline.numerics.levels import EXCESS
 from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
@@ -36,8 +37,6 @@ MOST_PERIODS = 250  # maximum number of periods for the fit of a weakly damped m
 LEAST_DAMPING = 0.01
 # Damping ratio above which it is fitted even if the windows, which are then few, show linear drag or none.
 ALWAYS = 0.05
-# Maximum root mean square of the residual of the law with most parameters, in units of the record's noise.
-MISFIT = 1.25
 
 
 def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *, stopped: bool) -> Fitted | str | None:
@@ -78,7 +77,7 @@ def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *
     if left.size <= count:
         return f"{words}, and no motion with {laws[-1].words} comes near the samples: the averaged law stands"
     noise_m = max(math.sqrt(float(left @ left) / (left.size - count)), 0.01 * expected_m)
-    if not noise_m <= MISFIT * expected_m:
+    if not noise_m <= EXCESS * expected_m:
         return (
             f"{words}, and the equation of motion with {laws[-1].words} leaves {amount(noise_m, unit)} where samples "
             f"scatter by {amount(expected_m, unit)}: the averaged law stands"
@@ -148,7 +147,7 @@ def _first_solution(models: Sequence[Solved], rows: Rows, windows: Demodulated, 
             start = alone.full(fit(alone, rows, first[alone.slots]).values)
         ends.append(end := fit(richest, rows, start[richest.slots]))
         u = np.sqrt(np.diag(end.covariance))
-        if end.cost <= MISFIT**2 * end.residual.size and np.all((end.values >= -NEGATIVE * u)[len(STATE) :]):
+        if end.cost <= EXCESS**2 * end.residual.size and np.all((end.values >= -NEGATIVE * u)[len(STATE) :]):
             break
     return min(ends, key=lambda end: end.cost).values
 

@@ -13,10 +13,10 @@ from pipeline.bench.added_mass import added_mass_kg
 from pipeline.bench.instrument import U_CRYSTAL
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.damping.evidence import VERY_STRONG
 from pipeline.motion.fit import Rows
 from pipeline.motion.relaxing import FREE, Decay, best_decay, critical_decay, lone_exponential
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import EXCESS, STRONG, VERY_STRONG
 from pipeline.numerics.quantity import noun
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
@@ -26,7 +26,6 @@ Kind = Literal["overdamped", "critical", "strong"]
 
 FEWEST = 20  # minimum number of samples for a fit of five parameters
 POINTS = 300  # approximate number of block means to which a record is reduced before shapes are compared
-MISFIT = 1.5  # maximum root mean square of the fit's residual, in units of the record's noise
 # Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
 LEAST_DAMPING = 0.05
 
@@ -115,7 +114,7 @@ def _misses(rows: Rows, found: Decay) -> bool:
     """Return whether the residual is too large over the whole record or over its moving part."""
     squares = (rows.left(FREE, found.values) / rows.u) ** 2
     count = max(int(np.searchsorted(rows.t, 4.0 / found.slowest)), 12)
-    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > MISFIT**2)
+    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > EXCESS**2)
 
 
 def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
@@ -167,7 +166,7 @@ def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[Kind, Deca
     one = critical_decay(rows, fit)
     critical = math.inf if one is None else one.chi2 + 4.0 * price
     free = fit.chi2 + 5.0 * price
-    if min(critical, free) > left + 3.0 * price - 6.0:
+    if min(critical, free) > left + 3.0 * price - STRONG:
         if rate > fastest:
             return None
         return NoOscillation(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.numerics.levels import LIMIT
 from pipeline.track import F8
 
 
@@ -85,10 +86,6 @@ class Estimate:
 
     def __neg__(self) -> Any:
         return -self.ufloat
-
-
-LIMIT = 0.95
-"""Probability of an upper limit."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)

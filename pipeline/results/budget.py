@@ -15,12 +15,9 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.levels import COVERAGE
 
 Kind = Literal["A", "B"]
-
-COVERAGE = 0.9545
-"""Coverage probability of the expanded uncertainty; the coverage factor is 2.00 for many degrees of freedom."""
-MANY = 1e6  # degrees of freedom from which they count as infinite: the coverage factor agrees to five digits
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +50,10 @@ class Budget:
     def dof(self) -> float:
         """Effective degrees of freedom: :math:`\\nu = u^4 / \\sum_i u_i^4/\\nu_i` (Welch-Satterthwaite).
 
-        The formula is from JCGM 100:2008, G.4.1. More than a million degrees of freedom count as infinite.
+        The formula is from JCGM 100:2008, G.4.1.
         """
         below = sum(c.share**2 / c.dof for c in self.contributions)
-        return 1.0 / below if below > 1.0 / MANY else math.inf
+        return 1.0 / below if below > 0.0 else math.inf
 
     @property
     def coverage_factor(self) -> float:
@@ -159,7 +156,8 @@ def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
     """Return estimates with their covariance, from the inputs that they were calculated from.
 
     >>> period = Estimate(0.8, 0.001, "s")
-    >>> print(joint_of({"period": period, "frequency": Estimate.of_variable(1 / period, "Hz")}).correlation.round(6).tolist())
+    >>> both = joint_of({"period": period, "frequency": Estimate.of_variable(1 / period, "Hz")})
+    >>> both.correlation.round(6).tolist()
     [[1.0, -1.0], [-1.0, 1.0]]
     """
     each = list(estimates.values())

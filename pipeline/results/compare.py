@@ -13,6 +13,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import FALSE_ALARM
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.numerics.threads import one_thread
 from pipeline.results.derive import Derived
@@ -22,7 +23,6 @@ NEARER = 0.01  # maximum tension with two runs exchanged, over that without: cha
 SOLVED = 0.5  # maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it
 LARGEST_SPRING = 0.6  # maximum mass of a spring, over the lightest bob: a heavier spring is noticed and weighed
 GAUSS_NEWTON_STEPS = 30
-PROBABILITY = 0.997  # with which runs of one spring agree
 SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those farthest from the mean
 
 
@@ -208,12 +208,12 @@ def _fit(
     dof = len(runs) - (2 if solved else 1)
     if stated is not None and stated.u > 0:
         chi2 += ((line.spring.value - stated.value) / stated.u) ** 2
-    tension = chi2 / chi2_quantile(PROBABILITY, dof) if dof else 0.0
+    tension = chi2 / chi2_quantile(1.0 - FALSE_ALARM, dof) if dof else 0.0
     if solved:
         # The mass of a spring cannot be negative, and a heavy spring would have been weighed.
         heaviest = LARGEST_SPRING * float(loads.min())
         away = max(-found.value, found.value - heaviest, 0.0) / max(found.u, 1e-12 * heaviest)
-        tension = max(tension, away**2 / chi2_quantile(PROBABILITY, 1))
+        tension = max(tension, away**2 / chi2_quantile(1.0 - FALSE_ALARM, 1))
     # With a stated spring, each constant is that of the run's own analysis. Without a usable mass it excludes the
     # spring.
     shown = stated or (found if solved and tension <= 1.0 else Estimate(0.0, 0.0, "kg"))

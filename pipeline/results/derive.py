@@ -24,6 +24,7 @@ from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.select import Damping
 from pipeline.motion.averaged import Fitted, Phase
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
+from pipeline.numerics.levels import LIMIT
 from pipeline.numerics.robust import mad_sigma
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
@@ -33,9 +34,6 @@ from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
-# Weight of the nearest law, if no law fits, from which its coefficients are quoted: the others together are within the
-# usual 5 % of a test.
-FAR_AHEAD = 0.95
 U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
 
 
@@ -489,7 +487,7 @@ class _Laws:
             found = [(Weighted(best, 1.0), *_of_law(best, elapsed))]
         self.weighted = tuple(one for one, *_ in found)
         self.stated = self.weighted[0].fit
-        ahead = not damping.admissible and self.weighted[0].weight >= FAR_AHEAD
+        ahead = not damping.admissible and self.weighted[0].weight >= LIMIT
         self.quoted = damping.by_statement or damping.settled or ahead
         self.shown = best if self.quoted else self.stated
         self.squared_rate = mean_squared_rate(best, best.amplitude(elapsed))

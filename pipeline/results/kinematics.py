@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.checks.model import EXCESS
 from pipeline.damping.average import Weighted
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.motion.averaged import Fitted, Phase
+from pipeline.numerics.levels import EXCESS
 from pipeline.track import F8, UNUSABLE, Quality, Track
 
 
