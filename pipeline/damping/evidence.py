@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Protocol
 
 import numpy as np
 
@@ -59,40 +58,7 @@ def weigh(law: Law, fit: Fit, least_chi2: float, points: int, correlation: float
     return LawFit(law, joint_of(law, fit.values, covariance, unit), reduced, dof, bic, rejection)
 
 
-class Weighed(Protocol):
-    """A fit that takes part in the selection among laws, to one run or to several runs together."""
-
-    @property
-    def law(self) -> Law:
-        """The law."""
-        ...
-
-    @property
-    def bic(self) -> float:
-        """Bayesian information criterion."""
-        ...
-
-    @property
-    def rejection(self) -> str:
-        """The reason why the law is rejected; empty if it is not."""
-        ...
-
-    @property
-    def rejected(self) -> bool:
-        """Whether the points contradict the law."""
-        ...
-
-    @property
-    def reduced_chi2(self) -> float:
-        """Chi-square over the degrees of freedom."""
-        ...
-
-    def rates(self, amplitude: F8) -> tuple[F8, F8]:
-        """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty, both in m/s."""
-        ...
-
-
-def choose(fits: Mapping[str, Weighed], evidence: float, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:
+def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:
     """Return the selected law, and the admissible laws from best to worst.
 
     If all laws are rejected, the law that fits best is selected and no law is admissible.

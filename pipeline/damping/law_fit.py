@@ -16,7 +16,7 @@ from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.regression import solve_weighted
 from pipeline.track import F8
 
-Rejection = Literal["", "misfit", "negative"]
+Rejection = Literal["", "misfit", "differ", "negative"]  # "differ": the coefficients of several runs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
