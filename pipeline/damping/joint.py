@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, choose
-from pipeline.damping.law_fit import LawFit, Rejection
+from pipeline.damping.law_fit import NEGATIVE, LawFit, Rejection, choose
 from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
 from pipeline.errors import AnalysisError

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, choose, least_chi2, weigh
-from pipeline.damping.law_fit import LawFit, fit_law, mean_squared_rate
+from pipeline.damping.law_fit import NEGATIVE, LawFit, choose, fit_law, least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import Fit

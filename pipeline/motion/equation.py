@@ -14,8 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, least_chi2, weigh
-from pipeline.damping.law_fit import mean_squared_rate
+from pipeline.damping.law_fit import NEGATIVE, least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.select import Damping, select_law
 from pipeline.motion.averaged import Fitted, Phase, Rest, Waveform, wrapped

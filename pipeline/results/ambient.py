@@ -6,8 +6,8 @@ import math
 from functools import cached_property
 from typing import Any
 
-from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
+from pipeline.bench.disc import scene_air
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.bench.added_mass import ADDED_MASS_SHAPE
+from pipeline.bench.disc import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
 from pipeline.bench.air import speed_of_sound
-from pipeline.bench.derived_drag import SOURCES, DerivedDrag, disc_rate
+from pipeline.bench.disc import SOURCES, DerivedDrag, added_mass_kg, disc_rate, scene_air, scene_air_density
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import GRAVITY_M_PER_S2, HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
-from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.equation import Problem
 from pipeline.motion.averaged import Fitted, Rest
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.quantity import amount
