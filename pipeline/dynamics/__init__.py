@@ -12,13 +12,12 @@ from typing import Any, cast
 
 from failure.extensions import entry_points_of, load_entry
 from pipeline.dynamics.equation import Equation as Equation
+from pipeline.dynamics.equation import Problem as Problem
+from pipeline.dynamics.equation import effective_mass_kg as effective_mass_kg
 from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import Integrator as Integrator
 from pipeline.dynamics.integrator import Trajectory as Trajectory
-from pipeline.dynamics.methods import FORWARD_EULER, RK4, SYMPLECTIC_EULER, VERLET, YOSHIDA4
-from pipeline.dynamics.problem import Problem as Problem
-from pipeline.dynamics.problem import effective_mass_kg as effective_mass_kg
-from pipeline.dynamics.solve_ivp import DOP853
+from pipeline.dynamics.methods import DOP853, FORWARD_EULER, RK4, SYMPLECTIC_EULER, VERLET, YOSHIDA4
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws.drag import amplitudes
-from pipeline.dynamics.problem import Problem, effective_mass_kg
+from pipeline.dynamics.equation import Problem, effective_mass_kg
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8

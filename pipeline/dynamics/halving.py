@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
-from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.solve_ivp import LEAST_RTOL, SolveIvp
+from pipeline.dynamics.methods import LEAST_RTOL, SolveIvp
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.equation import LARGEST
-from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.equation import LARGEST, Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 

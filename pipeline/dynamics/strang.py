@@ -14,10 +14,9 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from pipeline.dynamics.equation import Equation
+from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.flow import Entries, flow
 from pipeline.dynamics.integrator import Integrator, kept
-from pipeline.dynamics.problem import Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 

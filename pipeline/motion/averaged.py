@@ -14,11 +14,11 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from pipeline.damping.evidence import VERY_STRONG
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import FALSE_ALARM, VERY_STRONG
 from pipeline.numerics.quantity import Unit
 from pipeline.numerics.regression import (
     Line,
@@ -42,7 +42,6 @@ MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitu
 NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
 DEGREE = 6  # maximum degree of the polynomial of a drifting rest position
 FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
-REJECTION = 1e-3  # probability that the chi-square test rejects residuals that are only noise
 
 
 LARGE_SHIFT = 0.02  # of the frequency between very small swings and the first amplitude, beyond which it is checked
@@ -301,7 +300,7 @@ def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
     if free < 1:
         return 1.0, 1.0
     length = max(correlation_length(line.residual / u), spread.correlation)
-    too_large = line.chi2 > chi2_quantile(1.0 - REJECTION, free)
+    too_large = line.chi2 > chi2_quantile(1.0 - FALSE_ALARM, free)
     return length * (line.chi2 / free if too_large else 1.0), length
 
 

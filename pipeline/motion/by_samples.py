@@ -8,25 +8,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.damping.evidence import BARE_MENTION
 from pipeline.damping.law_fit import LawFit, joint_of
 from pipeline.damping.laws import LAWS, Law, in_units
-from pipeline.damping.select import EVIDENCE, Damping
+from pipeline.damping.select import Damping
 from pipeline.motion.averaged import DEGREE, Averaged, Fitted, Phase, Rest, area_of, assembled, wrapped
 from pipeline.motion.fit import Bools, Rows, clipped, covariance_of, fit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit, central_differences
+from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
 from pipeline.numerics.regression import solve_weighted
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated, model_error, with_prior
 
 FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law; with fewer the samples do
-ROUNDS = 5  # maximum number of rounds of clipping and refitting
 STEPS = 25  # maximum number of evaluations of the model in one fit
-# A law that is fitted in addition to the selected and the admissible ones, even if the windows contradict it: the
-# single exponential is the usual reference for comparisons.
-BESIDES = "linear"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +94,7 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
 
 def _considered(damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
     """Return laws and start values by name; the selected law first, which decides which samples are false echoes."""
-    names = [name for name in (damping.selected, *damping.admissible, BESIDES) if name in damping.fits]
+    names = [name for name in (damping.selected, *damping.admissible) if name in damping.fits]
     fits = {name: damping.fits[name] for name in names}
     return {n: x.law for n, x in fits.items()}, {n: x.joint.values for n, x in fits.items()}
 
@@ -198,7 +194,7 @@ def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
         found[name] = LawFit(law, joint, 1.0, one.dof, bic, "")
     least = min(one.bic for one in found.values())
     selected = next(name for name, one in found.items() if one.bic - least < BARE_MENTION)
-    admissible = tuple(name for name, one in found.items() if one.bic - least <= EVIDENCE)
+    admissible = tuple(name for name, one in found.items() if one.bic - least <= STRONG)
     if damping.stated in found:
         selected, admissible = damping.stated, (damping.stated,)
     unfitted = {name: why for name, why in damping.unfitted.items() if name not in found}

@@ -14,8 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, least_chi2, weigh
-from pipeline.damping.law_fit import mean_squared_rate
+from pipeline.damping.law_fit import NEGATIVE, least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.select import Damping, select_law
 from pipeline.motion.averaged import Fitted, Phase, Rest, Waveform, wrapped
@@ -23,6 +22,7 @@ from pipeline.motion.fit import Rows, clipped, fit
 from pipeline.motion.solved import STATE, FreeMotion, Solved, envelope
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit, central_differences
+from pipeline.numerics.levels import MISFIT
 from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
@@ -36,8 +36,6 @@ MOST_PERIODS = 250  # maximum number of periods for the fit of a weakly damped m
 LEAST_DAMPING = 0.01
 # Damping ratio above which it is fitted even if the windows, which are then few, show linear drag or none.
 ALWAYS = 0.05
-# Maximum root mean square of the residual of the law with most parameters, in units of the record's noise.
-MISFIT = 1.25
 
 
 def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *, stopped: bool) -> Fitted | str | None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.numerics import least_squares
 from pipeline.numerics.least_squares import STEPS, Fit
+from pipeline.numerics.levels import MISFIT, ROUNDS
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, Quality
@@ -27,7 +28,6 @@ Bools = NDArray[np.bool_]
 # Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
 # with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
 STEADY = 1e-4
-MORE_THAN_NOISE = 1.5  # ratio of residuals to noise above which no sample is excluded by its size
 DEPENDENT = 1e-13  # eigenvalue, relative to the largest, below which columns count as linearly dependent
 FEWEST_PERIODS = 8  # minimum number of periods whose sums show how far residuals are correlated
 
@@ -122,7 +122,7 @@ def clipped(
     *,
     least_m: float,
     noise_m: float = math.inf,
-    rounds: int = 5,
+    rounds: int = ROUNDS,
     steps: int = STEPS,
 ) -> tuple[Fit, Rows]:
     """Fit until the set of false echoes is stable; return the fit and its rows.
@@ -136,7 +136,7 @@ def clipped(
         left = rows.left(model, found.values)
         spread = mad_sigma(left[rows.candidates])
         candidates = rows.candidates & ~rows.on_plateau(rows.y - left)
-        near = rows.used if spread > MORE_THAN_NOISE * noise_m else np.abs(left) <= CLIP_SIGMAS * max(spread, least_m)
+        near = rows.used if spread > MISFIT * noise_m else np.abs(left) <= CLIP_SIGMAS * max(spread, least_m)
         chosen = candidates & near
         if (count := int(np.count_nonzero(chosen))) < 2 * start.size:
             few = replace(found, converged=False, tried=f"only {count} samples lie on the model")

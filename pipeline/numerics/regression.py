@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.track import F8
 
-LAGS = 16  # lags computed together; most residuals are uncorrelated beyond these
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
@@ -169,14 +167,11 @@ def correlation_length(residual: F8) -> float:
     if power == 0.0:
         return 1.0
     total, least = 1.0, 2.0 * power / math.sqrt(n)
-    for first in range(1, n // 3, LAGS):
-        stop = min(first + LAGS, n // 3)
-        # Several lags together, padded with zeros beyond the end.
-        ahead = np.concatenate([centred[first:], np.zeros(stop - 1)])
-        for product in np.correlate(ahead, centred, "valid").tolist():
-            if product < least:
-                return total
-            total += 2.0 * product / power
+    for lag in range(1, n // 3):
+        product = float(centred[lag:] @ centred[:-lag])
+        if product < least:
+            break
+        total += 2.0 * product / power
     return total
 
 

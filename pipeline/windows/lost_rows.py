@@ -64,7 +64,7 @@ def find_lost_rows(samples: Conditioned, windows: Demodulated) -> LostRows | Non
             turn = windows.angular_frequency * step_s
             if (scatter := _scatter(windows)) >= best:
                 break
-            best, found = scatter, LostRows(float(lost.sum()) / len(track), np.count_nonzero(lost), trial)
+            best, found = scatter, LostRows(float(lost.sum()) / len(track), int(np.count_nonzero(lost)), trial)
     return found
 
 

@@ -21,8 +21,8 @@ from acquisition.decoders.registry import get_family
 from acquisition.errors import CalibrationError
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
 from acquisition.live.serial_port import SerialPort
-from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import speed_of_sound
+from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted

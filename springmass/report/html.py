@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 from acquisition.errors import visible
 from pipeline.analyse import Oscillation
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.effects import EFFECTS
-from pipeline.registry.quantities import INPUTS
+from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
 from springmass.charts.chart import Chart, to_json
 from springmass.layout import static_file

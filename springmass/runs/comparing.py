@@ -215,5 +215,5 @@ def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Fin
 
 def _law(fit: JointFit) -> dict[str, Any]:
     keys = ("reduced_chi2", "dof", "bic", "excess_chi2", "excess_dof", "rejection")
-    coefficients = {name: limited(fit.law, name, x) for name, x in fit.coefficients.estimates().items()}
+    coefficients = {name: limited(fit.law, name, x) for name, x in fit.coefficients.items()}
     return {"parameters": parameters_json(coefficients), **picked(fit, keys)}

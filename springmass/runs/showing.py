@@ -124,7 +124,7 @@ def laws_of(motion: Oscillation) -> dict[str, Any]:
 
 def laws_across(joint: JointDamping) -> dict[str, Any]:
     """Return the rows of all laws fitted to several runs with shared coefficients, and the conclusion in words."""
-    fitted = {law: fit.coefficients.estimates() for law, fit in joint.fits.items()}
+    fitted = {law: fit.coefficients for law, fit in joint.fits.items()}
     return {
         "message": typeset(joint.message),
         "unfitted": [],

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from pipeline.analysis import Analysis
-from pipeline.bench.derived_drag import DerivedDrag, derive_drag, needs_drag
+from pipeline.bench.disc import DerivedDrag, derive_drag, needs_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Integrator, Problem, Trajectory, get_integrator
 from pipeline.dynamics.band import STRONGEST, Band, spread, uncertain
 from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
-from pipeline.dynamics.solve_ivp import DOP853
+from pipeline.dynamics.methods import DOP853
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
