@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics import least_squares
-from pipeline.numerics.least_squares import STEPS, Fit
+from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.levels import EXCESS, ROUNDS
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import mad_sigma
@@ -109,10 +109,10 @@ class Rows:
         return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])
 
 
-def fit(model: Model, rows: Rows, start: F8, steps: int = STEPS) -> Fit:
+def fit(model: Model, rows: Rows, start: F8) -> Fit:
     """Fit a model to the rows that are used."""
     at = least_squares.remembering(rows.residuals(model))
-    return least_squares.minimise(lambda x: at(x)[0], start, lambda x: at(x)[1](), steps=steps)
+    return least_squares.minimise(lambda x: at(x)[0], start, lambda x: at(x)[1]())
 
 
 def clipped(
@@ -123,7 +123,6 @@ def clipped(
     least_m: float,
     noise_m: float = math.inf,
     rounds: int = ROUNDS,
-    steps: int = STEPS,
 ) -> tuple[Fit, Rows]:
     """Fit until the set of false echoes is stable; return the fit and its rows.
 
@@ -132,7 +131,7 @@ def clipped(
     not if hardly any sample lies on the model.
     """
     for left_rounds in range(rounds, 0, -1):
-        found = fit(model, rows, start, steps)
+        found = fit(model, rows, start)
         left = rows.left(model, found.values)
         spread = mad_sigma(left[rows.candidates])
         candidates = rows.candidates & ~rows.on_plateau(rows.y - left)
