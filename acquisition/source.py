@@ -49,7 +49,6 @@ class Source(Protocol):
     @property
     def info(self) -> SourceInfo:
         """The description of the source, available before the first sample."""
-        ...
 
     def __enter__(self) -> Self: ...
 

@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import queue
+import shutil
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +20,8 @@ from typing import Any, Self
 
 from acquisition.clock import Clock
 from acquisition.readings import Read
-from storage.errors import NotALog, WriteFailed, one_line
-from storage.wire_log.appending import Item, WireLogWriter
-from storage.wire_log.log_file import LogFile, open_log_file
+from storage.errors import DiskNearlyFull, NotALog, WriteFailed, one_line
+from storage.wire_log.appending import Item, LogFile, WireLogWriter, open_log_file
 from storage.wire_log.records import HEAD_BYTES, HIGHEST_CHANNEL, MAX_PAYLOAD, Kind, LogHeader, event_payload
 from storage.wire_log.scanning import LogContents, read_log
 
@@ -286,3 +286,15 @@ def _in_records(records: Sequence[Read]) -> Iterable[Read]:
         for channel, mono_ns, payload in records
         for start in range(0, len(payload), MAX_PAYLOAD)
     ]
+
+
+def check_disk(path: Path, needed_bytes: int) -> None:
+    """Raise DiskNearlyFull if the disk of a file has less space, and WriteFailed if the file's folder is missing."""
+    try:
+        free = shutil.disk_usage(path.absolute().parent).free
+    except OSError as error:
+        problem = f"its folder cannot be read ({error.strerror or one_line(error)})"
+        raise WriteFailed(path, problem, "make the folder first") from error
+    if free < needed_bytes:
+        problem = f"the run needs {needed_bytes / 1e6:.1f} MB, but {free / 1e6:.1f} MB are free"
+        raise DiskNearlyFull(path, problem, "free disk space, record for a shorter time or use another disk")

@@ -7,17 +7,20 @@ The module of a format is imported on demand. Another package adds a format with
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any, cast
 
-from acquisition.errors import AcquisitionError, UnknownFormat
-from acquisition.recordings.base import Format, Survey, SurveyFormat, dialect_folder, read_bytes
+from platformdirs import user_config_path
+
+from acquisition.errors import AcquisitionError, FormatError, UnknownFormat
 from acquisition.recordings.foreign import unknown_format
-from acquisition.recordings.recording import Recording
+from acquisition.recordings.recording import Format, Recording, Survey, SurveyFormat
 from acquisition.recordings.tables.text import HEAD_BYTES, restated
+from acquisition.regular_file import open_regular
 from failure.extensions import entry_points_of, load_entry
 
 _MODULES = {
@@ -82,14 +85,7 @@ def open_recording(
     cells and the decimal mark of a text are found out unless they are stated.
     """
     name = os.fspath(path)
-    if delimiter or decimal:
-        original = read_bytes(path)
-        data = restated(name, original, delimiter, decimal)
-        reader = get_format(format) if format else _recognise(name, data[:HEAD_BYTES])
-        recording = _read(reader, name, data, answers)
-        return replace(recording, originals=(replace(recording.originals[0], data=original), *recording.originals[1:]))
-    reader = get_format(format) if format else _recognise(name, read_bytes(path, HEAD_BYTES))
-    data = read_bytes(path)
+    reader, original, data = _opened(name, format, delimiter, decimal)
     if velocity_path is not None:
         read_pair = getattr(reader, "read_pair", None)
         if read_pair is None:
@@ -97,25 +93,30 @@ def open_recording(
             raise UnknownFormat(name, problem, "leave the velocity file out")
         velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
         return cast(Recording, read_pair((name, data), velocity, rate_hz=answers.get("rate_hz")))
-    return _read(reader, name, data, answers)
-
-
-def _read(reader: Format, name: str, data: bytes, answers: Mapping[str, Any]) -> Recording:
-    return reader.read(name, data, **{name: answer for name, answer in answers.items() if answer is not None})
+    recording = reader.read(name, data, **{name: answer for name, answer in answers.items() if answer is not None})
+    if data is original:
+        return recording
+    return replace(recording, originals=(replace(recording.originals[0], data=original), *recording.originals[1:]))
 
 
 def inspect(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None) -> Inspection:
     """Return the format and the content of a file, before a channel is chosen."""
-    if delimiter or decimal:
-        data = restated(os.fspath(path), read_bytes(path), delimiter, decimal)
-        head = data[:HEAD_BYTES]
-    else:
-        data, head = b"", read_bytes(path, HEAD_BYTES)
-    reader = _recognise(os.fspath(path), head)
+    name = os.fspath(path)
+    reader, _, data = _opened(name, None, delimiter, decimal)
     if not isinstance(reader, SurveyFormat):
         return Inspection(reader.name, reader.title, "", ())
-    surveys = reader.survey(os.fspath(path), data or read_bytes(path))
-    return Inspection(reader.name, reader.title, reader.evidence(head), surveys)
+    return Inspection(reader.name, reader.title, reader.evidence(data[:HEAD_BYTES]), reader.survey(name, data))
+
+
+def _opened(path: str, format: str | None, delimiter: str | None, decimal: str | None) -> tuple[Format, bytes, bytes]:
+    """Return the format of a file, its bytes, and its bytes as they are to be read."""
+    if delimiter or decimal:
+        original = read_bytes(path)
+        data = restated(path, original, delimiter, decimal)
+        return get_format(format) if format else _recognise(path, data[:HEAD_BYTES]), original, data
+    reader = get_format(format) if format else _recognise(path, read_bytes(path, HEAD_BYTES))
+    data = read_bytes(path)
+    return reader, data, data
 
 
 def _recognise(path: str, head: bytes) -> Format:
@@ -134,17 +135,34 @@ def _loaders() -> dict[str, Callable[[], Format]]:
             if each.name in (*_MODULES, "table", "sketch"):
                 where = folder / f"{each.name}.toml"
                 raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')
-            loaders[each.name] = partial(_declared, each)
+            loaders[each.name] = partial(cast, Format, each)
     loaders |= {name: partial(_built_in, module) for name, module in _MODULES.items()}
     for name, entry in entry_points_of("springmass.formats").items():
         loaders.setdefault(name, partial(load_entry, entry, f'format "{name}"', AcquisitionError))
     return {**loaders, "table": partial(_built_in, "any_table"), "sketch": partial(_built_in, "sketch")}
 
 
-def _declared(each: Format) -> Format:
-    return each
-
-
 def _built_in(module: str) -> Format:
     name, _, variable = module.partition(":")
     return cast(Format, getattr(import_module(f"acquisition.recordings.families.{name}"), variable or "FORMAT"))
+
+
+def dialect_folder() -> Path:
+    """Return the folder of a user's dialects inside the system's folder for settings."""
+    return user_config_path("springmass", appauthor=False, roaming=True) / "dialects"
+
+
+def read_bytes(path: str | os.PathLike[str], limit: int = -1) -> bytes:
+    """Return the first bytes of a file, or all; raise an error if it cannot be read or is empty."""
+    name = os.fspath(path)
+    try:
+        with open_regular(name) as file:
+            data = file.read(limit)
+    except OSError as error:
+        problem = f"cannot be opened ({error.strerror or error})"
+        raise FormatError(name, problem, "check its name and permissions") from error
+    except ValueError as error:  # the name contains a NUL character
+        raise FormatError(repr(name), f"not a valid file name ({error})", "check the name") from error
+    if not data:
+        raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")
+    return data

@@ -22,7 +22,7 @@ from pipeline.motion.fit import Rows, clipped, fit
 from pipeline.motion.solved import STATE, FreeMotion, Solved, envelope
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit, central_differences
-from pipeline.numerics.levels import EXCESS
+from pipeline.numerics.levels import MISFIT
 from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
@@ -76,7 +76,7 @@ def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *
     if left.size <= count:
         return f"{words}, and no motion with {laws[-1].words} comes near the samples: the averaged law stands"
     noise_m = max(math.sqrt(float(left @ left) / (left.size - count)), 0.01 * expected_m)
-    if not noise_m <= EXCESS * expected_m:
+    if not noise_m <= MISFIT * expected_m:
         return (
             f"{words}, and the equation of motion with {laws[-1].words} leaves {amount(noise_m, unit)} where samples "
             f"scatter by {amount(expected_m, unit)}: the averaged law stands"
@@ -146,7 +146,7 @@ def _first_solution(models: Sequence[Solved], rows: Rows, windows: Demodulated, 
             start = alone.full(fit(alone, rows, first[alone.slots]).values)
         ends.append(end := fit(richest, rows, start[richest.slots]))
         u = np.sqrt(np.diag(end.covariance))
-        if end.cost <= EXCESS**2 * end.residual.size and np.all((end.values >= -NEGATIVE * u)[len(STATE) :]):
+        if end.cost <= MISFIT**2 * end.residual.size and np.all((end.values >= -NEGATIVE * u)[len(STATE) :]):
             break
     return min(ends, key=lambda end: end.cost).values
 

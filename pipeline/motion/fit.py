@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.numerics import least_squares
 from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import EXCESS, ROUNDS
+from pipeline.numerics.levels import MISFIT, ROUNDS
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, Quality
@@ -135,7 +135,7 @@ def clipped(
         left = rows.left(model, found.values)
         spread = mad_sigma(left[rows.candidates])
         candidates = rows.candidates & ~rows.on_plateau(rows.y - left)
-        near = rows.used if spread > EXCESS * noise_m else np.abs(left) <= CLIP_SIGMAS * max(spread, least_m)
+        near = rows.used if spread > MISFIT * noise_m else np.abs(left) <= CLIP_SIGMAS * max(spread, least_m)
         chosen = candidates & near
         if (count := int(np.count_nonzero(chosen))) < 2 * start.size:
             few = replace(found, converged=False, tried=f"only {count} samples lie on the model")

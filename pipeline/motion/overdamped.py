@@ -25,7 +25,7 @@ from pipeline.motion.fit import Rows
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import EXCESS, STRONG, VERY_STRONG
+from pipeline.numerics.levels import MISFIT, STRONG, VERY_STRONG
 from pipeline.numerics.quantity import noun
 from pipeline.numerics.regression import covariance_of
 from pipeline.samples.condition import Conditioned
@@ -294,7 +294,7 @@ def _misses(rows: Rows, found: Decay) -> bool:
     """Return whether the residual is too large over the whole record or over its moving part."""
     squares = (rows.left(FREE, found.values) / rows.u) ** 2
     count = max(int(np.searchsorted(rows.t, 4.0 / found.slowest)), 12)
-    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > EXCESS**2)
+    return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > MISFIT**2)
 
 
 def _beats_other_shapes(rows: Rows, found: Decay) -> bool:

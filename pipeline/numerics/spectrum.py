@@ -156,10 +156,10 @@ def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
     line = beyond(basis, (rows / np.linalg.norm(rows, axis=1)[:, None]).T)
     if np.linalg.norm(line[:, :2], -2) < 0.2:  # smallest singular value: the model already contains the line
         return None
-    noise = blocks.unweighted(left - line @ np.linalg.lstsq(line, left)[0])
+    noise = blocks.unweighted(left - line @ np.linalg.lstsq(line, left, rcond=None)[0])
     density = spectral_density(blocks, noise, f, band, smooth_density(noise, f * blocks.step))
     # Rows are weighted by their numbers of samples; the density is that of one full block.
-    own = line[:, :2] @ np.linalg.lstsq(line[:, :2], left)[0]
+    own = line[:, :2] @ np.linalg.lstsq(line[:, :2], left, rcond=None)[0]
     evidence = 0.5 * float(own @ own) / (density * blocks.samples)
     return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
 

@@ -109,6 +109,7 @@ INPUTS: Mapping[str, Input] = {
     "lost_rows": Input("samples that are missing between others"),
     "crest": Input("crests of a swing whose stiffness changes with the amplitude"),
     "model_misfit": Input("what differs from a sinusoid in every period"),
+    "rounding": Input("rounding to steps larger than the noise"),
     "held_samples": Input("distances held by the sensor"),
     "sensor_smoothing": Input("smoothing by the sensor"),
     "implausible_motion": Input("motion that no bob on a spring makes"),

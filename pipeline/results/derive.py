@@ -17,7 +17,7 @@ from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.checks.misfit import Misfit
+from pipeline.checks.residual import Misfit
 from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Drag, Law, free_power

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 from failure import Error
 from pipeline.registry.quantities import QUANTITIES
-from springmass.api.sources import Analysing, analyse
+from springmass.api.sources import Analysing, AnyScene, analyse
 from springmass.course.rows import NUMBERS, WHOLE, columns_of, read_rows
 from springmass.course.worker import row_of
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from springmass.api.sources import AnyScene, AnySource
+    from springmass.api.sources import AnySource
 
 UNITS = {
     **{name: x.unit for name, x in QUANTITIES.items() if isinstance(x.unit, str) and x.unit and name != "velocity_rms"},

@@ -17,8 +17,8 @@ from springmass.course.plan import Job, Plan, code_sha256, names_of
 from springmass.course.rows import COURSE, write_rows
 from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
-from springmass.errors import USAGE, ProgramError
-from springmass.report.script import SHARED, report_script
+from springmass.errors import ProgramError
+from springmass.report.html import SHARED, report_script
 from storage.atomic import write_whole, writing
 
 GROWTH = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
@@ -84,7 +84,7 @@ def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterat
             rows = [(job, row or blank_row(job, "ended", f"{job.path}: {_DIED}")) for job, row in done]
             if any(row["code_sha256"] != code_sha256() for _, row in rows):
                 wrong = "a worker has another version of springmass or of its libraries; install the same everywhere"
-                raise ProgramError(f"{dask}: {wrong}", USAGE)
+                raise ProgramError(f"{dask}: {wrong}")
             yield rows
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import functools
+import hashlib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,17 +16,16 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
 from springmass.charts.chart import Chart, to_json
-from springmass.report.advice import notices_of
+from springmass.layout import static_file
+from springmass.report.advice import notices_of, trust_of
 from springmass.report.budgets import budgets_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
-from springmass.report.summary import summary
-from springmass.report.trust import trust_of
-from springmass.report.words import method
+from springmass.report.words import method, summary
 from springmass.runs.comparing import Compared, beside
 from springmass.runs.json_results import picked
-from springmass.runs.laws import laws_across, laws_of
 from springmass.runs.rows import table_rows
 from springmass.runs.run import Run
+from springmass.runs.showing import laws_across, laws_of
 from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def drawn_by_script(charts: Sequence[Mapping[str, Any]], address: str = "") -> d
     """Return what a template needs to draw charts: their numbers, the style, and the script or its address."""
     from markupsafe import Markup
 
-    from springmass.report.script import report_script, report_style
+    from springmass.report.html import report_script, report_style
 
     style, script = Markup(report_style()), "" if address else Markup(report_script())
     return {"charts": charts, "chart_style": style, "script": script, "script_address": address}
@@ -253,3 +253,30 @@ def _breakable(law: str) -> Markup:
     from markupsafe import Markup, escape
 
     return Markup("+<wbr>").join(escape(term) for term in law.split("+"))
+
+
+SHARED = "charts.js"
+"""The name of the script's own file."""
+SOURCES = ("uPlot.iife.min.js", "charts.js", "report.js")
+"""The sources, in this order; a page that is opened from a disk cannot import modules."""
+
+
+@functools.cache
+def report_script() -> str:
+    """Return the script; ValueError if a source would end the element that contains it."""
+    script = "\n".join(static_file(name).read_text("utf-8") for name in SOURCES)
+    if "</script" in script.lower() or "<!--" in script:
+        raise ValueError("a script of a report must hold neither </script nor <!--")
+    return f"\n{script}\n"
+
+
+@functools.cache
+def report_style() -> str:
+    """Return the style of the charts, which the page of a recording has too."""
+    return "\n".join(static_file(name).read_text("utf-8") for name in ("uPlot.min.css", "charts.css"))
+
+
+@functools.cache
+def script_sha256() -> str:
+    """Return the base64 digest of the script for ``'sha256-...'`` in a Content-Security-Policy."""
+    return base64.b64encode(hashlib.sha256(report_script().encode()).digest()).decode()

@@ -49,8 +49,7 @@ def write_folder(
     from springmass.charts.draw import save
     from springmass.report.html import Figures, drawn_by_script, template
     from springmass.runs.simulating import charts as charted
-    from storage.atomic import write_whole
-    from storage.folder import whole_folder
+    from storage.atomic import whole_folder, write_whole
 
     name = Path(where).name.removesuffix(".toml").removesuffix(".scene")
     target = make_folder(out) / in_a_name(name, ".simulated")

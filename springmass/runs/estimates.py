@@ -31,7 +31,7 @@ _WRITTEN = (
 Exponents = tuple[float, ...]
 
 
-def _exponents(unit: str) -> Exponents | None:
+def exponents_of(unit: str) -> Exponents | None:
     """Return the exponents of a unit such as ``1/(m s)``; None for one that is not made of known ones."""
     above, _, below = unit.partition("/")
     total = [0.0] * 5
@@ -47,7 +47,7 @@ def _exponents(unit: str) -> Exponents | None:
     return tuple(total)
 
 
-_NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := _exponents(unit)) is not None}
+_NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := exponents_of(unit)) is not None}
 _NAMES[(0.0,) * 5] = ""
 
 
@@ -146,7 +146,7 @@ def _unit_of(other: Any) -> str | None:
 
 def _product(sign: int) -> Callable[[Any, Any], str | None]:
     def unit(left: Any, right: Any) -> str | None:
-        units = [None if one is None else _exponents(one) for one in (_unit_of(left), _unit_of(right))]
+        units = [None if one is None else exponents_of(one) for one in (_unit_of(left), _unit_of(right))]
         if units[0] is None or units[1] is None:
             return None
         return _NAMES.get(tuple(a + sign * b for a, b in zip(units[0], units[1], strict=True)))
@@ -155,7 +155,7 @@ def _product(sign: int) -> Callable[[Any, Any], str | None]:
 
 
 def _power(left: Any, right: Any) -> str | None:
-    exponents = None if (unit := _unit_of(left)) is None else _exponents(unit)
+    exponents = None if (unit := _unit_of(left)) is None else exponents_of(unit)
     if exponents is None or isinstance(right, UFloat):
         return "" if unit == "" and _unit_of(right) == "" else None
     return _NAMES.get(tuple(one * float(right) for one in exponents))

@@ -11,8 +11,8 @@ from acquisition.block import Block
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from storage.wire_log.parts import Part, Parts
 from storage.wire_log.records import Kind, Record, SensorEntry, event_content
+from storage.wire_log.survey import Part, Parts
 
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
 """Events that interrupt the bytes of a channel."""

@@ -44,11 +44,9 @@ def test_a_law_is_stated_by_an_option_and_never_noted(cli: Callable[..., Done], 
 
 
 def test_a_law_of_a_scene_file_is_named_first(cli: Callable[..., Done], run: Path) -> None:
-    """The first line of the output names law and file; an option takes precedence over the file."""
+    """The first line of the output names the law; an option takes precedence over the file."""
     bench = scene(run.parent, "linear")
-    first = cli("analyse", run, "--scene", bench, "--no-report").out.splitlines()[0]
-    assert "linear" in first
-    assert str(bench) in first
+    assert "linear" in cli("analyse", run, "--scene", bench, "--no-report").out.splitlines()[0]
     (free,) = cli("analyse", run, "--scene", bench, "--law", "any", "--json").results
     assert free["damping"]["stated"] is None
 

@@ -16,11 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
-from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
 
 from storage.run_file.reading import open_run
-from tests.pages.bench import LIMIT_S, MOVES, PHASE, SEEN, STAGES, Client, answer, press
+from tests.pages.bench import MOVES, PHASE, SEEN, STAGES, Client, answer, press
 
 LOST_ONCE = """() => {
   const trouble = document.getElementById('trouble');
@@ -252,22 +250,3 @@ def kill_page_of(program: Any) -> None:
     command = f"springmass page --recorder.* {program.out.with_suffix('.wire')}"
     found = subprocess.run(["pgrep", "-f", command], capture_output=True, text=True)
     os.kill(int(found.stdout), signal.SIGKILL)
-
-
-@pytest.mark.trials
-def test_a_stranger_sees_nothing(record: Callable[..., Any], browser: Browser, context: BrowserContext) -> None:
-    """The cookie opens a second page in the same browser; another browser, host or origin gets nothing."""
-    program = record()
-    first, second = context.new_page(), context.new_page()
-    first.goto(program.address)
-    second.goto(program.address.partition("?")[0])
-    for page in (first, second):
-        page.wait_for_function(SEEN.format(count=50))
-    stranger = browser.new_context()
-    answered = stranger.new_page().goto(program.address.partition("?")[0])
-    assert answered is not None
-    assert answered.status == 403
-    stranger.close()
-    netloc = program.address.split("/")[2]
-    with pytest.raises(InvalidStatus):
-        connect(f"ws://{netloc}/v2/run", origin="http://evil.example", open_timeout=LIMIT_S)  # type: ignore[arg-type]

@@ -63,18 +63,6 @@ def test_what_means_nothing_is_refused_and_the_page_goes_on(start: Callable[...,
     assert "Traceback" not in "".join(lines)
 
 
-def test_many_idle_connections_disturb_nobody(start: Callable[..., Any]) -> None:
-    """With 400 idle connections the earlier viewers still see new samples, and few lines are written."""
-    program = start("page", str(OLD_RUN))
-    client = Client(program.address)
-    with contextlib.ExitStack() as stack:
-        looking = stack.enter_context(client.socket())
-        for _ in range(400):
-            stack.enter_context(socket.create_connection(client.place, LIMIT_S))
-        assert fit_of(looking)["estimates"]
-    assert len(lines_after(program)) <= 1
-
-
 @pytest.mark.trials
 def test_no_client_disturbs_a_recording(record: Callable[..., Any]) -> None:
     """All of it during a recording that is open to viewers: every reading is there, and the terminal stays readable."""

@@ -112,15 +112,14 @@ def test_everything_comes_back_bit_for_bit(
             assert bits(run.samples()) == whole
             if len(run):
                 assert bits(concatenate(run.blocks(size))) == whole
-            assert (run.info, run.title, run.scene, run.provenance) == (info, title, scene, provenance)
+            assert (run.info, run.header.title, run.header.scene, run.provenance) == (info, title, scene, provenance)
             assert (run.traps, run.originals()) == (tuple(seen), tuple(files))
             run.verify()
 
 
 def everything(run: Run) -> tuple[Any, ...]:
     """Return all that a run says."""
-    described = (run.info, run.title, run.channel, run.format, run.scene, run.traps, run.provenance)
-    return *described, run.malformed_rows, bits(run.samples()), run.originals()
+    return run.header, run.traps, bits(run.samples()), run.originals()
 
 
 @pytest.fixture(scope="module")

@@ -21,8 +21,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.base import Survey
-from acquisition.recordings.recording import Original, Recording, Trap
+from acquisition.recordings.recording import Original, Recording, Survey, Trap
 from acquisition.recordings.sampling.nominal import median, time_flags
 from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled

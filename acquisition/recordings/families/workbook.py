@@ -51,7 +51,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
     families = [each for each in formats() if isinstance(each, ColumnFormat) and each.header is not None]
 
     def reader(name: str, sheet: Sheet) -> Callable[[], list[Table]] | None:
-        lines = [line.text for line in sheet.head(_HEAD_LINES)]
+        lines = sheet.head(_HEAD_LINES)
         header = next((each.header for each in families if lines and each.header and each.header(lines)), None)
         return None if header is None else partial(tables_of_text, f"{path}, sheet {name}", sheet, header, "rows")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -59,18 +59,24 @@ def row_traps(rows: Rows, timed: B1, zeros: int) -> Iterator[Trap]:
     last = unread.size - 1
     if rows.cut:
         outcome = "its sample counts as missing" if timed[last] else "it was left out, because its time is unknown"
-        yield Trap("truncated_row", f"the last row is incomplete; {outcome}", 1, rows.line(last))
+        yield Trap("truncated_row", f"the last row is incomplete; {outcome}", 1, line_of(rows.lines, last))
     unread_rows = np.flatnonzero(unread[:-1] if rows.cut else unread)
     if unread_rows.size:
-        first = rows.line(int(unread_rows[0]))
+        first = line_of(rows.lines, int(unread_rows[0]))
         kept_rows = int(np.count_nonzero(timed[unread_rows]))
         rows_are = "1 row" if unread_rows.size == 1 else f"{unread_rows.size} rows"
-        message = f"{rows_are} could not be read, the first in line {first}; {kept_rows} kept as missing samples"
+        where = "" if first is None else f", the first in line {first}"
+        message = f"{rows_are} could not be read{where}; {kept_rows} kept as missing samples"
         yield Trap("malformed_rows", message, int(unread_rows.size), first)
 
 
-def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | None]) -> Iterator[Trap]:
-    """Report the flagged samples, grouped by flag; ``line`` returns the line number of a sample."""
+def line_of(lines: I8 | None, row: int) -> int | None:
+    """Return the number of the line in which a row stands; None in a binary file."""
+    return None if lines is None else int(lines[row])
+
+
+def sample_traps(flags: U8, t: F8, rate_hz: float, lines: I8 | None) -> Iterator[Trap]:
+    """Report the flagged samples, grouped by flag; ``lines`` are the line numbers of the samples."""
     if not flags.any():
         return
     kinds = (
@@ -81,18 +87,18 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
     for code, flag, what in kinds:
         rows = np.flatnonzero(flags & flag.value)
         if rows.size:
-            yield Trap(code, f"{rows.size} {what}; kept and flagged", int(rows.size), line(int(rows[0])))
+            yield Trap(code, f"{rows.size} {what}; kept and flagged", int(rows.size), line_of(lines, int(rows[0])))
     gaps = np.flatnonzero(flags & Flag.GAP_BEFORE.value)
     if gaps.size:
         reached = np.maximum.accumulate(np.where(flags & IRREGULAR, -np.inf, t))
         lost = int(np.sum(np.rint((t[gaps] - reached[gaps - 1]) * rate_hz) - 1))
         gaps_are = "1 gap" if gaps.size == 1 else f"{gaps.size} gaps"
         message = f"about {lost} samples are missing in {gaps_are}; the sample after each is flagged"
-        yield Trap("missing_samples", message, lost, line(int(gaps[0])))
+        yield Trap("missing_samples", message, lost, line_of(lines, int(gaps[0])))
 
 
 def value_traps(
-    distance: F8, flags: U8, resolution: float, line: Callable[[int], int | None], *, length: bool = True
+    distance: F8, flags: U8, resolution: float, lines: I8 | None, *, length: bool
 ) -> tuple[float, tuple[Trap, ...]]:
     """Find zeros that fill the end, a lost target, and distances rounded more coarsely than printed.
 
@@ -106,14 +112,14 @@ def value_traps(
         distance[tail:] = np.nan
         flags[tail:] |= Flag.MISSING.value
         message = f"the last {count} distances are exactly 0, which no rangefinder reads; kept as missing samples"
-        traps.append(Trap("zero_filled_tail", message, count, line(tail)))
+        traps.append(Trap("zero_filled_tail", message, count, line_of(lines, tail)))
     far = _far(distance, resolution) if length else np.empty(0, np.int64)
     if far.size:
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
         distances = f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others"
         message = f"{distances}: the target was lost; kept and flagged"
-        traps.append(Trap("lost_target", message, int(far.size), line(int(far[0]))))
+        traps.append(Trap("lost_target", message, int(far.size), line_of(lines, int(far[0]))))
     quantum = _common_step(distance, resolution)
     if length and quantum >= _COARSE_M * (1 - 1e-9):
         message = f"distances are multiples of {quantum * 1e3:g} mm: smaller motion is lost by rounding"

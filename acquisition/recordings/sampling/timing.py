@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -39,15 +39,16 @@ class Rows:
     """The rows of one channel, before they become samples; every array has one element for each row.
 
     ``printed`` are the times as printed, s, or None; ``value`` the values in SI, NaN if unread or absent. ``remark``
-    marks rows of text between samples, which are not samples. ``time_resolution`` (s) and ``resolution`` are the last
-    printed digits, the latter 0 for binary values. ``cut`` says that the last row is incomplete.
+    marks rows of text between samples, which are not samples. ``lines`` are line numbers; None in a binary file.
+    ``time_resolution`` (s) and ``resolution`` are the last printed digits, the latter 0 for binary values. ``cut`` says
+    that the last row is incomplete.
     """
 
     printed: F8 | None
     value: F8
     unread: B1
     remark: B1
-    line: Callable[[int], int]
+    lines: I8 | None
     time_resolution: float
     resolution: float
     cut: bool = False

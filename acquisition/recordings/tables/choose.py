@@ -100,14 +100,11 @@ def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Chan
 
 def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple[Trap, ...]]:
     """Return the measure of a channel's values, and the assumptions made for it."""
-    stated = column.measure
-    given = None if unit is None else measure_of(unit)
-    if unit is not None and given is None:
-        raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
-    if given is None:
-        if stated is None:
-            raise NeedsAnswer(Question(path, (_unit_needed(column),), (column.label,)))
+    stated, given = column.measure, measure_of(unit or "")
+    if unit is None and stated is not None:
         return stated, ()
+    if given is None:
+        raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
     if stated == given:
         return given, ()
     if stated is not None and (stated.quantity in ("length", given.quantity)):

@@ -178,7 +178,7 @@ def _with_names(lines: Sequence[str], start: int, mark: str, brackets: bool, wid
     for name, unit in zip(names, units, strict=True):
         plain, own = heading_of(name)
         headings.append(Heading(plain, own or unit.strip(" ()[]")))
-    preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t")))
+    preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t;,")))
     return Layout(preamble, tuple(headings), spare, start, mark, brackets)
 
 

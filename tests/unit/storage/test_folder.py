@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from storage.atomic import whole_folder
 from storage.errors import WriteFailed
-from storage.folder import whole_folder
 
 NAMES = {"page", "table", "old", "figures/a"}
 

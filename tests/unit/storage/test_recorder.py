@@ -13,8 +13,7 @@ from acquisition.clock import VirtualClock
 from acquisition.live.reader import Sink
 from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
-from storage.wire_log.appending import SECOND_COPY
-from storage.wire_log.log_file import LogFile
+from storage.wire_log.appending import SECOND_COPY, LogFile
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.wire import json_of, parse_log

@@ -96,7 +96,7 @@ def test_a_closed_run_says_so(path: Path) -> None:
         blocks = iter(run.blocks(100))
         next(blocks)
     run.close()
-    assert run.title == "Träger 3"
+    assert run.header.title == "Träger 3"
     for read in (run.samples, run.originals, run.verify):
         with pytest.raises(RunClosed, match="closed"):
             read()
