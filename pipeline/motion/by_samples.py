@@ -11,12 +11,12 @@ import numpy as np
 from pipeline.damping.law_fit import LawFit, joint_of
 from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import Damping
-from pipeline.motion.averaged import DEGREE, Averaged, Fitted, Phase, Rest, area_of, assembled, wrapped
+from pipeline.motion.averaged import Averaged, Fitted, Phase, Rest, area_of, assembled, wrapped
 from pipeline.motion.fit import Bools, Rows, clipped, covariance_of, fit
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit
 from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
-from pipeline.numerics.regression import solve_weighted
+from pipeline.numerics.regression import DEGREE, solve_weighted
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated, model_error, with_prior
