@@ -19,7 +19,7 @@ from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import SceneError
 from pipeline.numerics.estimate import Estimate, Joint
 
-ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc over rho a^3: H. Lamb, "Hydrodynamics", 6th ed., 1932, art. 102
+ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc over rho a^3: H. Lamb, "Hydrodynamics", 6th ed. (1932), art. 102
 
 
 def added_mass_kg(scene: Scene) -> float:
@@ -43,10 +43,10 @@ def scene_air_density(scene: Scene) -> float:
     return air_density(*(each.value for each in scene_air(scene)))
 
 
-STEADY_DISC_DRAG = 1.17  # drag coefficient of a disc broadside on in steady flow, Re > 1000
+# Drag coefficient of a disc broadside on in steady flow, Re > 1000: S. F. Hoerner, "Fluid-Dynamic Drag" (1965).
+STEADY_DISC_DRAG = 1.17
 U_SHED = 0.2  # relative uncertainty: scatter of measured plates about the law, and its transfer to a disc
 SOURCES = "u 20 %; Graham 1980, de Bernardinis et al. 1981"
-DOWN_TO = 1e-3  # smallest amplitude at which the disc's law is matched, over the initial one
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     values, first = np.zeros(2), 0.0
     if amplitude_m > 0.0:
         first = rate(amplitude_m)
-        left = max((1.0 + first * seconds / 1.5) ** -1.5, DOWN_TO)
+        left = (1.0 + first * seconds / 1.5) ** -1.5
         amplitudes = amplitude_m * np.geomspace(min(left, 0.9), 1.0, 40)
         rates = np.array([rate(each) for each in amplitudes.tolist()])
         columns = np.stack([np.ones(40), amplitudes / amplitude_m], axis=1) / rates[:, None]

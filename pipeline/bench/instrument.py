@@ -10,13 +10,13 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import SIGNIFICANT
 from pipeline.track import Track
 
+# Relative standard uncertainty of a crystal's rate: 50 ppm, as in data sheets, as the half-width of a rectangle.
 U_CRYSTAL = 50e-6 / math.sqrt(3.0)
-"""Relative standard uncertainty of a crystal's rate: 50 ppm as the half-width of a rectangular distribution."""
+# Maximum relative error of a host's clock, including its adjustment: the kernel slews by up to 500 ppm (RFC 5905).
 HOST_LIMIT = 500e-6
-"""Maximum relative error of a host's clock, including its adjustment: the kernel slews by up to 500 ppm (RFC 5905)."""
+# Time by which a host's time stamps may drift within a record although both clocks are right, s. A USB bridge delays
+# bytes by up to 16 ms (data sheet FTDI AN232B-04), and a host that becomes busy wakes its readers later.
 HOST_DELAY_S = 0.02
-"""Time by which a host's time stamps may drift within a record although both clocks are right, s. A USB bridge delays
-bytes by up to 16 ms (FTDI AN232B-04), and a host that becomes busy wakes its readers later."""
 
 
 @dataclass(frozen=True, slots=True)

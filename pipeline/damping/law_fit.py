@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -24,6 +25,8 @@ from pipeline.numerics.regression import chi2_quantile, solve_weighted
 from pipeline.track import F8
 
 Rejection = Literal["", "misfit", "differ", "negative"]  # "differ": the coefficients of several runs
+# A coefficient this many standard uncertainties below zero rejects its law: probability 0.023 if it is zero.
+NEGATIVE = normal_quantile(COVERAGE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +75,9 @@ class LawFit:
 
     def rates(self, amplitude: F8) -> tuple[F8, F8]:
         """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty."""
-        return rates_of(self.law, amplitude, self.joint.values, self.joint.covariance)
+        gradient = self.by_parameters(lambda theta: self.law.rate(amplitude, theta))
+        variance = np.einsum("in,ij,jn->n", gradient, self.joint.covariance, gradient)
+        return -self.law.rate(amplitude, self.joint.values), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def rate_at_start(self) -> float:
         """Return the damping rate at the start, :math:`-\\dot A/A`, 1/s."""
@@ -80,7 +85,12 @@ class LawFit:
 
     def by_parameters(self, f: Callable[[F8], F8 | float]) -> F8:
         """Return the derivatives (p, ...) of a function, with a number or an array as its value, by the parameters."""
-        return _slopes(f, self.joint.values, self.joint.covariance)
+        # Central differences with steps of a thousandth of each parameter's uncertainty.
+        theta, u = self.joint.values, np.sqrt(np.maximum(np.diag(self.joint.covariance), 0.0))
+        steps = np.maximum(1e-3 * u, 1e-7 * np.abs(theta))
+        steps = np.where(steps > 0.0, steps, 1e-16)
+        shifts = zip(np.diag(steps), steps, strict=True)
+        return np.array([(np.asarray(f(theta + d)) - f(theta - d)) / (2.0 * h) for d, h in shifts])
 
     def slopes_of_rate(self) -> F8:
         """Return the derivatives (p,) of :meth:`rate_at_start` by the parameters."""
@@ -96,22 +106,6 @@ class LawFit:
 def joint_of(law: Law, theta: F8, covariance: F8, unit: str = "m") -> Joint:
     """Return a law's parameters (p,) and their covariance with names, and units for a record in a unit."""
     return Joint(tuple(law.parameters), theta, covariance, units_of(law, unit))
-
-
-def rates_of(law: Law, amplitude: F8, theta: F8, covariance: F8) -> tuple[F8, F8]:
-    """Return -dA/dt of a law at amplitudes (n,) in m, and its standard uncertainty."""
-    gradient = _slopes(lambda at: law.rate(amplitude, at), theta, covariance)
-    variance = np.einsum("in,ij,jn->n", gradient, covariance, gradient)
-    return -law.rate(amplitude, theta), np.asarray(np.sqrt(np.maximum(variance, 0.0)))
-
-
-def _slopes(f: Callable[[F8], F8 | float], theta: F8, covariance: F8) -> F8:
-    """Return derivatives (p, ...) by central differences with steps of a thousandth of each parameter's uncertainty."""
-    u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    steps = np.maximum(1e-3 * u, 1e-7 * np.abs(theta))
-    steps = np.where(steps > 0.0, steps, 1e-16)
-    shifts = zip(np.diag(steps), steps, strict=True)
-    return np.array([(np.asarray(f(theta + d)) - f(theta - d)) / (2.0 * h) for d, h in shifts])
 
 
 def _relative_rate(law: Law, theta: F8) -> float:
@@ -142,31 +136,24 @@ def mean_squared_rate(fit: LawFit, amplitude: F8, weights: F8 | None = None) -> 
 def fit_law(law: Law, t: F8, y: F8, u: F8) -> Fit:
     """Fit a law to at least as many points as it has parameters, starting from the law's own guess.
 
-    The unit of length in the search is the root mean square of the amplitudes, so that the choice of metres does not
-    affect it. The result is not finite if the numbers of the law overflowed.
+    The unit of length in the search is the root mean square of the amplitudes, because in metres the factor of a free
+    power is nearly degenerate with it. The result is not finite if the numbers of the law overflowed.
     """
     if len(law.parameters) == 1 and not law.rate(y, y[:1]).any():  # a constant amplitude is a mean and needs no search
         line = solve_weighted(np.ones((t.size, 1)), y, u)
         return Fit(line.values, line.covariance, line.residual / u, line.chi2, True, "", 1)
     length = math.sqrt(float(y @ y) / y.size) or 1.0
-    at, inverse_u = y / u, length / u
 
     def both(theta: F8) -> tuple[F8, F8]:
         amplitude, by = law.curve(t, theta)
-        return amplitude * inverse_u - at, by * inverse_u[:, None]
-
-    def in_metres(theta: F8) -> F8:
-        return in_units(law, theta, length_m=1.0 / length)
+        return (length * amplitude - y) / u, by * (length / u)[:, None]
 
     search = least_squares.remembering(both)
     fit = least_squares.minimise(lambda x: search(x)[0], law.guess(t, y / length), lambda x: search(x)[1])
     with np.errstate(all="ignore"):
+        in_metres = partial(in_units, law, length_m=1.0 / length)
         turn = least_squares.central_differences(in_metres, fit.values)
         return replace(fit, values=in_metres(fit.values), covariance=turn @ fit.covariance @ turn.T)
-
-
-# A coefficient this many standard uncertainties below zero rejects its law: probability 0.023 if it is zero.
-NEGATIVE = normal_quantile(COVERAGE)
 
 
 def least_chi2(fits: Mapping[str, Fit], laws: Mapping[str, Law] = LAWS) -> dict[str, float]:

@@ -18,7 +18,7 @@ from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FALSE_ALARM, VERY_STRONG
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, NOTICEABLE, VERY_STRONG
 from pipeline.numerics.quantity import Unit
 from pipeline.numerics.regression import (
     Line,
@@ -40,11 +40,6 @@ BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency d
 POINTS = 2049  # number of points in the tables of the lag and of the integral of the amplitude
 MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
 NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
-DEGREE = 6  # maximum degree of the polynomial of a drifting rest position
-FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
-
-
-LARGE_SHIFT = 0.02  # of the frequency between very small swings and the first amplitude, beyond which it is checked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,7 +126,7 @@ class Fitted:
         windows, omega, small = self.demodulated, self.phase.angular_frequency.value, self.phase.small_swings
         start = self.damping.best.joint["A0"].value
         shift, last = kappa * start**2 / omega, max(2, windows.t.size // 20)
-        if small is None or abs(shift) < LARGE_SHIFT or last >= windows.t.size:
+        if small is None or abs(shift) < NOTICEABLE or last >= windows.t.size:
             return start, shift
         mean = float(np.mean(windows.amplitude[: last + 1]))
         turned, passed = (float(each[last] - each[0]) for each in (windows.phase, windows.t))
@@ -361,8 +356,8 @@ def fit_rest(windows: Demodulated, unit: str) -> Rest:
     """Fit a constant and a polynomial to the windows' rest positions, and decide by BIC whether they drift."""
     t, offset = windows.t, windows.offset
     u = np.maximum(np.sqrt(windows.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
-    spread = scatter(t, offset, u, degree=DEGREE)
-    polynomial, gain = smooth_curve(t, offset, spread, degree=DEGREE)
+    spread = scatter(t, offset, u)
+    polynomial, gain = smooth_curve(t, offset, spread)
     weight = 1.0 / spread.u[spread.kept]
     mean = float(np.average(offset[spread.kept], weights=weight**2))
     left = (offset[spread.kept] - mean) * weight
@@ -385,7 +380,7 @@ def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
     phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
     differ from it by less, ``typical``.
     """
-    if typical < ASTRAY or fitted.demodulated.t.size < FEWEST:
+    if typical < 1.0 or fitted.demodulated.t.size < FEWEST_FOR_LINE:
         return None
     return NoOscillation(
         f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"

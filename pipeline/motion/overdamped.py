@@ -24,8 +24,8 @@ from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
 from pipeline.motion.fit import Rows
 from pipeline.numerics import least_squares
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import MISFIT, STRONG, VERY_STRONG
+from pipeline.numerics.least_squares import CENTRAL_STEP, Fit
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, STRONG, VERY_STRONG
 from pipeline.numerics.quantity import noun
 from pipeline.numerics.regression import covariance_of
 from pipeline.samples.condition import Conditioned
@@ -33,7 +33,6 @@ from pipeline.track import F8
 from pipeline.windows.cycles import NoOscillation
 
 FAR = 20.0  # maximum change of the logarithm of a rate in the fit of a single exponential
-DIFFERENCE = 1e-5  # relative change of a rate in difference quotients
 
 Shape = Callable[[F8, F8], F8]
 
@@ -53,8 +52,8 @@ class Relaxing:
 
         def slopes() -> F8:
             moved = [
-                (self.shape(t, logarithms + step) - self.shape(t, logarithms - step)) @ linear / (2.0 * DIFFERENCE)
-                for step in DIFFERENCE * np.eye(logarithms.size)
+                (self.shape(t, logarithms + step) - self.shape(t, logarithms - step)) @ linear / (2.0 * CENTRAL_STEP)
+                for step in CENTRAL_STEP * np.eye(logarithms.size)
             ]
             return np.column_stack([columns, *moved])
 
@@ -204,7 +203,6 @@ def _grid(rows: Rows, rate_hz: float) -> F8:
 
 Kind = Literal["overdamped", "critical", "strong"]
 
-FEWEST = 20  # minimum number of samples for a fit of five parameters
 POINTS = 300  # approximate number of block means to which a record is reduced before shapes are compared
 # Minimum damping ratio zeta of a strongly damped oscillation; below it the cycles are analysed instead.
 LEAST_DAMPING = 0.05
@@ -240,7 +238,7 @@ def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | No
     """
     used = conditioned.used
     t, y = conditioned.track.t[used], conditioned.track.y[used]
-    if t.size < FEWEST:
+    if t.size < 2 * FEWEST_FOR_CURVE:
         return None
     noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0), 1e-4 * float(np.ptp(y)))
     if not (noise > 0.0 and _moves(y, noise)):

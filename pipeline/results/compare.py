@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.bench.scene import Scene
-from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
+from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg, unstated_spring_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import central_differences, minimise
@@ -22,7 +22,6 @@ from pipeline.track import F8
 
 NEARER = 0.01  # maximum tension with two runs exchanged, over that without: chance does not reduce it so much
 SOLVED = 0.5  # maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it
-LARGEST_SPRING = 0.6  # maximum mass of a spring, over the lightest bob: a heavier spring is noticed and weighed
 SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those farthest from the mean
 
 
@@ -181,7 +180,7 @@ def _fit(
     tension = chi2 / chi2_quantile(1.0 - FALSE_ALARM, dof) if dof else 0.0
     if solved:
         # The mass of a spring cannot be negative, and a heavy spring would have been weighed.
-        heaviest = LARGEST_SPRING * float(loads.min())
+        heaviest = 2.0 * HEAVIEST_SHARE * float(loads.min())
         away = max(-found.value, found.value - heaviest, 0.0) / max(found.u, 1e-12 * heaviest)
         tension = max(tension, away**2 / chi2_quantile(1.0 - FALSE_ALARM, 1))
     # With a stated spring, each constant is that of the run's own analysis. Without a usable mass it excludes the

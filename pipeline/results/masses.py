@@ -11,11 +11,10 @@ import numpy as np
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import COVERAGE, SIGNIFICANT, normal_quantile
+from pipeline.numerics.levels import COVERAGE, NEGLIGIBLE, SIGNIFICANT, normal_quantile
 from pipeline.results.compare import SpringRun
 from pipeline.track import F8
 
-LEAST_SPREAD = 1.05  # ratio of the heaviest to the lightest bob; nearer ones give no line
 GRAVITY = Estimate(9.81, 0.015, "m/s^2")  # 9.780 at the equator to 9.832 at the poles, uniformly distributed
 
 
@@ -48,7 +47,7 @@ def mass_line(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> MassL
     The uncertainty of a mass counts as one of the squared period, by the slope. A common clock changes the slope alone.
     """
     mass = np.array([run.mass_kg.value for run in runs])
-    if len(runs) < 3 or mass.max() < LEAST_SPREAD * mass.min():
+    if len(runs) < 3 or mass.max() < (1.0 + NEGLIGIBLE) * mass.min():
         return None
     omega = np.array([run.angular_frequency.value for run in runs])
     squared = (2.0 * math.pi / omega) ** 2
