@@ -122,7 +122,7 @@ def measured(law: str, stated: bool, seconds: float, noise_m: float) -> Cell:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("stated", [True, False])
 def test_a_stated_law_gives_the_rate_to_its_bound(stated: bool, law: str, seconds: float, noise_m: float) -> None:
-    """95 % intervals cover in 93 % and more; by a stated law, u is at most 1.1 of the bound, and hardly one is charged."""
+    """95 % intervals cover in 93 % and more; by a stated law u is at most 1.1 of the bound, and few are charged."""
     cell = measured(law, stated, seconds, noise_m)
     print(cell.row())
     doubt = 3.3 * math.sqrt(LEAST_95 * (1.0 - LEAST_95) / TRIALS)
