@@ -138,7 +138,10 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         beside.callback(console.close)
         page = None
         try:
-            page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
+            if options.page:
+                given = option_words({each.name: getattr(page_options, each.name) for each in fields(page_options)})
+                process = PageProcess(given, log, queue.SimpleQueue(), STOPS, session.failures, console.line)
+                page = beside.enter_context(process)
             ended = _Bench(session, options, log, console, release, page).record()
             session.stop()
             failed, status = session.failures.describe(), ended.status
@@ -249,12 +252,6 @@ def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
             raise ProgramError(f"{name} does nothing without {needed}; name both or neither")
     if options.simulate and options.port:
         raise ProgramError("--simulate takes no --port; leave one of them out")
-
-
-def _page(options: PageOptions, log: Path, session: Session, console: Console) -> PageProcess:
-    """Return the page that runs during the recording."""
-    given = option_words({each.name: getattr(options, each.name) for each in fields(options)})
-    return PageProcess(given, log, queue.SimpleQueue(), session.stops, session.failures, console.line)
 
 
 @dataclass(frozen=True, slots=True)
