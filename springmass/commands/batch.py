@@ -16,10 +16,10 @@ from springmass.course.rows import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
+from springmass.parameters import Count, WholeNumber, argument, flag, option, output
 from springmass.runs.options import How
 from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
-from springmass.values import Count, WholeNumber, argument, flag, option, output
 
 
 @Parameter(name="*")

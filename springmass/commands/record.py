@@ -28,6 +28,7 @@ from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
+from springmass.parameters import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
 from springmass.runs.outputs import made_now
 from springmass.runs.questions import option_words
 from springmass.runs.scenes import ask_about, read_scene
@@ -43,7 +44,6 @@ from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import ProgressLine
 from springmass.terminal.style import style_of, watched
-from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
 from storage.errors import WriteFailed, one_line
 from storage.recorder import check_disk
 from storage.recovery.recover import recover
