@@ -281,6 +281,8 @@ def to_track(
 
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
+    stated = provenance or {}
+    moments = [event["t_s"] for event in stated.get("events", ()) if event.get("kind") == "trigger"]
     return Track(
         t=samples.t,
         y=samples.distance,
@@ -294,16 +296,10 @@ def to_track(
         velocity=samples.velocity,
         quantity=samples.quantity,
         unit=samples.unit,
-        trigger_s=_trigger_s(provenance or {}),
-        **_clock_comparison(samples, info, provenance or {}),
-        **_scale(recorded_format, (provenance or {}).get("sensor") or {}),
+        trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
+        **_clock_comparison(samples, info, stated),
+        **_scale(recorded_format, stated.get("sensor") or {}),
     )
-
-
-def _trigger_s(provenance: Mapping[str, Any]) -> float | None:
-    """Return when the bob left its rest position, in s, from the first trigger event of the recording."""
-    moments = [event["t_s"] for event in provenance.get("events", ()) if event.get("kind") == "trigger"]
-    return float(moments[0]) if moments else None
 
 
 def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:
