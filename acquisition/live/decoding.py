@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.block import F8, Block, Flag
+from acquisition.block import F8, Block, Flag, Kind, SourceInfo
 from acquisition.decoders.family import DeviceStatus, Family
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, fit_clock
 from acquisition.live.timebase import Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings, carried
-from acquisition.source import Kind, SourceInfo
 
 CLOCKS_PPM = (0.0, 1e6)
 """Allowed range of ``clock_ppm``, the maximum rate error of a clock, ppm."""

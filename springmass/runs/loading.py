@@ -15,13 +15,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.errors import NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
-from acquisition.source import SourceInfo
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, detail, tell
 from springmass.layout import STDIN, part

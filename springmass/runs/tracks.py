@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.decoders.family import RESONATOR_PPM
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.clock_fit import fit_clock
-from acquisition.source import SourceInfo
 from pipeline.track import Track
 
 MOTION_SENSOR = "motion-sensor"  # family that assumes a fixed speed of sound

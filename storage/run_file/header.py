@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from acquisition.block import UNITS
-from acquisition.source import ClockKind, Kind
+from acquisition.block import UNITS, ClockKind, Kind
 from storage.schema import Count, ValueRefused, decoded, json_text, parsed, plain, shown
 
 SCHEMA = 1

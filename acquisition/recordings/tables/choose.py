@@ -12,8 +12,7 @@ from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.questions import Missing, MissingItem, Question, Times
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import median
-from acquisition.recordings.sampling.timing import rate_needed
+from acquisition.recordings.sampling.timing import median, rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
 from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
