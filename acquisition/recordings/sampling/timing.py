@@ -35,24 +35,13 @@ class Grid(NamedTuple):
         return self.origin_s + index / self.rate_hz if self.origin_s else index / self.rate_hz
 
 
-class Rate(NamedTuple):
-    """The rate of printed times, in samples per second.
-
-    ``relative_u`` is the relative half-width of the range of rates that are compatible with the rounding of the times.
-    ``grid`` is the grid from which the times were rounded, or None if they fit no grid. The rate is ``certain`` if no
-    grid with a rate one hertz higher or lower fits equally well.
-    """
-
-    rate_hz: float
-    relative_u: float
-    grid: Grid | None
-    certain: bool
-
-
-def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate | None:
+def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[float, float, Grid | None, bool] | None:
     """Infer the rate from printed times (s) with a last digit of ``resolution``; None without two different times.
 
-    Times may repeat, run backward or be missing. If the rate is known, only grids of this rate are tried.
+    Times may repeat, run backward or be missing. If the rate is known, only grids of this rate are tried. Return the
+    rate in Hz, the relative half-width of the range of rates that are compatible with the rounding of the times, and
+    the grid from which the times were rounded, or None if they fit no grid. The rate is certain if no grid with a rate
+    one hertz higher or lower fits equally well.
     """
     times = t if (t[1:] > t[:-1]).all() else np.unique(t[np.isfinite(t)])
     if times.size < 2:
@@ -64,28 +53,18 @@ def find_rate(t: F8, resolution: float, *, rate_hz: float | None = None) -> Rate
     tried = [rate_hz] if rate_hz else [*_USUAL_RATES_HZ, round(rough), *nice, rough]
     rates = dict.fromkeys(float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9)
     probe = _probe(times)
-    best: Grid | None = None
-    best_share = _SHARE_ON_GRID
+
+    def share(grid: Grid) -> float:
+        return float(np.mean(snap(probe, grid, resolution)[1]))
+
     for origin in (0.0, float(times[0])):
-        for rate in rates:
-            if not _every_point(times, Grid(rate, origin)):
-                continue
-            share = float(np.mean(snap(probe, Grid(rate, origin), resolution)[1]))
-            if share > best_share + 1e-9:
-                best, best_share = Grid(rate, origin), share
-            if best_share == 1.0:
-                break
-        if best is not None:
-            break
-    if best is None:
-        return Rate(rough, relative_u, None, certain=False)
-    beside = (
-        Grid(rate, best.origin_s)
-        for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0)
-        if rate > 0 and abs(rate - rough) <= 1.5 * rough * relative_u
-    )
-    certain = all(np.mean(snap(probe, grid, resolution)[1]) < best_share for grid in beside)
-    return Rate(best.rate_hz, relative_u, best, certain)
+        shares = {grid: share(grid) for grid in (Grid(rate, origin) for rate in rates) if _every_point(times, grid)}
+        best = max(shares, key=lambda grid: shares[grid], default=None)
+        if best is not None and shares[best] > _SHARE_ON_GRID:
+            beside = (Grid(rate, origin) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
+            near = [grid for grid in beside if abs(grid.rate_hz - rough) <= 1.5 * rough * relative_u]
+            return best.rate_hz, relative_u, best, all(share(grid) < shares[best] for grid in near)
+    return rough, relative_u, None, False
 
 
 def median(values: NDArray[np.number]) -> float:
@@ -226,21 +205,22 @@ def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None)
     """Infer the rate from the printed times (s) of valid rows; ask for it if they do not show it."""
     if (bursts := find_bursts(printed)) is not None:
         return _spread(path, bursts, resolution, rate_hz)
-    rate = find_rate(printed, resolution, rate_hz=rate_hz)
-    if rate is None:
+    found = find_rate(printed, resolution, rate_hz)
+    if found is None:
         if rate_hz is None:
             reason = f"expected different times, got {printed.size} rows at one time"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
         origin = float(printed[0]) if printed.size else 0.0
         return Timing(rate_hz, Grid(rate_hz, origin), resolution, certain=False, given=True)
-    steps = _jitter(printed) if rate.grid is None else None
+    rate, relative_u, grid, certain = found
+    steps = _jitter(printed) if grid is None else None
     if rate_hz is not None:
-        allowed = rate_hz * (1.5 * rate.relative_u + 1e-6 + (0.01 if steps else 0.0))
-        if abs(rate.rate_hz - rate_hz) > allowed:
-            problem = f"rate_hz must agree with the times, {rate.rate_hz:.6g} Hz, got {rate_hz:g}"
+        allowed = rate_hz * (1.5 * relative_u + 1e-6 + (0.01 if steps else 0.0))
+        if abs(rate - rate_hz) > allowed:
+            problem = f"rate_hz must agree with the times, {rate:.6g} Hz, got {rate_hz:g}"
             raise FormatError(path, problem, "leave the rate out or correct it")
-        return Timing(rate_hz, rate.grid, resolution, certain=True, given=True, steps_s=steps)
-    return Timing(rate.rate_hz, rate.grid, resolution, rate.certain, steps_s=steps)
+        return Timing(rate_hz, grid, resolution, certain=True, given=True, steps_s=steps)
+    return Timing(rate, grid, resolution, certain, steps_s=steps)
 
 
 def _spread(path: str, bursts: Bursts, resolution: float, rate_hz: float | None) -> Timing:

@@ -211,11 +211,7 @@ def side_by_side(table: Table, headings: Sequence[Heading], run: str = "") -> li
             channels.setdefault((each.run, times.get(each.run)), []).append(columns[at])
     return [
         replace(
-            table,
-            columns=tuple(own),
-            times=None if time is None else columns[time],
-            run=own_run or run,
-            beside=columns,
+            table, columns=tuple(own), times=None if time is None else columns[time], run=own_run or run, beside=columns
         )
         for (own_run, time), own in channels.items()
     ]
