@@ -64,13 +64,12 @@ WHAT = {
     "acquisition.replay": "a recording as a sensor",
     "acquisition.recordings": "files of other programs",
     "acquisition.decoders": "one family a sensor",
-    "acquisition.source": "what all sources are",
     "acquisition.block": "samples in a row",
     "acquisition.clock": "the only use of time",
 }
 ORDER = {
     "storage": [["recovery"], ["run_file"], ["wire_log", "recorder"]],
-    "acquisition": [["live", "simulated"], ["replay", "recordings"], ["decoders"], ["source"], ["block", "clock"]],
+    "acquisition": [["live", "simulated"], ["replay", "recordings"], ["decoders"], ["block", "clock"]],
 }
 """Packages whose rooms no contract orders."""
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.decoders.family import RESONATOR_PPM
 from acquisition.errors import NeedsAnswer
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
@@ -23,7 +23,6 @@ from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
-from acquisition.source import SourceInfo
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
 from springmass.layout import STDIN, part

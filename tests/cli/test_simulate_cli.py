@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.block import Block
-from acquisition.source import SourceInfo
+from acquisition.block import Block, SourceInfo
 from springmass import analyse, load
 from springmass.charts.chart import decoded
 from storage.run_file.writing import write_run
