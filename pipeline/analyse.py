@@ -37,6 +37,7 @@ from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated, demodulate
 from pipeline.windows.disturbances import Disturbances, separate
 from pipeline.windows.free_part import FreePart, free_part, start_of
+from pipeline.windows.rounding import rounded
 from pipeline.windows.sinusoid import check_sinusoid
 
 __all__ = ["Analysis", "Oscillation", "Overdamped", "Still", "analyse"]
@@ -70,6 +71,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     if (why := check_sinusoid(samples, windows)) is not None:
         return without_period(samples, why, scene, options)
     windows, disturbances = separate(samples, part.cycles, windows, modes=options.modes)
+    windows = rounded(windows, samples.quantum_m)
     laws = fit_laws(windows, start_of(samples, windows.angular_frequency), options.laws, options.known_law, track.unit)
 
     # For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.

@@ -12,6 +12,7 @@ from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.limits import beyond_limits
 from pipeline.checks.model import colour, excess, halves, phases
 from pipeline.checks.residual import Misfit, Outcome, Residual, residual_of
+from pipeline.checks.rounding import rounding
 from pipeline.checks.sensor import held, smoothed
 from pipeline.checks.shape import folded_shape
 from pipeline.motion.averaged import Fitted
@@ -44,6 +45,8 @@ def judge(
     if lost is not None:
         missing = {"places": lost.places, "share": lost.share}
         outcomes.append(Outcome("lost_rows", missing, Misfit(name="lost_rows", clock=lost.share)))
+    if (rounded := rounding(samples, fitted)) is not None:
+        outcomes.append(rounded)
     if fitted.method != "equation":
         residual = residual_of(samples, fitted, filter_)
         for test in TESTS:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pipeline.damping.evidence import VERY_STRONG
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
+from pipeline.numerics.levels import VERY_STRONG
 from pipeline.numerics.quantity import number
 from pipeline.registry.found import Found
 

@@ -38,6 +38,13 @@ FEWEST_FOR_LINE = 5
 FEWEST_FOR_CURVE = 8
 # Most rounds of a search that usually ends by itself; with ten, `python -m tests.golden` measured no other result.
 ROUNDS = 5
+# Differences of BIC from which evidence is worth more than a bare mention, strong, and very strong: R. E. Kass,
+# A. E. Raftery, J. Am. Stat. Assoc. 90 (1995) 773.
+BARE_MENTION, STRONG, VERY_STRONG = 2.0, 6.0, 10.0
+# Probability of an upper limit, and weight of a law beside which all others are unlikely; the usual level of a test.
+LIMIT = 0.95
+# Coverage probability of an expanded uncertainty, with k = 2.00 for many degrees of freedom (EA-4/02 M:2022, annex E).
+COVERAGE = 0.9545
 
 
 @cache
