@@ -32,13 +32,11 @@ from pipeline.results.derive import derive
 from pipeline.results.effects import tabulate
 from pipeline.samples.condition import Conditioned, condition
 from pipeline.track import Track
-from pipeline.windows.clipping import find_cuts
 from pipeline.windows.cycles import NoOscillation
-from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated, demodulate
+from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated
 from pipeline.windows.disturbances import Disturbances, separate
-from pipeline.windows.free_part import FreePart, free_part, start_of
+from pipeline.windows.free_part import check_sinusoid, free_part, start_of
 from pipeline.windows.rounding import rounded
-from pipeline.windows.sinusoid import check_sinusoid
 
 __all__ = ["Analysis", "Oscillation", "Overdamped", "Still", "analyse"]
 
@@ -66,11 +64,10 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     part = free_part(samples)
     if isinstance(part, NoOscillation):
         return without_period(samples, part, scene, options)
-    samples, windows = _uncut(part)
-    track = samples.track
-    if (why := check_sinusoid(samples, windows)) is not None:
+    samples, track = part.samples, part.samples.track
+    if (why := check_sinusoid(samples, part.windows)) is not None:
         return without_period(samples, why, scene, options)
-    windows, disturbances = separate(samples, part.cycles, windows, modes=options.modes)
+    windows, disturbances = separate(samples, part.cycles, part.windows, modes=options.modes)
     windows = rounded(windows, samples.quantum_m)
     laws = fit_laws(windows, start_of(samples, windows.angular_frequency), options.laws, options.known_law, track.unit)
 
@@ -111,13 +108,6 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     )
     motion = Oscillation.of(fitted, part.cycles, derived)
     return Analysis(track, scene, options, samples, motion, effects, findings, derived.estimates)
-
-
-def _uncut(part: FreePart) -> tuple[Conditioned, Demodulated]:
-    """Return the samples without the crests that are cut off, and their windows."""
-    if (cut := find_cuts(part.samples, part.cycles, part.windows)) is None:
-        return part.samples, part.windows
-    return cut, demodulate(cut, part.cycles)
 
 
 def _averaged(
