@@ -15,11 +15,9 @@ from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.judge import judge
 from pipeline.closed import overdamped, still, two_modes, without_period
 from pipeline.damping.select import Damping, fit_laws
-from pipeline.findings.damping import damping_findings
 from pipeline.findings.finding import worded
-from pipeline.findings.motion import fit_findings, motion_findings
-from pipeline.findings.parts import part_findings
-from pipeline.findings.samples import clock_findings, sample_findings
+from pipeline.findings.motion import damping_findings, fit_findings, motion_findings
+from pipeline.findings.samples import clock_findings, part_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion.averaged import Fitted, check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
@@ -33,7 +31,7 @@ from pipeline.results.effects import tabulate
 from pipeline.samples.condition import Conditioned, condition
 from pipeline.track import Track
 from pipeline.windows.cycles import NoOscillation
-from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated
+from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances, separate
 from pipeline.windows.free_part import check_sinusoid, free_part, start_of
 from pipeline.windows.rounding import rounded
@@ -101,7 +99,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
             windows.noise_m,
             find_clusters(track, windows, fitted.phase),
             swing_m,
-            by_chance=echoes_by_chance(samples.flags, windows, CLIP_SIGMAS),
+            by_chance=echoes_by_chance(samples.flags, windows),
         ),
         fit_findings(fitted, solved if isinstance(solved, str) else ""),
         clock_findings(track),
