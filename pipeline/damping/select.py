@@ -89,21 +89,16 @@ def fit_laws(
 ) -> Damping:
     """Fit the damping laws to the windows' amplitudes; times count from ``t0``.
 
-    A stated law is tried in addition to ``laws`` and selected however well other laws fit; the record may still
-    contradict it. An :class:`AnalysisError` says that no law can be fitted.
+    A stated law is tried in addition to ``laws`` and selected however well other laws fit; the record may still contradict
+    it. An :class:`AnalysisError` says that no law can be fitted.
 
-    Real amplitudes scatter more than their noise, for example because of beats with a sideways mode or clusters of
-    false echoes. The excess scatter is measured about a smooth curve that is independent of all laws, so that a
-    wrong law cannot hide its misfit in it. If few windows decay fast, or friction stops the motion, no smooth curve
-    follows the decay. A law whose residuals are less than half as large then replaces the curve. Correlated points
-    count as fewer points: chi-square, BIC and degrees of freedom are divided by the correlation length, and the
-    covariance is multiplied by it. If chi-square rejects a law, its covariance comes from its own residuals: it is
-    multiplied by the reduced chi-square, and the correlation length is that of the residuals.
+    Real amplitudes scatter more than their noise, for example because of beats. The excess is measured about a smooth curve
+    that is independent of all laws, so that a wrong law cannot hide its misfit in it; where no smooth curve follows the
+    decay, a law whose residuals are less than half as large replaces it. Correlated points count as fewer points. If
+    chi-square rejects a law, its covariance comes from the size and the correlation length of its own residuals.
 
-    Drag coefficients are not negative, but their estimates may be by chance; only unbounded estimates are unbiased and
-    have correct intervals. So the fits are unbounded. A law is rejected if a coefficient is negative by more than two
-    standard uncertainties. The BIC is that of the law's best fit without negative coefficients, which is that of one
-    of its special cases.
+    Only unbounded estimates of drag coefficients are unbiased and have correct intervals. So the fits are unbounded, and a
+    coefficient that is negative by more than two standard uncertainties rejects its law.
     """
     t, amplitude = windows.t - t0, windows.amplitude
     noise = np.sqrt(windows.covariance[:, 0, 0])
