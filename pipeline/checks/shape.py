@@ -12,12 +12,13 @@ from pipeline.checks.residual import PARTS, Misfit, Outcome, Residual
 from pipeline.numerics.levels import IMPROBABLE
 from pipeline.track import F8
 
-BINS = 64  # phase bins per period; the eighth harmonic keeps sin(pi 8/64)/(pi 8/64) = 0.97 of its amplitude
-HIGHEST = 8  # highest order of harmonics that are sought; at 16 samples per period the next would be aliased
+# Highest order of the harmonics that are sought; each further one adds IMPROBABLE to the probability of a false alarm.
+HIGHEST = 8
+BINS = HIGHEST**2  # phase bins per period: the highest harmonic keeps sin(x)/x = 0.97 of its amplitude, x = pi/8
 # Minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones. Those of a scale
 # bent by 1 % reach it, as measured by `python -m tests.trials.troubles --only bent`.
 REPORTED = 0.002
-CENTRES = 2.0 * math.pi * (np.arange(BINS) + 0.5) / BINS
+CENTRES = math.tau * np.arange(BINS) / BINS + math.pi / BINS
 
 
 def folded_shape(residual: Residual, _: float) -> Outcome | None:

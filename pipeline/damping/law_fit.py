@@ -3,7 +3,7 @@
 Libraries rank models only by an information criterion, which names a winner even if no model fits. Here chi-square of
 correlated points may reject a law, and so may a negative coefficient. A law that predicts the same damping as a simpler
 one is not admissible. The true law is admissible in at least 95 % of simulated records and rejected in at most 2 %
-(``tests/trials/test_law_selection.py``).
+(``benchmarks/accuracy``).
 """
 
 from __future__ import annotations

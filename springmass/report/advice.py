@@ -117,15 +117,16 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
     """Return the trust in every quantity of Table 1 by its name; empty if nothing oscillates.
 
     A number is uncertain if it depends on an assumption that a warning names, or if fewer than two of its digits are
-    certain. It is not to be quoted if an error concerns it, if zero is within two standard uncertainties, or if the
-    recording contradicts the law that was stated for it. The worst of these decides; every reason is kept.
+    certain, or common to all amplitudes of which it is the average. It is not to be quoted if an error concerns it, if
+    zero is within two standard uncertainties, or if the recording contradicts the law that was stated for it. The worst
+    of these decides; every reason is kept.
     """
     motion = analysis.motion
     if not isinstance(motion, Oscillation):
         return {}
     found = {}
     for key, x in table_estimates(analysis).items():
-        reasons = [*_assumed(analysis, key.name, x), *_sized(motion, key.name, x)]
+        reasons = [*_assumed(motion, analysis, key.name, x), *_sized(motion, key.name, x)]
         if motion.damping.best.rejected:
             if QUANTITIES[key.name].by_law and motion.damping.by_statement:
                 reasons.append(Trust("do not quote", "the recording contradicts the stated law"))
@@ -136,21 +137,27 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
     return found
 
 
-def _assumed(analysis: Analysis, name: str, x: Estimate) -> Iterator[Trust]:
-    """Yield the errors and the unchecked assumptions on which a quantity depends."""
+def _assumed(motion: Oscillation, analysis: Analysis, name: str, x: Estimate) -> Iterator[Trust]:
+    """Yield the errors, the unchecked assumptions and the averages on which a quantity depends."""
+    inputs = {each.name for each in motion.derived.budgets[name].contributions}
     for finding in analysis.findings:
-        harm = harm_of(finding.code, finding.severity)
-        if harm in (Harm.UNUSABLE, Harm.SCALE) and _concerns(kinds()[finding.code].symptom, name, x.unit):
+        harm, about = harm_of(finding.code, finding.severity), kinds()[finding.code].about
+        averaged = abs(finding.values.get("relative_shift", 0.0)) > UNCERTAIN
+        if (averaged or harm in (Harm.UNUSABLE, Harm.SCALE)) and _concerns(about, name, x.unit, inputs):
             yield Trust("do not quote" if harm is Harm.UNUSABLE else "uncertain", finding.code)
 
 
-def _concerns(symptom: str, name: str, unit: str) -> bool:
-    """Return whether a quantity depends on what findings of a symptom are about."""
-    if symptom == "Times":
-        return any(letter in unit for letter in "sz") or unit == "N/m" or name in _WITH_AIR[:2]
-    if symptom == "Distances":
-        return isinstance(QUANTITIES[name].unit, Unit) or unit.startswith("m") or name in _WITH_AIR
-    return symptom in ("Motion", "Recording") or (symptom == "Scene" and name in ("spring_constant", *_WITH_AIR))
+def _concerns(about: Container[str], name: str, unit: str, inputs: Container[str]) -> bool:
+    """Return whether a quantity depends on what a finding is about; a finding about nothing special concerns all."""
+    lengths = isinstance(QUANTITIES[name].unit, Unit) or unit.split("/")[0] in ("m", "mm")
+    of = {
+        "times": "clock_rate" in inputs,
+        "frequency": "angular_frequency" in inputs,
+        "distances": lengths or name in _WITH_AIR,
+        "scene": name in ("spring_constant", *_WITH_AIR),
+    }
+    named = [depends for what, depends in of.items() if what in about]
+    return any(named) or not named
 
 
 def _sized(motion: Oscillation, name: str, x: Estimate) -> Iterator[Trust]:

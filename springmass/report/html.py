@@ -30,7 +30,6 @@ from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number
 
 if TYPE_CHECKING:
     from jinja2 import Template
-    from markupsafe import Markup
 
 _QUALITY = {
     "used": "used",
@@ -44,8 +43,10 @@ _QUALITY = {
 }
 BESIDE = 3  # columns of runs that fit on A4
 MOST_NOTES = 50  # of a recording that the page lists
-FIRST = ("position", "amplitude")
-"""The charts of a single run that stand beside Table 1."""
+SHARED = "charts.js"
+"""The name of the script's own file, where several reports share it."""
+SOURCES = ("uPlot.iife.min.js", "charts.js", "report.js")
+"""The sources of the script, in this order; a page that is opened from a disk cannot import modules."""
 
 
 @dataclass(slots=True)
@@ -104,12 +105,23 @@ def render_html(
 
 def drawn_by_script(charts: Sequence[Mapping[str, Any]], address: str = "") -> dict[str, Any]:
     """Return what a template needs to draw charts: their numbers, the style, and the script or its address."""
-    from markupsafe import Markup
-
-    from springmass.report.html import report_script, report_style
-
-    style, script = Markup(report_style()), "" if address else Markup(report_script())
+    # The page of a recording has this style too.
+    style = "\n".join(static_file(name).read_text("utf-8") for name in ("uPlot.min.css", "charts.css"))
+    script = "" if address else report_script()
     return {"charts": charts, "chart_style": style, "script": script, "script_address": address}
+
+
+@functools.cache
+def report_script() -> str:
+    """Return the script of reports; its sources may hold neither </script nor <!--, which would end its element."""
+    script = "\n".join(static_file(name).read_text("utf-8") for name in SOURCES)
+    return f"\n{script}\n"
+
+
+@functools.cache
+def script_sha256() -> str:
+    """Return the base64 digest of the script for ``'sha256-...'`` in a Content-Security-Policy."""
+    return base64.b64encode(hashlib.sha256(report_script().encode()).digest()).decode()
 
 
 @functools.cache
@@ -130,12 +142,10 @@ def template(name: str) -> Template:
         "pretty": pretty,
         "cells": cells,
         "number": pretty_number,
-        "symbol": _symbol,
         "input": lambda name: INPUTS[name].label,
         "effect": EFFECTS.__getitem__,
         "unit": page_unit,
         "typeset": typeset,
-        "breakable": _breakable,
     }
     return environment.get_template(name)
 
@@ -238,45 +248,3 @@ def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]
         elif value is not None:
             leaves.append((name, " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)))
     return leaves
-
-
-def _symbol(symbol: str) -> Markup:
-    """Format a symbol, with the index that follows a space as a subscript."""
-    from markupsafe import Markup
-
-    letter, mark, index = symbol.partition(" ")
-    return Markup("<i>{}</i><sub>{}</sub>").format(letter, index) if mark else Markup("<i>{}</i>").format(letter)
-
-
-def _breakable(law: str) -> Markup:
-    """Allow a line break after each plus in the name of a law."""
-    from markupsafe import Markup, escape
-
-    return Markup("+<wbr>").join(escape(term) for term in law.split("+"))
-
-
-SHARED = "charts.js"
-"""The name of the script's own file."""
-SOURCES = ("uPlot.iife.min.js", "charts.js", "report.js")
-"""The sources, in this order; a page that is opened from a disk cannot import modules."""
-
-
-@functools.cache
-def report_script() -> str:
-    """Return the script; ValueError if a source would end the element that contains it."""
-    script = "\n".join(static_file(name).read_text("utf-8") for name in SOURCES)
-    if "</script" in script.lower() or "<!--" in script:
-        raise ValueError("a script of a report must hold neither </script nor <!--")
-    return f"\n{script}\n"
-
-
-@functools.cache
-def report_style() -> str:
-    """Return the style of the charts, which the page of a recording has too."""
-    return "\n".join(static_file(name).read_text("utf-8") for name in ("uPlot.min.css", "charts.css"))
-
-
-@functools.cache
-def script_sha256() -> str:
-    """Return the base64 digest of the script for ``'sha256-...'`` in a Content-Security-Policy."""
-    return base64.b64encode(hashlib.sha256(report_script().encode()).digest()).decode()

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import numpy as np
 import pytest
 from websockets.asyncio.client import connect
 
@@ -82,12 +81,9 @@ def test_no_client_disturbs_a_recording(record: Callable[..., Any]) -> None:
     while log.stat().st_size < 20_000:
         assert viewer.code_after('{"type": "stop"}') == 1003
     assert program.end() == 130
+    assert len(program.whole_run()) > 100
     with open_run(program.out) as run:
-        samples = run.samples()
         (ended,) = [event["facts"] for event in run.provenance["events"] if event["kind"] == "ended"]
-    assert len(samples) > 100
-    assert np.diff(samples.t).max() < 0.015
-    assert np.isfinite(samples.distance).all()
     assert "Traceback" not in "".join(program.messages)
     assert len([line for line in program.messages if line.startswith("springmass: page:")]) <= 2
     assert ended["by"] != "the page"
@@ -125,11 +121,7 @@ def test_a_hundred_viewers_lose_no_sample(record: Callable[..., Any]) -> None:
     with ThreadPoolExecutor(1) as thread:  # a browser of other tests may keep a loop running in this thread
         assert len(thread.submit(asyncio.run, watch()).result()) == 100
     assert program.end() == 130
-    with open_run(program.out) as run:
-        samples = run.samples()
-    assert len(samples) > 300
-    assert np.diff(samples.t).max() < 0.015
-    assert np.isfinite(samples.distance).all()
+    assert len(program.whole_run()) > 300
 
 
 def answers(client: Client) -> bool:
