@@ -221,9 +221,9 @@ def _velocity(best: LawFit, phase: Phase, amplitude: F8, angle: F8) -> F8:
 def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
     """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
 
-    The reported frequency is the record's mean, whether or not the frequency varies. If the residuals of the straight line
-    are not white, its covariance is widened, so that the interval covers a curvature of the phase. A nonlinear spring
-    shifts the frequency in proportion to the square of the amplitude. The delay of a period's fitted sinusoid
+    The reported frequency is the record's mean, whether or not the frequency varies. If the residuals of the straight
+    line are not white, its covariance is widened, so that the interval covers a curvature of the phase. A nonlinear
+    spring shifts the frequency in proportion to the square of the amplitude. The delay of a period's fitted sinusoid
     (:func:`lag_of`) follows from the damping law and is removed first.
     """
     t, t0 = windows.t, damping.t0

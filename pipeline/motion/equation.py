@@ -39,10 +39,10 @@ def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *
     """Fit the equation of motion if the damping requires it; return the reason if that fails.
 
     The result is None if damping is weak, if no law with damping can be fitted, or if linear drag or no damping is
-    selected, for which the amplitude law is exact. The parameters are the rest position, displacement and velocity at the
-    first sample, :math:`\\omega_0`, and the coefficients as defined for the amplitude laws, of
-    :math:`\\ddot y = -\\omega_0^2 y - 2\\gamma\\dot y - b|\\dot y|\\dot y - f\\,\\mathrm{sign}(\\dot y)`:
-    :math:`\\gamma`, :math:`\\beta = 4\\omega_0 b/3\\pi` and :math:`\\mu = 2f/\\pi\\omega_0`.
+    selected, for which the amplitude law is exact. The parameters are the rest position, displacement and velocity at
+    the first sample, :math:`\\omega_0`, and the coefficients as defined for the amplitude laws, of :math:`\\ddot y =
+    -\\omega_0^2 y - 2\\gamma\\dot y - b|\\dot y|\\dot y - f\\,\\mathrm{sign}(\\dot y)`: :math:`\\gamma`, :math:`\\beta
+    = 4\\omega_0 b/3\\pi` and :math:`\\mu = 2f/\\pi\\omega_0`.
 
     The law with most parameters is fitted first: its residual shows the false echoes and the noise. The other laws are
     compared with this noise and selected by the same rules as the amplitude laws.

@@ -226,13 +226,13 @@ class Overdamped:
 def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | None:
     """Fit the free motion of a linearly damped bob and classify its damping.
 
-    The result is :class:`NoOscillation` if the record is a single exponential, which a drift can resemble. It is None if
-    the record is no relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
+    The result is :class:`NoOscillation` if the record is a single exponential, which a drift can resemble. It is None
+    if the record is no relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
 
-    A relaxation must leave no more than noise, also in its moving part alone, and end within the record
-    (:math:`gT > 2`). The evidence for it against every polynomial up to degree three, every step and every ramp must be
-    very strong, and that against a single exponential strong. Critical damping and the free fit are compared by BIC. If a
-    record begins before the release, the fit begins where the displacement begins to fall.
+    A relaxation must leave no more than noise, also in its moving part alone, and end within the record (:math:`gT >
+    2`). The evidence for it against every polynomial up to degree three, every step and every ramp must be very strong,
+    and that against a single exponential strong. Critical damping and the free fit are compared by BIC. If a record
+    begins before the release, the fit begins where the displacement begins to fall.
     """
     used = conditioned.used
     t, y = conditioned.track.t[used], conditioned.track.y[used]

@@ -55,15 +55,16 @@ def minimise(
 ) -> Fit:
     """Find the parameters that minimise the sum of squared residuals.
 
-    Check ``converged`` before using the numbers. ``residuals`` gives at least as many differences of model and data over
-    the standard uncertainty as parameters; where the model has no value it may be non-finite. ``jacobian`` is by central
-    differences, accurate to about ten digits, if there is none. The search stops when the remaining step is ``precision``
-    of the parameters' standard uncertainties, as estimated from the residuals; 1e-8 is for reference values.
+    Check ``converged`` before using the numbers. ``residuals`` gives at least as many differences of model and data
+    over the standard uncertainty as parameters; where the model has no value it may be non-finite. ``jacobian`` is by
+    central differences, accurate to about ten digits, if there is none. The search stops when the remaining step is
+    ``precision`` of the parameters' standard uncertainties, as estimated from the residuals; 1e-8 is for reference
+    values.
 
     Where the relative offset is ``precision``, the remaining step lowers the sum of squares by the fraction
-    :math:`\\mathrm{precision}^2 p/(n-p)`, which is the search's tolerance. The end is judged by the offset itself [1]_: the
-    length of the residuals' projection on the columns of the Jacobian, relative to the length of the residuals, which does
-    not depend on the units of the parameters. An offset within rounding error is accepted too.
+    :math:`\\mathrm{precision}^2 p/(n-p)`, which is the search's tolerance. The end is judged by the offset itself [1]_:
+    the length of the residuals' projection on the columns of the Jacobian, relative to the length of the residuals,
+    which does not depend on the units of the parameters. An offset within rounding error is accepted too.
 
     .. [1] D. M. Bates, D. G. Watts, "A relative offset orthogonality convergence criterion for nonlinear least
        squares", Technometrics 23 (1981) 179, doi:10.1080/00401706.1981.10486257.

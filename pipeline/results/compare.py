@@ -97,14 +97,14 @@ def compare_springs(
 ) -> Comparison:
     """Test whether runs made with one spring give one spring constant.
 
-    The constant k and the mass s of the spring are fitted by generalised least squares to
-    :math:`k = \\omega_i^2 M(s, m_i)`, where M is the oscillating mass
-    (:func:`pipeline.bench.spring.oscillating_mass_kg`). The covariance of the right-hand sides is
-    :math:`V_{ij} = \\delta_{ij} u_i^2 + 4 u_{c,i} u_{c,j} k^2 + r\\,\\omega_i^2\\omega_j^2 u(m_i) u(m_j)`.
-    The clock's term applies only to runs with the same clock. Errors that runs share change all constants together and so
-    hardly affect the test. A stated mass of the spring is one more observation; if it is not stated, the observation is
-    :func:`pipeline.bench.spring.unstated_spring_kg` for the lightest bob, so uncertain that runs with different masses
-    outweigh it. The mass then takes one degree of freedom, so two runs determine it but do not test it.
+    The constant k and the mass s of the spring are fitted by generalised least squares to :math:`k = \\omega_i^2 M(s,
+    m_i)`, where M is the oscillating mass (:func:`pipeline.bench.spring.oscillating_mass_kg`). The covariance of the
+    right-hand sides is :math:`V_{ij} = \\delta_{ij} u_i^2 + 4 u_{c,i} u_{c,j} k^2 + r\\,\\omega_i^2\\omega_j^2 u(m_i)
+    u(m_j)`. The clock's term applies only to runs with the same clock. Errors that runs share change all constants
+    together and so hardly affect the test. A stated mass of the spring is one more observation; if it is not stated,
+    the observation is :func:`pipeline.bench.spring.unstated_spring_kg` for the lightest bob, so uncertain that runs
+    with different masses outweigh it. The mass then takes one degree of freedom, so two runs determine it but do not
+    test it.
 
     If the runs disagree, the eight runs farthest from the mean are exchanged pair by pair. A pair is reported if its
     exchange makes all runs agree, or reduces their tension to a hundredth.
