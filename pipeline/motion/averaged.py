@@ -147,12 +147,6 @@ class Averaged:
     area: Table | None
     lag: Table | None
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each parameter."""
-        turning = ("phase", "angular_frequency", "backbone")[: 2 if self.area is None else 3]
-        return (*self.law.parameters, *turning, *(f"rest{k}" for k in range(self.degree + 1)))
-
     def split(self, values: F8) -> tuple[F8, F8, F8]:
         """Return the parameters of law, phase and rest position."""
         first = len(self.law.parameters)

@@ -31,15 +31,10 @@ STEADY = 1e-4
 
 
 class Model(Protocol):
-    """A motion with named parameters."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each parameter."""
-        ...
+    """A motion with parameters."""
 
     def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
-        """Return the positions (n,) at t, and a function that gives their derivatives (n, p) by the parameters."""
+        """Return the positions (n,) at t, and a function that gives their derivatives (n, p) by them."""
         ...
 
 

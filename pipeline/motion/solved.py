@@ -159,11 +159,6 @@ class Solved:
     motion: FreeMotion
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each parameter."""
-        return (*STATE, *(COEFFICIENTS[power] for power in self.law.powers))
-
-    @property
     def slots(self) -> list[int]:
         """Indices of the parameters among all seven."""
         return [*range(len(STATE)), *(len(STATE) + power for power in self.law.powers)]
