@@ -9,9 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from acquisition.block import Block, Flag, concatenate
+from acquisition.block import Block, Flag, SourceInfo, concatenate
 from acquisition.clock import Clock
-from acquisition.source import SourceInfo
 
 
 class Replay:

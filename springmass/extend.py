@@ -7,7 +7,7 @@ add.
 
 from __future__ import annotations
 
-from acquisition.block import Block, Flag
+from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
 from acquisition.decoders.frames import FramedDecoder, LineSplitter, SumFrames, with_sum
@@ -20,7 +20,6 @@ from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.table import Column, Header, Table
-from acquisition.source import SourceInfo
 from pipeline.damping.laws.law import Law
 from pipeline.damping.laws.of_function import make_law
 from pipeline.dynamics import Equation, Integrator, Problem, Trajectory, get_integrator

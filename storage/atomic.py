@@ -177,7 +177,7 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
     """
     target = Path(path).resolve()
     part, lock = part_of(target), None
-    with _writing_folder(path):
+    with writing(path):
         if target.exists() and not target.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "a file of that name exists")
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -186,11 +186,11 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
         else:
             lock = lock_new(part, _open_folder)
     try:
-        with _writing_folder(path):
+        with writing(path):
             for leftover in part.iterdir():
                 shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink()
         yield part
-        with _writing_folder(path):
+        with writing(path):
             _move(part, target, names, last)
             sync_folder(target)
             sync_folder(target.parent)
@@ -212,13 +212,3 @@ def _move(part: Path, target: Path, names: Collection[str], last: str) -> None:
 def _open_folder(path: Path) -> int:
     path.mkdir(exist_ok=True)
     return os.open(path, os.O_RDONLY)
-
-
-@contextlib.contextmanager
-def _writing_folder(path: str | os.PathLike[str]) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        problem = f"the folder for results cannot be made ({error.strerror or one_line(error)})"
-        remedy = "check the disk space and the permissions, or choose another folder"
-        raise WriteFailed(path, problem, remedy) from error

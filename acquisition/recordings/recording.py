@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
-from acquisition.block import Block
-from acquisition.source import SourceInfo
+from acquisition.block import Block, SourceInfo
 
 
 @dataclass(frozen=True, slots=True)

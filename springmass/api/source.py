@@ -12,12 +12,11 @@ from typing import Any, Protocol, Self, Unpack
 
 import numpy as np
 
-from acquisition.block import Block, concatenate
+from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.decoders.registry import get_family
 from acquisition.live.serial_port import SerialPort
 from acquisition.replay import Replay
-from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
 from springmass.api.sources import AnyScene, Reading
 from springmass.errors import UNREADABLE, ProgramError

@@ -31,6 +31,7 @@ from springmass.errors import (
     tell,
 )
 from springmass.layout import STDIN
+from springmass.parameters import argument, flag, option, output
 from springmass.runs.inputs import files_of
 from springmass.runs.json_results import rejected
 from springmass.runs.options import How
@@ -38,7 +39,6 @@ from springmass.runs.outputs import distinct_names, in_a_name, make_folder
 from springmass.runs.questions import for_command, option_words
 from springmass.runs.run import Failed, Run, Task, analyse_all, law_lines
 from springmass.runs.scenes import read_scenes
-from springmass.values import argument, flag, option, output
 from storage.errors import WriteFailed
 
 TOGETHER = "together.results"

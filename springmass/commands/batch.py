@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import sys
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -17,12 +15,11 @@ from springmass.course.plan import plan, template
 from springmass.course.rows import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
-from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, manner, suggest, tell
+from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
+from springmass.parameters import Count, WholeNumber, argument, flag, option, output
 from springmass.runs.options import How
 from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
-from springmass.terminal.progress import TaskProgress
-from springmass.values import Count, WholeNumber, argument, flag, option, output
 
 
 @Parameter(name="*")
@@ -62,9 +59,8 @@ def batch(
         raise ProgramError("batch needs a folder for the results; name it with -o DIR")
     if options.dask is not None and options.jobs:
         raise ProgramError("--dask brings its workers, got --jobs too; leave out --jobs")
-    quiet = manner()[0]
     folder = make_folder(options.output)
-    with contextlib.ExitStack() as shown, opened(folder) as store:
+    with opened(folder) as store:
         course = plan(
             inputs,
             runs_csv=None if options.runs is None else str(options.runs),
@@ -75,30 +71,8 @@ def batch(
         )
         for line in course.notes:
             tell(line)
-        runs = shown.enter_context(TaskProgress("runs", lines=True, quiet=quiet))
-        reports: list[TaskProgress] = []
-
-        def analysed(rows: Sequence[Mapping[str, Any]], done: int, total: int) -> None:
-            for row in rows:
-                if row["status"] in FAILED:
-                    complain(row["error"])
-            runs.update(done, total)
-
-        def reported(done: int, total: int) -> None:
-            if not reports:  # the bar for reports replaces that for runs
-                shown.pop_all().close()
-                reports.append(shown.enter_context(TaskProgress("reports", lines=True, quiet=quiet)))
-            reports[0].update(done, total)
-
         rows, made, unwritten = run_course(
-            course,
-            store,
-            folder,
-            jobs=options.jobs,
-            dask=options.dask,
-            reports=options.reports,
-            progress=analysed,
-            reported=reported,
+            course, store, folder, jobs=options.jobs, dask=options.dask, reports=options.reports
         )
     for line in unwritten:
         complain(line)

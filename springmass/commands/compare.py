@@ -16,13 +16,13 @@ from acquisition.errors import visible
 from springmass.commands.options import Figures, File, Json, Scenes, Strict, refuse
 from springmass.course.rows import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
+from springmass.parameters import Share, argument, option, output
 from springmass.runs.comparing import Compared, beside, compare_runs, comparison_json
 from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
 from springmass.runs.options import How
 from springmass.runs.outputs import distinct_names, make_folder, now_utc
 from springmass.runs.run import Run, Task, analysed, law_lines
 from springmass.runs.scenes import read_scenes
-from springmass.values import Share, argument, option, output
 
 if TYPE_CHECKING:
     from springmass.course.benches import CourseComparison

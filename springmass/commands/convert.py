@@ -10,11 +10,11 @@ from typing import Annotated
 from acquisition.recordings.writers import WRITERS
 from springmass.commands.options import PART, File, Overwrite, refuse
 from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
+from springmass.parameters import argument, option, output
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import numbered, save_run
 from springmass.runs.scenes import read_scene
-from springmass.values import argument, option, output
 from storage.atomic import write_whole
 
 RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")

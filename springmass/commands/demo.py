@@ -10,6 +10,7 @@ from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.options import File
 from springmass.errors import OK, suggest
+from springmass.parameters import output
 from springmass.report.write import write_report
 from springmass.runs.comparing import compare_runs
 from springmass.runs.loading import load, sample_data
@@ -20,7 +21,6 @@ from springmass.runs.scenes import read_scene
 from springmass.terminal.printing import findings_text
 from springmass.terminal.style import style_of
 from springmass.terminal.table1 import text_table
-from springmass.values import output
 
 RUNS = ("undamped", "damped")
 

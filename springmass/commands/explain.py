@@ -11,8 +11,8 @@ from pipeline.findings.finding import Kind, kinds, usual_advice, word
 from pipeline.registry.found import Found
 from springmass.commands.options import Json
 from springmass.errors import OK, ProgramError
+from springmass.parameters import argument
 from springmass.terminal.printing import wrapped
-from springmass.values import argument
 
 COLUMNS = 80
 INDENT = " " * 9

@@ -16,8 +16,8 @@ from acquisition.errors import visible
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
 from springmass.errors import OK, SENSOR, ProgramError, suggest
+from springmass.parameters import Whole, option
 from springmass.session.sensors import outdated, settings_of
-from springmass.values import Whole, option
 
 ANSWER_S = 5.0
 """Longest time until a board answers: opening the port restarts it, and its bootloader waits for two seconds."""

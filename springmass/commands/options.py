@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 from cyclopts import Group, Parameter, Token
 
 from springmass.errors import ProgramError
+from springmass.parameters import LawName, Positive, TcpPort, argument, flag, option
 from springmass.runs.options import ReadOptions
 from springmass.runs.questions import option_of
-from springmass.values import LawName, Positive, TcpPort, argument, flag, option
 
 File = str | Path
 """The name of a file; a shell completes it."""

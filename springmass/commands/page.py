@@ -15,11 +15,11 @@ from springmass.errors import OK, ProgramError, manner, tell
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
 from springmass.page.web.server import address_in_network, code_for_terminal, serve
+from springmass.parameters import flag
 from springmass.runs.inputs import kind_of
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
 from springmass.stops import STOPS
-from springmass.values import flag
 
 
 def page(

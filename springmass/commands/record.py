@@ -28,6 +28,7 @@ from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
+from springmass.parameters import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
 from springmass.runs.outputs import made_now
 from springmass.runs.questions import option_words
 from springmass.runs.scenes import ask_about, read_scene
@@ -43,7 +44,6 @@ from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import ProgressLine
 from springmass.terminal.style import style_of, watched
-from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
 from storage.errors import WriteFailed, one_line
 from storage.recorder import check_disk
 from storage.recovery.recover import recover
@@ -138,7 +138,10 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         beside.callback(console.close)
         page = None
         try:
-            page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
+            if options.page:
+                given = option_words({each.name: getattr(page_options, each.name) for each in fields(page_options)})
+                process = PageProcess(given, log, queue.SimpleQueue(), STOPS, session.failures, console.line)
+                page = beside.enter_context(process)
             ended = _Bench(session, options, log, console, release, page).record()
             session.stop()
             failed, status = session.failures.describe(), ended.status
@@ -249,12 +252,6 @@ def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
             raise ProgramError(f"{name} does nothing without {needed}; name both or neither")
     if options.simulate and options.port:
         raise ProgramError("--simulate takes no --port; leave one of them out")
-
-
-def _page(options: PageOptions, log: Path, session: Session, console: Console) -> PageProcess:
-    """Return the page that runs during the recording."""
-    given = option_words({each.name: getattr(options, each.name) for each in fields(options)})
-    return PageProcess(given, log, queue.SimpleQueue(), session.stops, session.failures, console.line)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,9 @@ from typing import Annotated
 from acquisition.errors import CalibrationError
 from springmass.commands.options import File, Overwrite
 from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.parameters import Positive, argument, option, output
 from springmass.runs.outputs import made_now
 from springmass.stops import STOPS
-from springmass.values import Positive, argument, option, output
 from storage.recovery.recover import recover as build
 
 

@@ -14,9 +14,9 @@ from acquisition.clock import SystemClock, VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.options import PART, Recording, refuse
 from springmass.errors import OK
+from springmass.parameters import Finite, flag, option
 from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
-from springmass.values import Finite, flag, option
 
 
 def _speed(_: Any, tokens: Sequence[Token]) -> float:

@@ -9,7 +9,7 @@ from typing import Annotated
 from acquisition.errors import visible
 from springmass.commands.options import File, converted
 from springmass.errors import OK, ProgramError, suggest, tell
-from springmass.values import argument, option
+from springmass.parameters import argument, option
 
 TEMPLATE = """\
 # What was at the bench. Remove the # before what you measured, and put your numbers for the dots.

@@ -17,6 +17,7 @@ from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import Figures, File, Json, Overwrite
 from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.runs.json_results import picked
 from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
@@ -35,7 +36,6 @@ from springmass.runs.simulating.simulation import (
     summary,
 )
 from springmass.terminal.printing import wrapped
-from springmass.values import Finite, Positive, Whole, flag, option, output
 
 GROWTH = ("method", "predicted", "measured", "fails_above_s")
 

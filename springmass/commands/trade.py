@@ -10,12 +10,12 @@ from pipeline.analysis import Oscillation
 from springmass import __version__
 from springmass.commands.options import File, Json
 from springmass.errors import OK, UNREADABLE, ProgramError, manner
+from springmass.parameters import Count, Positive, argument, option
 from springmass.runs.options import How
 from springmass.runs.run import Run
 from springmass.runs.scenes import read_scene
 from springmass.terminal.progress import counted
 from springmass.trade import KINDS, QUANTITIES, Motion, measure_integrators, measure_tiers, motion_of, motion_of_problem
-from springmass.values import Count, Positive, argument, option
 
 
 def trade(

@@ -12,6 +12,7 @@ from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.quantity import Unit
 from pipeline.registry.quantities import INPUTS, QUANTITIES
+from springmass.runs.estimates import exponents_of
 from springmass.runs.rows import table_estimates, table_rows
 from springmass.typeset import typeset
 
@@ -99,7 +100,15 @@ def sentence(text: str) -> str:
 Grade = Literal["sound", "uncertain", "do not quote"]
 UNCERTAIN = 0.05  # u over the value from which fewer than two digits are certain
 MEANINGLESS = 0.5  # u over the value from which zero is within two standard uncertainties
-_WITH_AIR = ("reynolds_number", "reynolds_number_start", "keulegan_carpenter_number", "drag_coefficient")
+_PARTS = frozenset({"times", "frequency", "distances", "scene"})
+_NOT_BY_UNIT = {
+    "spring_constant": {"scene"},
+    "reynolds_number": _PARTS,
+    "reynolds_number_start": _PARTS,
+    "keulegan_carpenter_number": {"distances", "scene"},
+    "drag_coefficient": {"distances", "scene"},
+}
+"""What a quantity is computed of beside what its unit shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +135,7 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
         return {}
     found = {}
     for key, x in table_estimates(analysis).items():
-        reasons = [*_assumed(motion, analysis, key.name, x), *_sized(motion, key.name, x)]
+        reasons = [*_assumed(motion, analysis, key.name), *_sized(motion, key.name, x)]
         if motion.damping.best.rejected:
             if QUANTITIES[key.name].by_law and motion.damping.by_statement:
                 reasons.append(Trust("do not quote", "the recording contradicts the stated law"))
@@ -137,27 +146,24 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
     return found
 
 
-def _assumed(motion: Oscillation, analysis: Analysis, name: str, x: Estimate) -> Iterator[Trust]:
+def _assumed(motion: Oscillation, analysis: Analysis, name: str) -> Iterator[Trust]:
     """Yield the errors, the unchecked assumptions and the averages on which a quantity depends."""
-    inputs = {each.name for each in motion.derived.budgets[name].contributions}
+    parts = _made_of(name)
+    if any(each.name == "angular_frequency" for each in motion.derived.budgets[name].contributions):
+        parts.add("frequency")
     for finding in analysis.findings:
-        harm, about = harm_of(finding.code, finding.severity), kinds()[finding.code].about
+        harm, concerned = harm_of(finding.code, finding.severity), _PARTS & {*kinds()[finding.code].about}
         averaged = abs(finding.values.get("relative_shift", 0.0)) > UNCERTAIN
-        if (averaged or harm in (Harm.UNUSABLE, Harm.SCALE)) and _concerns(about, name, x.unit, inputs):
+        if (averaged or harm in (Harm.UNUSABLE, Harm.SCALE)) and (not concerned or concerned & parts):
             yield Trust("do not quote" if harm is Harm.UNUSABLE else "uncertain", finding.code)
 
 
-def _concerns(about: Container[str], name: str, unit: str, inputs: Container[str]) -> bool:
-    """Return whether a quantity depends on what a finding is about; a finding about nothing special concerns all."""
-    lengths = isinstance(QUANTITIES[name].unit, Unit) or unit.split("/")[0] in ("m", "mm")
-    of = {
-        "times": "clock_rate" in inputs,
-        "frequency": "angular_frequency" in inputs,
-        "distances": lengths or name in _WITH_AIR,
-        "scene": name in ("spring_constant", *_WITH_AIR),
-    }
-    named = [depends for what, depends in of.items() if what in about]
-    return any(named) or not named
+def _made_of(name: str) -> set[str]:
+    """Return what a quantity is computed of: times, distances, the scene."""
+    unit = QUANTITIES[name].unit
+    powers = (0.0, 1.0, unit.second) if isinstance(unit, Unit) else exponents_of(unit) or ()
+    parts = {part for part, power in zip(("masses", "distances", "times"), powers, strict=False) if power}
+    return {*parts, *_NOT_BY_UNIT.get(name, ())}
 
 
 def _sized(motion: Oscillation, name: str, x: Estimate) -> Iterator[Trust]:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
-from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory, effective_mass_kg
 from pipeline.dynamics.band import LEVELS, Band

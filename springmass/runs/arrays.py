@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.recordings import units
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.headings import heading_of, is_time
-from acquisition.source import SourceInfo
 from pipeline.errors import TrackError
 from pipeline.track import F8, Track
 from springmass.runs.inputs import kind_of

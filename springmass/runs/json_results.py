@@ -118,7 +118,7 @@ def _budgets(analysis: Analysis) -> dict[str, Any]:
     return {
         name: {
             **plain(budget.estimate),
-            **plain({"dof": budget.dof, "coverage_factor": budget.coverage_factor, "expanded": budget.expanded}),
+            **plain(picked(budget, ("dof", "coverage_factor", "expanded"))),
             "inputs": [_contribution(c) for c in budget.contributions],
         }
         for name, budget in analysis.motion.derived.budgets.items()

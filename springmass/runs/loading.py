@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.decoders.family import RESONATOR_PPM
 from acquisition.errors import NeedsAnswer
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
@@ -23,7 +23,6 @@ from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
-from acquisition.source import SourceInfo
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
 from springmass.layout import STDIN, part
@@ -281,6 +280,8 @@ def to_track(
 
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
+    stated = provenance or {}
+    moments = [event["t_s"] for event in stated.get("events", ()) if event.get("kind") == "trigger"]
     return Track(
         t=samples.t,
         y=samples.distance,
@@ -294,16 +295,10 @@ def to_track(
         velocity=samples.velocity,
         quantity=samples.quantity,
         unit=samples.unit,
-        trigger_s=_trigger_s(provenance or {}),
-        **_clock_comparison(samples, info, provenance or {}),
-        **_scale(recorded_format, (provenance or {}).get("sensor") or {}),
+        trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
+        **_clock_comparison(samples, info, stated),
+        **_scale(recorded_format, stated.get("sensor") or {}),
     )
-
-
-def _trigger_s(provenance: Mapping[str, Any]) -> float | None:
-    """Return when the bob left its rest position, in s, from the first trigger event of the recording."""
-    moments = [event["t_s"] for event in provenance.get("events", ()) if event.get("kind") == "trigger"]
-    return float(moments[0]) if moments else None
 
 
 def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -95,10 +94,8 @@ class Run(Mapping[str, Value]):
 
     def named(self, name: str, **changes: Any) -> Run:
         """Return the run under another name, and with other fields, with its analysis if it has one."""
-        other = copy.copy(self)
-        other.__dict__.pop("result", None)
-        for each, value in {"name": name, **changes}.items():
-            object.__setattr__(other, each, value)
+        other = replace(self, name=name, **changes)
+        vars(other).update({each: vars(self)[each] for each in ("analysis", "classic") if each in vars(self)})
         return other
 
     @cached_property

@@ -17,10 +17,9 @@ from typing import Any, Self
 
 from numpy.typing import NDArray
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.recordings.recording import Original, Trap
 from acquisition.regular_file import open_regular
-from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunClosed, RunDamaged, one_line
 from storage.hdf5 import damaged, reading_h5
 from storage.run_file import layout

@@ -129,10 +129,10 @@ class WireLogWriter:
         self.extended = 0
         if refused := self._append_error or self._sync_error:
             raise refused
-        copies = int(not self._copied and self.written.bytes >= SECOND_COPY)
-        if copies:
+        if not self._copied and self.written.bytes >= SECOND_COPY:
             self._copied = True
-            items = [(Kind.HEADER, 0, items[0][2], self._header), *items]
+            self.extend([(Kind.HEADER, 0, items[0][2], self._header)])
+            self.extended = 0
         records = [
             frame(kind, payload, sequence, mono_ns, self._log, channel)
             for sequence, (kind, channel, mono_ns, payload) in enumerate(items, self.written.records)
@@ -147,14 +147,14 @@ class WireLogWriter:
         except OSError as error:
             ends = list(accumulate(map(len, records)))
             whole = bisect_right(ends, taken)
-            self._count(whole, ends[whole - 1] if whole else 0, copies)
+            self._count(whole, ends[whole - 1] if whole else 0)
             self._append_error = self._failed("could not be continued", error)
             raise self._append_error from error
-        self._count(len(records), len(data), copies)
+        self._count(len(records), len(data))
 
-    def _count(self, records: int, size: int, copies: int) -> None:
+    def _count(self, records: int, size: int) -> None:
         self.written = Written(self.written.records + records, self.written.bytes + size)
-        self.extended = max(records - copies, 0)
+        self.extended = records
 
     def sync(self) -> None:
         """Sync everything appended before the call to the disk.

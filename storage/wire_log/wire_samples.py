@@ -121,7 +121,8 @@ class LogDecoder:
 
     def _hand_over(self, part: Part) -> None:
         held = self._held[part]
-        self.chains[part].take_all(held)
+        for host_ns, data in held:
+            self.chains[part].take(host_ns, data)
         self.reads[part] += len(held)
         held.clear()
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from springmass.runs.loading import sample_data
+from tests.cli.conftest import Cli
 
-Cli = Callable[..., Any]
 DATA = sample_data()
 BARE, DISC = (str(DATA / f"{name}_simulated_position.txt") for name in ("undamped", "damped"))
 BARE_SCENE, DISC_SCENE = (str(DATA / f"{name}.scene.toml") for name in ("undamped", "damped"))

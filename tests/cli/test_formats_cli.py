@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import springmass
 from acquisition.clock import VirtualClock
 from storage.recorder import Recorder
 from storage.run_file.reading import open_run
 from storage.wire_log.records import LogHeader, SensorEntry
-
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 
 def write_log(path: Path, channels: int) -> None:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from springmass.runs.loading import sample_data
-
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.live.firmware import HEX, VERSION
+from tests.cli.conftest import Cli
 
 PERIOD_S = 0.01
 
@@ -95,13 +96,13 @@ def board() -> Iterator[Callable[..., Board]]:
         each.close()
 
 
-def recorded(cli: Callable, port: str, out: Path, seconds: float) -> object:
+def recorded(cli: Cli, port: str, out: Path, seconds: float) -> object:
     """Record what a board sends."""
     return cli("record", "--port", port, "--sensor", "line-protocol", "--seconds", str(seconds), "-o", out)
 
 
 def test_record_asks_for_an_update_where_the_firmware_is_older(
-    cli: Callable, board: Callable[..., Board], tmp_path: Path
+    cli: Cli, board: Callable[..., Board], tmp_path: Path
 ) -> None:
     """And goes on with the one that is there."""
     here = board("1.4.2")
@@ -121,7 +122,7 @@ def test_record_asks_for_an_update_where_the_firmware_is_older(
     ],
 )
 def test_a_fault_that_the_sensor_knows_is_said_in_its_words(
-    cli: Callable, board: Callable[..., Board], tmp_path: Path, letter: str, words: str
+    cli: Cli, board: Callable[..., Board], tmp_path: Path, letter: str, words: str
 ) -> None:
     """Once a second has passed without a distance; as none comes, the recording ends with 4."""
     done = recorded(cli, board(VERSION, letter).port, tmp_path / "run.h5", 2.5)
@@ -129,7 +130,7 @@ def test_a_fault_that_the_sensor_knows_is_said_in_its_words(
     assert done.code == 4
 
 
-def test_firmware_sets_a_board_and_shows_what_it_then_is(cli: Callable, board: Callable[..., Board]) -> None:
+def test_firmware_sets_a_board_and_shows_what_it_then_is(cli: Cli, board: Callable[..., Board]) -> None:
     """Each setting as the protocol's command; what the device does not take is said with exit code 4."""
     here = board()
     settings = ("--rate", "50", "--gate", "600,4000", "--spread", "1000", "--name", "bench-3")
@@ -142,7 +143,7 @@ def test_firmware_sets_a_board_and_shows_what_it_then_is(cli: Callable, board: C
     assert "'R13'" in refused.complaint
 
 
-def test_an_older_board_is_shown_how_to_flash(cli: Callable, board: Callable[..., Board]) -> None:
+def test_an_older_board_is_shown_how_to_flash(cli: Cli, board: Callable[..., Board]) -> None:
     """A line for avrdude at each speed of a bootloader, with the port; settings need a port."""
     port = board("1.4.2").port
     words = [line for line in cli("firmware", "--port", port).out.splitlines() if "-b " in line]

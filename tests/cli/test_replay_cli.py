@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import springmass
-
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 
 def test_the_samples_are_those_of_the_recording(cli: Cli, recording: Path) -> None:

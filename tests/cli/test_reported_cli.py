@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from tests.cli.conftest import Cli
 from tests.reported import Row, periodic_rows, record, write_table
 from tests.synthetic import Truth
 
@@ -47,7 +46,7 @@ def bench(tmp_path: Path) -> list[str]:
     return arguments
 
 
-def test_six_of_six_on_the_reports_own_table(bench: list[str], tmp_path: Path, cli: Callable[..., Any]) -> None:
+def test_six_of_six_on_the_reports_own_table(bench: list[str], tmp_path: Path, cli: Cli) -> None:
     """Each mistake has its line on the terminal, in the JSON and on the page; --strict rejects the table."""
     table = write_table(tmp_path / "printed.csv", PRINTED)
     done = cli("compare", *bench, "--reported", table, "-o", tmp_path / "out", "--strict")
@@ -62,7 +61,7 @@ def test_six_of_six_on_the_reports_own_table(bench: list[str], tmp_path: Path, c
     assert len(result["reported"]) == len(PRINTED)
 
 
-def test_a_right_table_has_no_findings(bench: list[str], tmp_path: Path, cli: Callable[..., Any]) -> None:
+def test_a_right_table_has_no_findings(bench: list[str], tmp_path: Path, cli: Cli) -> None:
     """Values read off a graph, with semicolons and decimal commas as a sheet writes them, agree."""
     rows = [
         *periodic_rows("bare", 5.08, 0.2007),
@@ -78,9 +77,7 @@ def test_a_right_table_has_no_findings(bench: list[str], tmp_path: Path, cli: Ca
     assert not [f for f in result["findings"] if f["code"].startswith("reported_")]
 
 
-def test_a_value_that_no_usual_mistake_explains_differs(
-    bench: list[str], tmp_path: Path, cli: Callable[..., Any]
-) -> None:
+def test_a_value_that_no_usual_mistake_explains_differs(bench: list[str], tmp_path: Path, cli: Cli) -> None:
     """It is said how far off it is; a quantity that a recording does not give is not compared, and says so."""
     rows: list[Row] = [("bare", "period", 0.9, 0.001, "s"), ("bare", "colour", 3, "", "")]
     (result,) = cli("compare", *bench, "--reported", write_table(tmp_path / "t.csv", rows), "--json").results
@@ -100,7 +97,7 @@ def test_a_value_that_no_usual_mistake_explains_differs(
     ],
 )
 def test_a_table_that_cannot_be_read_names_the_line(
-    bench: list[str], tmp_path: Path, cli: Callable[..., Any], line: str, words: str
+    bench: list[str], tmp_path: Path, cli: Cli, line: str, words: str
 ) -> None:
     """The error names file and line, and says what to write."""
     table = tmp_path / "t.csv"

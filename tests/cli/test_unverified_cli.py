@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import h5py
 import pytest
 
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 COMMANDS = ("analyse", "convert", "replay", "trade", "simulate", "compare", "formats")
 

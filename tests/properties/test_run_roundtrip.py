@@ -12,9 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from acquisition.block import Block, concatenate
+from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.recordings.recording import Original, Trap
-from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunDamaged
 from storage.run_file.reading import Run, open_run
 from storage.run_file.writing import write_run

@@ -20,14 +20,7 @@ from collections.abc import Iterator, Sequence
 
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import text_format
-from acquisition.recordings.tables.headings import (
-    Heading,
-    headings_of,
-    is_time,
-    name_and_unit,
-    split_heading,
-    words,
-)
+from acquisition.recordings.tables.headings import Heading, headings_of, is_time, name_and_unit, split_heading, words
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text
 
@@ -163,9 +156,5 @@ DATASTUDIO = text_format(
     blocks=_datastudio_runs,
 )
 VERNIER = text_format(
-    "vernier",
-    "Vernier Format 2 text of Logger Pro",
-    vernier,
-    expected=f'"{_VERNIER}" in line 1',
-    blocks=_vernier_sets,
+    "vernier", "Vernier Format 2 text of Logger Pro", vernier, expected=f'"{_VERNIER}" in line 1', blocks=_vernier_sets
 )

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -156,13 +156,13 @@ def _joined(passes: list[list[Table]]) -> list[Table]:
         return []
     tables = []
     for parts in zip(*passes, strict=True):
-        formula, lines = _one_formula(parts), [part.lines for part in parts if part.lines is not None]
+        lines = [part.lines for part in parts if part.lines is not None]
         tables.append(
             replace(
                 parts[0],
                 columns=(_one([each.columns[0] for each in parts]),),
-                times=None if formula and parts[0].times is None else _one([_times(each) for each in parts]),
-                formula=formula,
+                times=_one([_times(each) for each in parts]),
+                formula=None,
                 run=f"Segments 1 to {len(parts)}",
                 lines=lines[-1]._replace(
                     numbers=np.concatenate([each.numbers for each in lines]),
@@ -197,18 +197,6 @@ def _one(parts: list[Column]) -> Column:
         values=np.concatenate([part.values for part in parts]),
         decimals=np.concatenate([part.forms for part in parts]),
     )
-
-
-def _one_formula(parts: Sequence[Table]) -> Formula | None:
-    """Return the formula of all segments; None if one has none or does not begin where the one before it ends."""
-    first, rows = parts[0].formula, 0
-    for part in parts:
-        if first is None or part.formula is None or part.formula.step_s != first.step_s:
-            return None
-        if not abs(part.formula.start_s - (first.start_s + rows * first.step_s)) < 0.01 * first.step_s:
-            return None
-        rows += part.columns[0].values.size
-    return None if first is None else replace(first, samples=rows)
 
 
 def _name_and_unit(label: str, unit: str, column: int) -> tuple[str, str]:

@@ -17,8 +17,7 @@ from functools import partial
 from acquisition.errors import FormatError
 from acquisition.recordings.families import workbook_child
 from acquisition.recordings.families.archive import tables_of_parts
-from acquisition.recordings.foreign import foreign_format
-from acquisition.recordings.identify import formats
+from acquisition.recordings.identify import foreign_format, formats
 from acquisition.recordings.tables.format import ColumnFormat, tables_of_text
 from acquisition.recordings.tables.rows import Sheet
 from acquisition.recordings.tables.table import Table

@@ -8,8 +8,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8, U8, Flag
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import median, place_unread, snap, time_flags
-from acquisition.recordings.sampling.timing import Rows, Timing
+from acquisition.recordings.sampling.timing import Grid, Rows, Timing, median, snap
 
 IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
@@ -21,6 +20,50 @@ _SAMPLE = 65536
 _FEWEST = 50  # minimum number of distances; with fewer, a common step may be accidental
 _ZEROS = 10
 _BACKWARD = "run backward or ahead of their neighbours"
+
+
+def place_unread(t: F8, unread: B1, grid: Grid | None) -> F8:
+    """Return the times of all rows; NaN for an unread row if nothing shows that it was a sample.
+
+    An unread row has a time if the unread rows exactly fill the grid between two others, or if its printed time (a NaN
+    if that was not read either) is the one that its row number predicts. Without a grid it must lie between the others.
+    """
+    out = np.where(unread, np.nan, t)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], unread.view(np.int8), [0]))))
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        own = t[start:stop]
+        before, after = t[start - 1] if start else -np.inf, t[stop] if stop < t.size else np.inf
+        if grid is None:
+            out[start:stop] = np.where(np.isfinite(after - before) & (before < own) & (own < after), own, np.nan)
+            continue
+        # As numbers of steps of the grid: the printed time, and what the rows above and below predict.
+        first, printed, last = ((each - grid.origin_s) * grid.rate_hz for each in (before, own, after))
+        above, below = first + 1 + np.arange(own.size), last - 1 - np.arange(own.size)[::-1]
+        fills = np.abs(above - below) < 0.5
+        alike = (np.abs(printed - above) < 0.5) | (np.abs(printed - below) < 0.5)
+        out[start:stop] = np.where(fills | alike, grid.time(np.rint(np.where(fills, above, printed))), np.nan)
+    return out
+
+
+def time_flags(t: F8, step: float) -> U8:
+    """Flag repeated times, backward times and gaps, given the nominal time between samples (s).
+
+    The times of samples with neither DUPLICATE_TIME nor NON_MONOTONIC_TIME increase strictly. If a single time is
+    ahead of its neighbours, only that time is flagged, and not all the times after it.
+    """
+    flags = np.zeros(t.size, np.uint8)
+    steps = np.diff(t)
+    if not steps.size or (steps.min() > 0 and steps.max() <= 1.5 * step):
+        return flags
+    spike = np.zeros(t.size, bool)
+    spike[:-1] = (t[:-1] > t[1:]) & (np.concatenate(([-np.inf], t[:-2])) < t[1:])
+    reached = np.maximum.accumulate(np.where(spike, -np.inf, t))
+    before = np.concatenate(([-np.inf], reached[:-1]))
+    flags[spike | (t < before)] |= Flag.NON_MONOTONIC_TIME.value
+    flags[~spike & (t == before)] |= Flag.DUPLICATE_TIME.value
+    ahead = ~spike & (t > before)
+    flags[ahead & np.isfinite(before) & (t - before > 1.5 * step)] |= Flag.GAP_BEFORE.value
+    return flags
 
 
 def place(rows: Rows, timing: Timing) -> F8:

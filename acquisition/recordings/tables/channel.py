@@ -8,7 +8,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from acquisition.block import B1, F8, I8, U8, Block, Flag
+from acquisition.block import B1, F8, I8, U8, Block, ClockKind, Flag, Kind, SourceInfo
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.samples import flags_of, line_of, place, row_traps, sample_traps, value_traps
@@ -18,7 +18,6 @@ from acquisition.recordings.tables.choose import Answers, choose_channel, measur
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
 from acquisition.recordings.tables.text import says_simulated
 from acquisition.recordings.units import TIMES, Measure, time_unit
-from acquisition.source import ClockKind, Kind, SourceInfo
 
 _LONGEST_S = 1e10
 """Times beyond three hundred years are no times."""

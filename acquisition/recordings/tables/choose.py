@@ -10,10 +10,9 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.questions import Missing, MissingItem, Question, Times
+from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import median
-from acquisition.recordings.sampling.timing import rate_needed
+from acquisition.recordings.sampling.timing import median, rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
 from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
@@ -296,11 +295,12 @@ def _first_numbers(column: Column) -> F8:
     return head[np.isfinite(head)][:_FIRST_ROWS]
 
 
-def _range_of(times: Column | None) -> Times | str:
-    """Return the range of times, only their name if there are too few numbers, or an empty text without times."""
+def _range_of(times: Column | None) -> str:
+    """Return the name of the times, with their range if there are enough numbers; an empty text without times."""
     if times is None:
         return ""
+    name = f'"{times.name or "time"}"'
     first, known = _first_numbers(times), times.values[np.isfinite(times.values)]
     if first.size < 2:
-        return times.name or "time"
-    return Times(times.name or "time", float(first[0]), float(known[-1]), median(np.diff(first)))
+        return name
+    return f"{name} ({first[0]:.6g} to {known[-1]:.6g}, {median(np.diff(first)):.3g} apart)"

@@ -12,8 +12,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import median
-from acquisition.recordings.sampling.timing import Formula
+from acquisition.recordings.sampling.timing import Formula, median
 from acquisition.recordings.tables.cells import EMPTY, I1
 from acquisition.recordings.tables.headings import Heading, numbered_apart, role_of
 from acquisition.recordings.units import Measure, measure_of
@@ -212,11 +211,7 @@ def side_by_side(table: Table, headings: Sequence[Heading], run: str = "") -> li
             channels.setdefault((each.run, times.get(each.run)), []).append(columns[at])
     return [
         replace(
-            table,
-            columns=tuple(own),
-            times=None if time is None else columns[time],
-            run=own_run or run,
-            beside=columns,
+            table, columns=tuple(own), times=None if time is None else columns[time], run=own_run or run, beside=columns
         )
         for (own_run, time), own in channels.items()
     ]

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from acquisition.block import Block, Flag
+from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
-from acquisition.source import SourceInfo
 
 INFO = SourceInfo("replay", "run", 100.0)
 

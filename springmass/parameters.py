@@ -1,4 +1,4 @@
-"""How options are declared, and their numeric types, whose ranges the command line demands."""
+"""How the parameters of commands are declared, and their numeric types, whose ranges the command line demands."""
 
 from __future__ import annotations
 
