@@ -37,9 +37,15 @@ from pipeline.windows.disturbances import Disturbances
 Table = tuple[F8, F8]  # values at ascending times, s
 
 BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency depends on the squared amplitude
-POINTS = 2049  # number of points in the tables of the lag and of the integral of the amplitude
-MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
-NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
+# Number of points in the tables of the lag and of the integral of the squared amplitude. If that falls by e^10 within a
+# table, the trapezoidal rule errs by h^2/12 = 2e-6: P. J. Davis, P. Rabinowitz, "Methods of Numerical Integration"
+# (1984).
+POINTS = 2049
+# Nodes of the quadrature of the decay rate over amplitudes, exact up to the power 15 (the same book, (1984)).
+NODES = 8
+# Maximum lag in rad by averaging (Bogoliubov and Mitropolsky (1961)): that of friction which halves the amplitude
+# within one radian.
+MOST_LAG = 0.75
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,8 +25,8 @@ from pipeline.windows.demodulate import CLIP_SIGMAS
 
 Bools = NDArray[np.bool_]
 
-# Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
-# with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
+# Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas, and
+# with signs by chance, they move an estimate by 4 sqrt(1e-4) = 0.04 of its standard uncertainty.
 STEADY = 1e-4
 
 

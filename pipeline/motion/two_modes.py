@@ -17,7 +17,7 @@ from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by rounding
+ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by IEEE rounding
 # Minimum ratio of the weaker mode's amplitude to the stronger one's; below it only one oscillation counts.
 WEAKER = 1.0 / 3.0
 # Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
