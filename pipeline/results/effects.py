@@ -213,7 +213,7 @@ def _modes(disturbances: Disturbances, unit: str) -> Iterator[Effect]:
         elif not members:
             yield Effect(name, None, None, unit, False, f"no {what} stands out of what the main oscillation leaves")
         else:
-            size = math.sqrt(sum(mode.amplitude.value**2 for mode in members))
+            size = math.sqrt(sum(mode.amplitude_m**2 for mode in members))
             verdict = "more" if disturbances.modelled else "less"
             why = (
                 f"{len(members)} times a {what}, together of this amplitude; the strongest line would leave up to "
