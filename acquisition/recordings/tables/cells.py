@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import math
 import re
@@ -10,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import B1, F8, I8
+from acquisition.block import B1, F8
 
 I1 = NDArray[np.int8]
 NAN, EMPTY, UNREAD = -1, -2, -3
@@ -137,30 +138,18 @@ def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
     raw[comma] = ord(".")
     values[fixed] = text[fixed].astype(np.float64)
     rest = ~fixed & (lengths > 0)
-    if rest.any() and not (kinds[rest] == _OTHER).any() and _exponents(text, kinds, places, rest, values, decimals):
-        return values, decimals, comma.any(axis=1)
+    # A mantissa with a mark, and an exponent of up to two digits.
+    letters = kinds == _E
+    exponent = lengths - letters.argmax(axis=1)  # the length of it with its letter
+    scientific = rest & (letters.sum(axis=1) == 1) & (marked == 1) & (places >= exponent) & (exponent <= len("e-99"))
+    if (scientific == rest).all() and not (kinds[rest] == _OTHER).any():
+        with contextlib.suppress(ValueError):
+            values[rest] = text[rest].astype(np.float64)
+            decimals[rest] = np.minimum(places - exponent, EXPONENT - 1)[rest] + EXPONENT
+            rest &= ~np.isfinite(values)
     for row in np.flatnonzero(rest).tolist():
         values[row], decimals[row] = cell(cells[row].decode("latin-1"))
     return values, decimals, comma.any(axis=1)
-
-
-def _exponents(
-    text: NDArray[np.bytes_], kinds: NDArray[np.uint8], places: I8, rows: B1, values: F8, decimals: I1
-) -> bool:
-    """Read the numbers in some rows, if all have a mantissa with a mark, and an exponent of up to three digits."""
-    letters = kinds[rows] == _E
-    exponent = np.count_nonzero(kinds[rows], axis=1) - letters.argmax(axis=1)  # with its letter
-    own = places[rows] - exponent
-    if not ((letters.sum(axis=1) == 1) & (own >= 0) & (own < EXPONENT) & (exponent <= len("e-99"))).all():
-        return False
-    try:
-        read = text[rows].astype(np.float64)
-    except ValueError:
-        return False
-    if not np.isfinite(read).all():
-        return False
-    values[rows], decimals[rows] = read, own + EXPONENT
-    return True
 
 
 def scaled(values: F8, decimals: I1 | None, power: int) -> F8:
