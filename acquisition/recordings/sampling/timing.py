@@ -58,7 +58,9 @@ def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[f
         return float(np.mean(snap(probe, grid, resolution)[1]))
 
     for origin in (0.0, float(times[0])):
-        shares = {grid: share(grid) for grid in (Grid(rate, origin) for rate in rates) if _every_point(times, grid)}
+        grids = [Grid(rate, origin) for rate in rates]
+        # Consecutive times must usually lie at consecutive grid points.
+        shares = {grid: share(grid) for grid in grids if median(np.diff(grid.nearest(times[:_PROBE]))) == 1.0}
         best = max(shares, key=lambda grid: shares[grid], default=None)
         if best is not None and shares[best] > _SHARE_ON_GRID:
             beside = (Grid(rate, origin) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
@@ -79,11 +81,6 @@ def _probe(apart: F8) -> F8:
     if apart.size <= 4 * _PROBE:
         return apart
     return np.concatenate((apart[:_PROBE], apart[:: apart.size // _PROBE], apart[-_PROBE:]))
-
-
-def _every_point(apart: F8, grid: Grid) -> bool:
-    """Return whether consecutive times usually lie at consecutive grid points."""
-    return median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0
 
 
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
