@@ -64,22 +64,9 @@ else:
 
 __version__ = "0.3.0"
 
+# fmt: off
 __all__ = [
-    "LAWS",
-    "Error",
-    "Format",
-    "Run",
-    "Scene",
-    "Sensor",
-    "Stream",
-    "__version__",
-    "analyse",
-    "batch",
-    "compare",
-    "load",
-    "make_law",
-    "results",
-    "sample_data",
-    "simulate",
-    "source",
+    "LAWS", "Error", "Format", "Run", "Scene", "Sensor", "Stream", "__version__", "analyse", "batch", "compare", "load",
+    "make_law", "results", "sample_data", "simulate", "source",
 ]
+# fmt: on

@@ -11,15 +11,14 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import NEGLIGIBLE, OUTLIER
 from pipeline.numerics.robust import mad_sigma
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 
-FAR = 5.0  # distance from the median, in standard deviations, above which a run is suspect: none of 200 good runs
 FEW = 4  # minimum number of runs in a group for a median
 LARGEST_BENCH = 50  # maximum number of runs compared as those of one bench; of a larger group only far runs are named
 LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
 MATES = 4  # good runs against which two far runs are exchanged
-ALIKE = 0.1  # maximum relative difference of two constants after an exchange that is worth a comparison
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,7 +212,7 @@ def _alike_exchanged(a: SpringRun | None, b: SpringRun | None) -> bool:
     if a is None or b is None:
         return False
     k_a, k_b = (x.angular_frequency.value**2 * y.mass_kg.value for x, y in ((a, b), (b, a)))
-    return abs(math.log(k_a / k_b)) < ALIKE
+    return abs(math.log(k_a / k_b)) < NEGLIGIBLE
 
 
 def _far(runs: Sequence[CourseRun]) -> dict[str, Suspect]:
@@ -240,7 +239,7 @@ def _far(runs: Sequence[CourseRun]) -> dict[str, Suspect]:
             scatter = max(mad_sigma(logs - middle), least)
             for (name, value), log in zip(group, logs.tolist(), strict=True):
                 away = (log - middle) / math.hypot(scatter, value.u / value.value)
-                if len(group) >= FEW and abs(away) > FAR:
+                if len(group) >= FEW and abs(away) > OUTLIER:
                     ratio = math.exp(log - middle)
                     off = f"{ratio:.3g} times" if abs(log - middle) > 1.0 else f"{100.0 * (ratio - 1.0):+.3g} % off"
                     found.setdefault(name, Suspect(name, f"its {words} is {off} that of {others}: {advice}"))

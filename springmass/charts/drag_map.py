@@ -3,26 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
+from pipeline.bench.disc import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, line_of
 
 POINTS = 8  # of one run
 LARGEST = 1e100  # whose square is still finite
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DragRun:
-    """One run's drag coefficient at several of its amplitudes: (n, 4) of Re, KC, the coefficient and its u."""
-
-    disc: str
-    points: F8
 
 
 def drag_points(analysis: Analysis) -> list[list[float]]:
@@ -67,16 +58,19 @@ def drag_of_plate(keulegan_carpenter: F8) -> F8:
     return np.maximum(10.0 * keulegan_carpenter ** (-1.0 / 3.0), 1.95)
 
 
-def drag_map(runs: Sequence[DragRun]) -> Chart | None:
-    """Return the map, with one line per disc and the band of each run; None without a positive coefficient."""
-    runs = [run for run in runs if len(run.points) and (run.points[:, 2] > 0.0).any()]
+def drag_map(runs: Sequence[tuple[str, F8]]) -> Chart | None:
+    """Return the map of runs, each the name of its disc and (n, 4) of Re, KC, the drag coefficient and its u.
+
+    It has one line per disc and the band of each run; None without a positive coefficient.
+    """
+    runs = [(disc, points[points[:, 2] > 0.0]) for disc, points in runs if len(points) and (points[:, 2] > 0.0).any()]
     if not runs:
         return None
     panels = []
     for column, label in enumerate(("Reynolds number", "Keulegan-Carpenter number")):
         series, ends, heights = [], [], []
-        for disc in dict.fromkeys(run.disc for run in runs):
-            parts = [run.points[run.points[:, 2] > 0][:, [column, 2, 3]] for run in runs if run.disc == disc]
+        for disc in dict.fromkeys(name for name, _ in runs):
+            parts = [points[:, [column, 2, 3]] for name, points in runs if name == disc]
             rows = np.concatenate([np.vstack([part, np.full((1, 3), np.nan)]) for part in parts])
             words = f"disc {visible(disc)}" if disc else "runs"
             series.append(Series(words, rows[:, 0], rows[:, 1], "other", line=True, u=rows[:, 2]))

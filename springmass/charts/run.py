@@ -17,7 +17,6 @@ from pipeline.results.curves import Curve
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
 from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
-from springmass.charts.spectrum import peaks_of, spectrum_of
 from springmass.typeset import law_status, pretty
 
 REASONS: tuple[tuple[int, str], ...] = (
@@ -39,7 +38,6 @@ MOST_STRETCHES, LEAST_WINDOWS = 24, 6
 TURNS_OF_SAMPLES = 24  # more would cover each other
 MOST_TURNS = 230  # of the phase plot: 6000 points, of which none may be left out
 MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
-MOST_MEANS = 120  # of kinetic and potential energy; of more periods, one mean covers several
 
 
 def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
@@ -59,8 +57,8 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
     places = np.where(np.isfinite(y[out]), y[out], middle)
     flagged = [Series(f"left out ({out.size})", t[out], places, "flagged", why=why)] if out.size else []
     series = [samples, *flagged, *_marks(notes)]
-    sigma = pretty(_in_shown(a, a.estimates["noise"]))
-    motion = a.motion
+    noise, motion = a.estimates["noise"], a.motion
+    sigma = pretty(Estimate(factor * noise.value, factor * noise.u, SHOWN[track.unit].unit))
     if isinstance(motion, Overdamped):
         grid, curve = _relaxing(a, motion)
         series.insert(0, line_of("fit", grid, curve * factor))
@@ -68,7 +66,7 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
         caption = f"The recording. Samples scatter by {sigma}."
         return Chart("position", "Position", caption, (Panel(value_label(what, track.unit), tuple(series)),))
     series[:0] = _fit_lines(a, motion, factor)
-    residual = np.where(used, motion.waveform.residual[rows], np.nan) / (a.estimates["noise"].value or 1.0)
+    residual = np.where(used, motion.waveform.residual[rows], np.nan) / (noise.value or 1.0)
     panels = [
         Panel(value_label(what, track.unit), tuple(series)),
         Panel("residual / σ", (Series("residual", t, residual),), 1.3, zero=True),
@@ -89,11 +87,6 @@ def _reason(flags: int, y: float) -> str:
     if not np.isfinite(y):
         return "missing: the sensor gave no value"
     return next((words for bit, words in REASONS if flags & bit), "not usable")
-
-
-def _in_shown(a: Analysis, x: Estimate) -> Estimate:
-    shown = SHOWN[a.track.unit]
-    return Estimate(shown.factor * x.value, shown.factor * x.u, shown.unit)
 
 
 def _marks(notes: Sequence[Note]) -> list[Series]:
@@ -256,10 +249,9 @@ def drag(a: Analysis) -> Chart | None:
         return None
     # The long error bar of a stretch with hardly any damping would compress everything else.
     most = 2.5 * float(np.max(np.abs(curve.y) + curve.u))
-    ends = np.concatenate([curve.y - curve.u, curve.y + curve.u, curve.y_points - curve.u_points])
-    tops = curve.y_points + curve.u_points
-    low, high = min(0.0, max(float(np.min(ends)), -most)), min(float(np.max(tops, initial=0.0)), most)
-    high = max(high, float(np.max(curve.y + curve.u)))
+    both = ((curve.y, curve.u), (curve.y_points, curve.u_points))
+    ends = np.clip(np.concatenate([y + sign * u for y, u in both for sign in (-1, 1)]), -most, most)
+    low, high = min(0.0, float(np.min(ends))), float(np.max(ends))
     series = _with_band(curve, SHOWN[unit].factor, 1.0, "a stretch of the run", f"law {motion.damping.selected}")
     shown = (low, high + 0.08 * (high - low))
     panel = Panel("effective drag coefficient", series, 3.0, value_label("amplitude", unit), range=shown)
@@ -278,15 +270,14 @@ def _with_band(curve: Curve, x: float, y: float, points: str, law: str) -> tuple
     )
 
 
-def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
-    """Mechanical energy with its band, means of its two parts, and the deviation of single amplitudes from the law."""
+def energy(a: Analysis) -> Chart | None:
+    """Mechanical energy with its band, and the deviation of single amplitudes from the law."""
     if not isinstance(a.motion, Oscillation):
         return None
     motion = a.motion
     curve = motion.derived.energy_curve(motion.damping, motion.demodulated)
     if curve is None:
         return None
-    parts = _energy_means(motion, smoothed or _smoothed(a)) if a.track.unit == "m" else ()
     low, high = float(np.min(curve.y - curve.u)), float(np.max(curve.y))
     law = np.interp(curve.x_points, curve.x, curve.y)
     # Where friction has stopped the motion, the law predicts no energy for comparison.
@@ -295,7 +286,7 @@ def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     width = 100.0 * curve.u[moves] / curve.y[moves]
     label = "energy / mJ" if curve.unit == "J" else "energy per mass / (mJ/kg)"
     series = _with_band(curve, 1.0, 1e3, "from single amplitudes", f"law {motion.damping.selected}")
-    above = Panel(label, (*series, *parts), 2.6, log=low < high / 20.0 if low > 0.0 else None)
+    above = Panel(label, series, 2.6, log=low < high / 20.0 if low > 0.0 else None)
     band = band_of("± u of the law", curve.x[moves], np.zeros(width.size), width)
     points = Series("deviation", curve.x_points[there], off, u=100.0 * curve.u_points[there] / law[there])
     below = Panel("deviation / %", (band, points), 1.3, zero=True)
@@ -303,29 +294,6 @@ def energy(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     of = f"the mass that oscillates, {pretty(mass)}" if mass is not None else "one kilogram, as no mass was given"
     caption = f"Energy m ω² A²/2 of {of}; below, the deviation of single amplitudes from the law."
     return Chart("energy", "Energy", caption, (above, below))
-
-
-def _energy_means(motion: Oscillation, smoothed: Smoothed | None) -> tuple[Series, ...]:
-    """Means of kinetic and potential energy over whole periods: each is half of the energy."""
-    stiffness = motion.derived.half_stiffness
-    if stiffness is None or smoothed is None:
-        return ()
-    rows = np.flatnonzero(np.isfinite(smoothed.position))
-    rows = rows[np.argsort(smoothed.t[rows], kind="stable")]
-    t, f = smoothed.t[rows], motion.cycles.frequency_hz
-    together = max(1, int(np.ceil(motion.cycles.count / MOST_MEANS)))
-    turn = np.floor((t - t[0]) * f / together).astype(np.intp)
-    counts = np.bincount(turn)
-    whole = counts >= np.median(counts) - 1  # a period is not a whole number of samples
-    times = np.bincount(turn, t)[whole] / counts[whole]
-    # Both energies use the same constant, because m v^2 / 2 = k (v/omega)^2 / 2.
-    squares = {
-        "kinetic, mean of a period": (smoothed.velocity[rows] / motion.phase.angular_frequency.value) ** 2,
-        "potential, mean of a period": (smoothed.position[rows] - motion.rest.at(t)) ** 2,
-    }
-    means = {name: 1e3 * stiffness.value * np.bincount(turn, x)[whole] / counts[whole] for name, x in squares.items()}
-    # The means lie on one line, so their points alternate and neither covers the other.
-    return tuple(Series(name, times[i::2], y[i::2], "other") for i, (name, y) in enumerate(means.items()))
 
 
 def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
@@ -359,8 +327,8 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     return Chart("motion", "Velocity and acceleration", caption, panels, end if end < t[-1] else None)
 
 
-def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
-    """Velocity against displacement: the fitted motion, of very many turns every n-th, and the values of samples."""
+def phase(a: Analysis) -> Chart | None:
+    """Velocity against displacement: the fitted motion, of very many turns every n-th, and recorded velocities."""
     if not isinstance(a.motion, Oscillation):
         return None
     motion, track, unit = a.motion, a.track, a.track.unit
@@ -368,14 +336,6 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     step = int(np.ceil(motion.cycles.count / MOST_TURNS))
     inside = (a.flags & Quality.OUTSIDE) == 0
     first, end = motion.damping.t0, float(np.nanmax(track.t[inside]))
-    recorded = track.velocity is not None and np.isfinite(track.velocity).any()
-    smoothed = smoothed or _smoothed(a)
-    moving = track.velocity if recorded else np.nan if smoothed is None else smoothed.velocity
-    velocity = np.where(_used(a), np.asarray(moving, np.float64), np.nan)
-    words = "samples, velocity as recorded" if recorded else "samples, velocity by the fit"
-    displacement, turn = track.y - motion.rest.at(track.t), np.floor((track.t - first) / period)
-    few = int(np.ceil(motion.cycles.count / TURNS_OF_SAMPLES))
-    seen = np.flatnonzero(np.isfinite(velocity) & (turn >= 0) & (np.mod(turn, few) == 0))
     turns = []
     for start in np.arange(first, end, period * step).tolist():
         t = np.linspace(start, min(start + period, end), PER_PERIOD)
@@ -383,13 +343,15 @@ def phase(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
         turns.append(np.full((int(step > 1), 2), np.nan))  # lifts the pen
     line = np.concatenate(turns)
     fastest = 1.1 * float(np.nanmax(np.abs(line[:, 1])))
-    series = (
-        Series(words, displacement[seen] * factor, velocity[seen], "rest"),
-        line_of("fitted motion", line[:, 0] * factor, line[:, 1]),
-    )
+    series = [line_of("fitted motion", line[:, 0] * factor, line[:, 1])]
+    if track.velocity is not None:
+        few, turn = int(np.ceil(motion.cycles.count / TURNS_OF_SAMPLES)), np.floor((track.t - first) / period)
+        seen = _used(a) & np.isfinite(track.velocity) & (turn >= 0) & (np.mod(turn, few) == 0)
+        displacement = (track.y - motion.rest.at(track.t)) * factor
+        series.insert(0, Series("samples, velocity as recorded", displacement[seen], track.velocity[seen], "rest"))
     label = rate_label("velocity" if unit == "m" else "derivative", 1, unit)
     x_label = value_label("displacement" if unit == "m" else f"{noun(unit)} from rest", unit)
-    panel = Panel(label, series, 4.4, x_label, equal=True, range=(-fastest, fastest))
+    panel = Panel(label, tuple(series), 4.4, x_label, equal=True, range=(-fastest, fastest))
     caption = "Velocity against displacement from rest." + (f" One turn in {step} is drawn." if step > 1 else "")
     return Chart("phase", "Phase plot", caption, (panel,))
 
@@ -458,15 +420,66 @@ def charts_of(
     smoothed: Smoothed | None = None,
 ) -> dict[str, Chart]:
     """Return all charts that a run allows, in the report's order; only the position if nothing oscillates."""
-    smoothed = smoothed or _smoothed(a)
     makers: dict[str, Callable[[Analysis], Chart | None]] = {
         **CHARTS,
         "position": partial(position, notes=notes),
-        "energy": partial(energy, smoothed=smoothed),
         "motion": partial(motion, smoothed=smoothed),
-        "phase": partial(phase, smoothed=smoothed),
     }
     charts = {name: make(a) for name, make in makers.items()}
     if classic is not None:
         charts["classic"] = classic_method(a, classic)
     return {name: chart for name, chart in charts.items() if chart is not None}
+
+
+SHOWN_MULTIPLES = 8.0  # range of the spectrum in multiples of the oscillation's frequency
+LEAST_ROWS = 8
+MOST_PEAKS, MOST_TRIED = 5, 200
+FALSE_ALARM = 1e-3  # probability that white noise has a labelled peak
+SURROUNDINGS = 101  # rows whose median is the noise level around a peak
+APART = 0.03  # of the range of frequencies; of two peaks that are nearer, the higher is labelled
+
+
+def spectrum_of(a: Analysis, motion: Oscillation) -> tuple[F8, F8, F8] | None:
+    """Return frequencies in Hz, and the amplitudes of recording and residuals in the recording's unit.
+
+    The discrete Fourier transform with a Hann window is scaled so that a steady sinusoid shows its amplitude. Omitted
+    samples and gaps are filled with the fit in the recording, and with zero in the residuals.
+    """
+    track, waveform = a.track, motion.waveform
+    used = ((a.flags & UNUSABLE) == 0) & np.isfinite(track.y) & np.isfinite(waveform.residual)
+    start, end = float(track.t[used][0]), float(track.t[used][-1])
+    count = max(round((end - start) * track.rate_hz) + 1, 8)
+    grid = np.linspace(start, end, count)
+    at = np.clip(np.round((track.t[used] - start) / (end - start) * (count - 1)).astype(np.intp), 0, count - 1)
+    residual = np.zeros(count)
+    residual[at] = waveform.residual[used]
+    swing = motion.damping.best.amplitude(grid - motion.phase.t0) * np.cos(motion.phase.total(grid))
+    whole = motion.rest.at(grid) + swing
+    whole[at] = track.y[used]
+    window = np.hanning(count)
+    scale = 2.0 / window.sum()
+    f: F8 = np.asarray(np.fft.rfftfreq(count, 1.0 / track.rate_hz), np.float64)
+    keep = (f > 0.0) & (f <= SHOWN_MULTIPLES * motion.cycles.frequency_hz)
+    if np.count_nonzero(keep) < LEAST_ROWS:
+        return None
+    whole, residual = (scale * np.abs(np.fft.rfft(window * (y - y.mean())))[keep] for y in (whole, residual))
+    return f[keep], whole, residual
+
+
+def peaks_of(amplitude: F8) -> list[int]:
+    """Return the rows of the highest peaks that exceed the noise around them.
+
+    The amplitudes of white noise have a Rayleigh distribution: with probability :math:`\\alpha`, the largest of n
+    exceeds :math:`\\sqrt{\\ln(n/\\alpha)/\\ln 2}` times their median.
+    """
+    limit = np.sqrt(np.log(amplitude.size / FALSE_ALARM) / np.log(2.0))
+    inner = amplitude[1:-1]
+    # scipy has functions for both, but they take longer to import than all charts take to make.
+    tops = np.flatnonzero((inner > amplitude[:-2]) & (inner >= amplitude[2:])) + 1
+    taken: list[int] = []
+    for row in tops[np.argsort(amplitude[tops])[::-1]][:MOST_TRIED].tolist():
+        noise = float(np.median(amplitude[max(row - SURROUNDINGS // 2, 0) : row + SURROUNDINGS // 2 + 1]))
+        alone = all(abs(row - other) > APART * amplitude.size for other in taken)
+        if len(taken) < MOST_PEAKS and alone and amplitude[row] > limit * max(noise, 1e-30):
+            taken.append(row)
+    return taken

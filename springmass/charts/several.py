@@ -113,3 +113,31 @@ def course(label: str, rows: Sequence[tuple[str, float, float]], differing: Mapp
         series.append(Series("differs from its course", x[apart], values[apart], "flagged", u=us[apart], why=why))
     panel = Panel(label, tuple(series), x_label="run", names=names)
     return Chart("course", "All runs", "Point at a run to read its name.", (panel,))
+
+
+BINS, FEWEST_BINS = 60, 8
+
+
+def outline(analysis: Analysis) -> str:
+    """Return an outline of the recording as an SVG path in a box of 120 by 30; empty if nothing was measured."""
+    t, y = analysis.track.t, analysis.track.y
+    there = np.isfinite(t) & np.isfinite(y)
+    order = np.argsort(t[there], kind="stable")
+    t, y = t[there][order], y[there][order]
+    if t.size < 2 or not np.ptp(t) > 0:
+        return ""
+    span = t[-1] - t[0]
+    # A bin shorter than a period would not show the outline.
+    count = (
+        int(np.clip(span / period.value, FEWEST_BINS, BINS)) if (period := analysis.estimates.get("period")) else BINS
+    )
+    ends = np.searchsorted(t, t[0] + span * np.arange(count + 1) / count)
+    filled = np.flatnonzero(np.diff(ends))
+    low, high = (edge.reduceat(y, ends[filled]) for edge in (np.minimum, np.maximum))
+    beyond = y.size // 200  # the extreme 0.5 % are ignored, so that false echoes do not flatten the outline
+    bottom, top = np.partition(y, (beyond, -1 - beyond))[[beyond, -1 - beyond]]
+    scale = 28.0 / max(top - bottom, 1e-300)
+    above, below = (np.clip(29.0 - (edge - bottom) * scale, 0.0, 30.0).round() for edge in (high, low))
+    x = ((filled + 0.5) * 120.0 / count).round(1).tolist()
+    edge = [*zip(x, above.tolist(), strict=True), *reversed([*zip(x, below.tolist(), strict=True)])]
+    return "M" + "L".join(f"{a:g} {b:g}" for a, b in edge) + "Z"

@@ -14,7 +14,7 @@ from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.course import LITTLE
 from springmass.charts.chart import Chart
-from springmass.charts.drag_map import DragRun, drag_map
+from springmass.charts.drag_map import drag_map
 from springmass.charts.several import course
 from springmass.course.benches import BENCHES, CourseComparison
 from springmass.course.rows import COURSE, FAILED
@@ -40,8 +40,7 @@ def write_page(
     folder: Path, rows: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]], tags: Sequence[str]
 ) -> None:
     """Write ``index.html``; the link of a line is empty if its run has no report."""
-    from springmass.report.html import Figures, drawn_by_script, template
-    from springmass.report.script import SHARED
+    from springmass.report.html import SHARED, Figures, drawn_by_script, template
 
     there = [name for name in SHOWN if any(line["cells"][name] for line in lines)]  # only with numbers
     shown = [{**line, "link": quote(line["link"])} for line in lines]
@@ -73,7 +72,7 @@ def _of_drag(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     """Return the map of the drag coefficients of all runs that have some."""
     return drag_map(
         [
-            DragRun(row.get("disc") or f"{1e3 * row['disc_diameter_m']:.4g} mm", np.array(json.loads(points)))
+            (row.get("disc") or f"{1e3 * row['disc_diameter_m']:.4g} mm", np.array(json.loads(points)))
             for row in rows
             if (points := row.get("drag_points"))
         ]

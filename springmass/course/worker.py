@@ -16,15 +16,14 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
 from springmass.charts.drag_map import drag_points
-from springmass.charts.outline import outline
+from springmass.charts.several import outline
 from springmass.course.plan import Job, code_sha256, digest_of
 from springmass.course.rows import ESTIMATES
 from springmass.errors import internal_error, quietly
 from springmass.report.advice import Harm, harm_of, sentence
-from springmass.report.script import SHARED
-from springmass.runs.analysing import Failed, analyse_all
+from springmass.report.html import SHARED
 from springmass.runs.questions import for_course
-from springmass.runs.run import Run
+from springmass.runs.run import Failed, Run, analyse_all
 from storage.errors import WriteFailed
 
 LARGEST = 1e100

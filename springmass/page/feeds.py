@@ -12,6 +12,7 @@ from typing import Any
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from springmass.page.view import Series, View
+from springmass.report.recorded import event_words
 from springmass.runs.loading import Loaded
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
@@ -22,7 +23,6 @@ from storage.wire_log.wire_samples import LogDecoder, chain_of
 
 AT_ONCE = 10_000
 """Maximum number of records per call: 100 s of a sensor at 100 Hz. A long log is therefore shown piece by piece."""
-MOST_NOTES = 1000
 NOT_LISTED = frozenset({"calibration", "ended"})
 """Kinds of events that the page does not list, because a person at the bench need not read them."""
 
@@ -95,13 +95,13 @@ class LogFeed:
     def _note(self, record: Record, content: dict[str, Any]) -> None:
         if record.kind is Kind.MARK:
             self._timed.append(record)
-        elif record.kind is Kind.EVENT and len(self.view.notes) < MOST_NOTES:
+        elif record.kind is Kind.EVENT:
             if content["kind"] == "trigger":
                 self._timed.append(record)
             if content["kind"] == "still":
                 self.view.zero = _zero_of(content)
             if content["kind"] not in NOT_LISTED:
-                self.view.notes.append(_in_words(content["kind"], content["facts"]))
+                self.view.notes.append(event_words(content["kind"], content["facts"], named=True))
 
     def _place_marks(self) -> None:
         """Give marks and triggers the times that the run file will give them, which the first samples improve."""
@@ -112,21 +112,6 @@ class LogFeed:
         self.view.marks = [(t_s, record.text()) for t_s, record in timed if record.kind is Kind.MARK]
         events = [{"t_s": t_s, **event_content(record.payload)} for t_s, record in timed if record.kind is Kind.EVENT]
         self.view.provenance = {**self.view.provenance, "events": events}
-
-
-def _in_words(kind: str, facts: Mapping[str, Any]) -> str:
-    """Return an event in words; for other kinds, return the names and values of its facts."""
-    try:
-        if kind == "still":
-            return f"Zero {1e3 * facts['rest_m']:.1f} mm, noise {1e3 * facts['noise_m']:.2f} mm"
-        if kind == "trigger":
-            return f"Trigger at {1e3 * facts['threshold_m']:.0f} mm, {facts['keep_s']:g} s kept"
-        if kind == "note":
-            return f"Note: {facts['text']}"
-    except (KeyError, TypeError, ValueError):  # a log by another program may state other facts
-        pass
-    named = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in facts.items())
-    return f"{kind}: {named}" if named else kind
 
 
 def _zero_of(event: Mapping[str, Any]) -> dict[str, float]:

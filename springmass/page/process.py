@@ -21,8 +21,6 @@ from springmass.session.failures import Failures
 from springmass.stops import EndReason, Stops
 
 ENDS_WITHIN_S = 5.0
-MOST_UNREAD = 100
-"""Maximum number of lines that wait for a page that reads none; further lines are dropped."""
 
 
 class PageProcess:
@@ -47,7 +45,7 @@ class PageProcess:
         self.requests: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         self._lines: queue.SimpleQueue[dict[str, Any] | None] = queue.SimpleQueue()
         self._phase = "waiting"
-        self._over = self._gone = False
+        self._over = False
         self.failed = False  # the process died; False if somebody closed the page
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -70,9 +68,8 @@ class PageProcess:
     def tell(self, phase: str, **facts: Any) -> None:
         """Send the phase of the recording to the page without waiting."""
         self._phase = phase
-        if self._lines.qsize() < MOST_UNREAD:
-            self._lines.put({"phase": phase, **facts})
-        if self._gone:
+        self._lines.put({"phase": phase, **facts})
+        if self.failed:
             self._close_if_ready()
 
     def ended(self) -> None:
@@ -133,7 +130,7 @@ class PageProcess:
         if self._phase in ("ready", "still"):
             advice = "nothing has been recorded; start `springmass record` again"
         self._say(f"springmass: the page has ended ({error}); {advice}")
-        self._gone = self.failed = True
+        self.failed = True
         self._close_if_ready()
 
     def _close_if_ready(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import queue
-import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from springmass.page.feeds import LogFeed
 from springmass.page.live_analysis import Watcher
 from springmass.page.run_actions import Afterwards
 from springmass.page.view import View
+from springmass.session.progress import free_bytes
 
 POSSIBLE: Mapping[str, tuple[str, ...]] = {
     "ready": ("zero", "arm", "record", "close"),
@@ -79,7 +79,8 @@ class PageState:
         state = {"type": "state"} if self.view is None else self.view.state()
         zero = {} if self.view is None else self.view.zero
         after = {} if self.after is None else self.after.state()
-        return {**state, "bench": {**zero, **self.bench, **after}, "disk_free_bytes": self._free()}
+        free = None if self._folder is None else free_bytes(self._folder)
+        return {**state, "bench": {**zero, **self.bench, **after}, "disk_free_bytes": free}
 
     def ask(self, request: Mapping[str, Any]) -> None:
         """Carry out a controller's request that is possible now, and ignore others; the page shows the state."""
@@ -121,9 +122,3 @@ class PageState:
             self.watcher.close()
         self.view = view
         self.watcher = Watcher(view, scene, self._wanted_u_s, self._law)
-
-    def _free(self) -> int | None:
-        try:
-            return None if self._folder is None else shutil.disk_usage(self._folder).free
-        except OSError:  # the folder was renamed; the recorder reports that
-            return None

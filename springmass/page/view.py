@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import math
 import secrets
 import struct
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from acquisition.block import Block, ClockKind, SourceInfo
 from acquisition.recordings.recording import Trap
 from pipeline.track import Track
-from springmass.runs.tracks import to_track
+from springmass.runs.json_results import plain
+from springmass.runs.loading import to_track
 from storage.wire_log.wire_samples import Origin
 
 VERSION = 2  # of the messages
 MOST_PER_MESSAGE = 50_000
+SHOWN_NOTES = 20  # the latest
 _HEAD = struct.Struct("<4I")
 
 
@@ -87,7 +89,7 @@ class View:
     series: list[Series] = field(default_factory=list)
     session: str = field(default_factory=lambda: secrets.token_hex(8))
     marks: list[tuple[float, str]] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    notes: deque[str] = field(default_factory=lambda: deque(maxlen=SHOWN_NOTES))
     ended: bool = False
     error: str = ""
     recorded: Track | None = None
@@ -119,7 +121,7 @@ class View:
             "samples": [len(series) for series in self.series],
             "missing": sum(series.missing for series in self.series),
             "marks": [[t, text] for t, text in self.marks],
-            "notes": self.notes[-20:],
+            "notes": list(self.notes),
             "ended": self.ended,
             "error": self.error,
         }
@@ -130,12 +132,4 @@ def json_of(content: Any) -> str:
     try:
         return json.dumps(content, allow_nan=False)
     except ValueError:  # rare; checking every number in advance would double the time
-        return json.dumps(_finite(content), allow_nan=False)
-
-
-def _finite(content: Any) -> Any:
-    if isinstance(content, dict):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [_finite(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content
+        return json.dumps(plain(content))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import functools
+import hashlib
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,26 +13,23 @@ from typing import TYPE_CHECKING, Any
 from acquisition.errors import visible
 from pipeline.analyse import Oscillation
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.effects import EFFECTS
-from pipeline.registry.quantities import INPUTS
+from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
 from springmass.charts.chart import Chart, to_json
-from springmass.report.advice import notices_of
+from springmass.layout import static_file
+from springmass.report.advice import notices_of, trust_of
 from springmass.report.budgets import budgets_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
-from springmass.report.summary import summary
-from springmass.report.trust import trust_of
-from springmass.report.words import method
+from springmass.report.words import method, summary
 from springmass.runs.comparing import Compared, beside
 from springmass.runs.json_results import picked
-from springmass.runs.laws import laws_across, laws_of
 from springmass.runs.rows import table_rows
 from springmass.runs.run import Run
+from springmass.runs.showing import laws_across, laws_of
 from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset
 
 if TYPE_CHECKING:
     from jinja2 import Template
-    from markupsafe import Markup
 
 _QUALITY = {
     "used": "used",
@@ -45,8 +43,10 @@ _QUALITY = {
 }
 BESIDE = 3  # columns of runs that fit on A4
 MOST_NOTES = 50  # of a recording that the page lists
-FIRST = ("position", "amplitude")
-"""The charts of a single run that stand beside Table 1."""
+SHARED = "charts.js"
+"""The name of the script's own file, where several reports share it."""
+SOURCES = ("uPlot.iife.min.js", "charts.js", "report.js")
+"""The sources of the script, in this order; a page that is opened from a disk cannot import modules."""
 
 
 @dataclass(slots=True)
@@ -105,12 +105,23 @@ def render_html(
 
 def drawn_by_script(charts: Sequence[Mapping[str, Any]], address: str = "") -> dict[str, Any]:
     """Return what a template needs to draw charts: their numbers, the style, and the script or its address."""
-    from markupsafe import Markup
-
-    from springmass.report.script import report_script, report_style
-
-    style, script = Markup(report_style()), "" if address else Markup(report_script())
+    # The page of a recording has this style too.
+    style = "\n".join(static_file(name).read_text("utf-8") for name in ("uPlot.min.css", "charts.css"))
+    script = "" if address else report_script()
     return {"charts": charts, "chart_style": style, "script": script, "script_address": address}
+
+
+@functools.cache
+def report_script() -> str:
+    """Return the script of reports; its sources may hold neither </script nor <!--, which would end its element."""
+    script = "\n".join(static_file(name).read_text("utf-8") for name in SOURCES)
+    return f"\n{script}\n"
+
+
+@functools.cache
+def script_sha256() -> str:
+    """Return the base64 digest of the script for ``'sha256-...'`` in a Content-Security-Policy."""
+    return base64.b64encode(hashlib.sha256(report_script().encode()).digest()).decode()
 
 
 @functools.cache
@@ -131,12 +142,10 @@ def template(name: str) -> Template:
         "pretty": pretty,
         "cells": cells,
         "number": pretty_number,
-        "symbol": _symbol,
         "input": lambda name: INPUTS[name].label,
         "effect": EFFECTS.__getitem__,
         "unit": page_unit,
         "typeset": typeset,
-        "breakable": _breakable,
     }
     return environment.get_template(name)
 
@@ -239,18 +248,3 @@ def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]
         elif value is not None:
             leaves.append((name, " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)))
     return leaves
-
-
-def _symbol(symbol: str) -> Markup:
-    """Format a symbol, with the index that follows a space as a subscript."""
-    from markupsafe import Markup
-
-    letter, mark, index = symbol.partition(" ")
-    return Markup("<i>{}</i><sub>{}</sub>").format(letter, index) if mark else Markup("<i>{}</i>").format(letter)
-
-
-def _breakable(law: str) -> Markup:
-    """Allow a line break after each plus in the name of a law."""
-    from markupsafe import Markup, escape
-
-    return Markup("+<wbr>").join(escape(term) for term in law.split("+"))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
-from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, format_value
+from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, in_brackets
 from pipeline.registry.quantities import INPUTS
 from springmass.report.advice import by_harm, lab_report_line
 from springmass.report.budgets import budgets_of
@@ -43,7 +43,6 @@ _SIUNITX = {
     "degC": r"\degreeCelsius",
     "Pa": r"\pascal",
 }
-_WRITTEN = re.compile(r"\(?(?P<value>-?[\d.]+) \+- (?P<u>[\d.]+)\)?(?:e(?P<power>[+-]\d+))?")
 _TEX_SPECIAL = {
     "\\": r"\textbackslash{}",
     "~": r"\textasciitilde{}",
@@ -101,7 +100,6 @@ def _templates() -> Environment:
     )
     environment.filters |= {
         "quantity": _tex_quantity,
-        "power": _tex_power,
         "words": _tex_words,
         "text": _tex_text,
         "input": lambda name: _tex_text(INPUTS[name].label),
@@ -109,11 +107,6 @@ def _templates() -> Environment:
         "sentence": lambda text: f"{text[:1].upper()}{text[1:]}",
     }
     return environment
-
-
-def _tex_power(text: str) -> str:
-    """Typeset an exponent such as e-05 as a power of ten."""
-    return re.sub(r"e([+-])0*(\d+)", lambda found: rf" \times 10^{{{found[1].replace('+', '')}{found[2]}}}", text)
 
 
 _TEX_MATH = {
@@ -140,20 +133,17 @@ def _tex_words(text: str) -> str:
 
 
 def _tex_quantity(estimate: Estimate | None) -> str:
-    """Write value(u)unit for siunitx, with the digits that ``format_value`` chooses."""
+    """Write value(u)unit for siunitx, with two digits of u."""
     if estimate is None:
         return "--"
     if isinstance(estimate, UpperLimit):
         return f"$<$ {_tex_number(format_limit(estimate.limit), estimate.unit)} (\\qty{{95}}{{\\percent}})"
-    written = format_value(estimate.value, estimate.u)
-    found = _WRITTEN.fullmatch(written)
+    found = re.fullmatch(r"(-?[\d.]+)(\([\d.]+\))?(?:e([+-]\d+))?", in_brackets(estimate.value, estimate.u))
     if found is None:
-        number = written if re.fullmatch(r"-?[\d.]+(e[+-]\d+)?", written) else ""
-    else:
-        # 0.7529 +- 0.0014 is 0.7529(14), 13.9 +- 1.2 is 13.9(12), 1100 +- 150 is 1100(150).
-        number = f"{found['value']}({int(found['u'].replace('.', ''))})"
-        number += f"e{int(found['power'])}" if found["power"] else ""
-    return _tex_number(number, estimate.unit) if number else "--"
+        return "--"
+    # siunitx wants the u in the last digit: 13.9(12) for 13.9(1.2).
+    power = f"e{int(found[3])}" if found[3] else ""
+    return _tex_number(f"{found[1]}{(found[2] or '').replace('.', '')}{power}", estimate.unit)
 
 
 def _tex_number(number: str, unit: str) -> str:

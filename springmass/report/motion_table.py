@@ -9,35 +9,21 @@ from pipeline.numerics.quantity import Unit, noun
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import UNUSABLE
 
-COLUMNS = (
-    "time_s",
-    "distance_m",
-    "used",
-    "position_m",
-    "u_position_m",
-    "velocity_m_per_s",
-    "u_velocity_m_per_s",
-    "acceleration_m_per_s2",
-    "u_acceleration_m_per_s2",
-)
-"""Columns of ``motion.csv`` for a length; distance and used belong to the sample itself, the others are smoothed."""
-
 MOST_ROWS = 1_000_000
 
 
 def columns_of(unit: str) -> tuple[str, ...]:
-    """Return the columns of ``motion.csv`` for a record in a unit.
+    """Return the columns of ``motion.csv``: time, value and used belong to the sample, the others are smoothed.
 
-    >>> columns_of("rad")[3:7]
-    ('smooth_angle_rad', 'u_smooth_angle_rad', 'derivative_rad_per_s', 'u_derivative_rad_per_s')
+    >>> columns_of("rad")[1:6]
+    ('angle_rad', 'used', 'smooth_angle_rad', 'u_smooth_angle_rad', 'derivative_rad_per_s')
     """
-    if unit == "m":
-        return COLUMNS
     word = noun(unit).replace(" ", "_")
     names = (f"smooth_{word}", "derivative", "second_derivative")
+    if unit == "m":
+        word, names = "distance", ("position", "velocity", "acceleration")
     smooth = [f"{name}{_spelt(Unit(1, -order).of(unit))}" for order, name in enumerate(names)]
-    own = f"{word}{_spelt(unit)}"
-    return ("time_s", own, "used", *(x for each in smooth for x in (each, f"u_{each}")))
+    return ("time_s", f"{word}{_spelt(unit)}", "used", *(x for each in smooth for x in (each, f"u_{each}")))
 
 
 def _spelt(unit: str) -> str:
@@ -46,28 +32,18 @@ def _spelt(unit: str) -> str:
     return f"_{spelt}" if spelt else ""
 
 
-def row_step(analysis: Analysis) -> int:
-    """Return n if every n-th sample has a line in ``motion.csv``; n is 1 for up to a million samples."""
-    return -(-len(analysis.track) // MOST_ROWS)
-
-
 def motion_csv(analysis: Analysis, smoothed: Smoothed) -> str:
     """Return CSV with one line per sample in the record's order, with the columns from :func:`columns_of`.
 
     Times keep all their digits; other values keep ten, which exceeds their accuracy. NaN becomes an empty cell: a
     missing distance, or the motion at a sample without a time or outside the analysed part. Records of more than a
-    million samples have a line for every second or third sample; see :func:`row_step`.
+    million samples have a line for every second or third sample.
     """
     used = (analysis.flags & UNUSABLE) == 0
-    motion = (
-        smoothed.position,
-        smoothed.u_position,
-        smoothed.velocity,
-        smoothed.u_velocity,
-        smoothed.acceleration,
-        smoothed.u_acceleration,
-    )
-    table = np.column_stack([analysis.track.t, analysis.track.y, used, *motion])[:: row_step(analysis)]
+    orders = ("position", "velocity", "acceleration")
+    motion = [getattr(smoothed, f"{u}{name}") for name in orders for u in ("", "u_")]
+    every = -(-len(analysis.track) // MOST_ROWS)
+    table = np.column_stack([analysis.track.t, analysis.track.y, used, *motion])[::every]
     line = ",".join(["%.17g", "%.10g", "%d", *["%.10g"] * 6]) + "\n"
     # One format string for many lines takes a third of the time of numpy, which formats them one by one.
     blocks = (table[at : at + 1000] for at in range(0, len(table), 1000))

@@ -32,18 +32,26 @@ def notes_of(recorded: Mapping[str, Any]) -> tuple[Note, ...]:
     """Return marks and events of a recording in the order of their times."""
     marks = [Note(mark["t_s"], visible(str(mark["text"])), "mark") for mark in recorded.get("marks", ())]
     events = [
-        Note(event["t_s"], _facts(event.get("facts", {})), str(event["kind"])) for event in recorded.get("events", ())
+        Note(event["t_s"], visible(event_words(event["kind"], event.get("facts", {}))), str(event["kind"]))
+        for event in recorded.get("events", ())
     ]
     return tuple(sorted([*marks, *events], key=lambda note: note.t_s))
 
 
-def _facts(facts: Mapping[str, Any]) -> str:
-    parts = (
-        f"{name.replace('_', ' ')} {value:g}" if isinstance(value, float) else f"{name} {value}".replace("_", " ")
-        for name, value in facts.items()
-        if value is not None
-    )
-    return visible(", ".join(parts))
+def event_words(kind: str, facts: Mapping[str, Any], *, named: bool = False) -> str:
+    """Return an event in words; of most kinds the names and values of its facts, ``named`` by the kind."""
+    try:
+        if kind == "still":
+            return f"Zero {1e3 * facts['rest_m']:.1f} mm, noise {1e3 * facts['noise_m']:.2f} mm"
+        if kind == "trigger":
+            return f"Trigger at {1e3 * facts['threshold_m']:.0f} mm, {facts['keep_s']:g} s kept"
+        if kind == "note":
+            return f"Note: {facts['text']}"
+    except (KeyError, TypeError, ValueError):  # a log by another program may state other facts
+        pass
+    known = {name.replace("_", " "): value for name, value in facts.items() if value is not None}
+    words = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in known.items())
+    return ": ".join(filter(None, (kind, words))) if named else words
 
 
 def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:

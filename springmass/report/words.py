@@ -1,16 +1,19 @@
-"""Parts of a result in words: numbers that do not break, equations, the damping law, the method."""
+"""The result of a run in words: the summary, the damping law, the method."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.analyse import Analysis, Oscillation
+from pipeline.analyse import Analysis, Oscillation, Still
 from pipeline.damping.laws import words_of
+from pipeline.numerics.quantity import noun
+from pipeline.registry.quantities import INPUTS
+from pipeline.results.budget import Contribution
 from pipeline.track import UNUSABLE
+from springmass.report.advice import harm_of, sentence, trust_of, trust_text
 from springmass.report.budgets import budgets_of
-from springmass.report.trust import trust_of
 from springmass.runs.rows import is_about
-from springmass.typeset import kept, pretty_number, unbroken
+from springmass.typeset import kept, prefixed, pretty_number, typeset, unbroken
 
 
 def method(analysis: Analysis) -> tuple[str, ...]:
@@ -84,9 +87,7 @@ def damping_sentence(analysis: Analysis) -> str:
     else:
         text = f"The amplitude falls by {chosen}"
     if damping.by_statement:
-        text += ", as you stated"
-    if damping.by_statement:
-        return f"{text}."
+        return f"{text}, as you stated."
     if possible:
         more = len(possible) - NAMED_LAWS
         if more > 1:
@@ -99,12 +100,9 @@ def damping_sentence(analysis: Analysis) -> str:
     others, rejected = len(damping.fits) - 1, sum(fit.rejected for fit in damping.fits.values())
     if not others:
         return f"{text}; no other law was tried."
-    if others == 1:
-        return f"{text}; the other law is {'rejected' if rejected else 'unlikely'}."
-    if rejected == others:
-        return f"{text}; the recording rejects all {others} other laws."
-    if not rejected:
-        return f"{text}; all {others} other laws are unlikely."
+    if rejected in (0, others):
+        all_others = "the other law is" if others == 1 else f"all {others} other laws are"
+        return f"{text}; {all_others} {'rejected' if rejected else 'unlikely'}."
     ruled_out = f"{rejected} {'is' if rejected == 1 else 'are'} rejected and {others - rejected} unlikely"
     return f"{text}; of {others} other laws {ruled_out}."
 
@@ -112,3 +110,60 @@ def damping_sentence(analysis: Analysis) -> str:
 def listed(words: Sequence[str]) -> str:
     """Join words with commas and an "and"."""
     return " and ".join(words) if len(words) < 3 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
+    """Return (title, text) of each part of the summary."""
+    motion, warnings = analysis.motion, [f for f in analysis.findings if f.severity != "info"]
+    ordered = sorted(warnings, key=lambda f: harm_of(f.code, f.severity))
+    to_do = ordered[0].advice if ordered else ""
+    if not isinstance(motion, Oscillation):
+        why = sentence(typeset(motion.why))
+        if isinstance(motion, Still) and "first_mode_period" not in analysis.estimates:
+            why = "Nothing oscillates in this recording; it gives mean and noise only."
+        return (("Result", why), *((("What to do", to_do),) if to_do else ()))
+    greatest = _greatest(analysis)
+    if not to_do:
+        to_do = "Nothing needs attention."
+        if greatest is not None:
+            symbol, it = greatest
+            way = "record longer" if it.kind == "A" else f"find the {INPUTS[it.name].label} more accurately"
+            to_do += f" To know {symbol} better, {way}."
+    if (
+        "spring_constant" not in analysis.estimates
+        and analysis.scene.bob_mass_kg is None
+        and analysis.track.unit == "m"
+    ):
+        to_do += " For the spring constant, state the mass: --mass-kg KG."
+    return (("Values", _values(analysis, motion)), ("How sure", _trust(analysis, greatest)), ("What to do", to_do))
+
+
+def _values(analysis: Analysis, motion: Oscillation) -> str:
+    x, unit = analysis.estimates, analysis.track.unit
+    moves = "bob swings" if unit == "m" else f"{noun(unit)} oscillates"
+    parts = [f"the {moves} with the period T\u00a0=\u00a0{kept(x['period'])}"]
+    if "spring_constant" in x:
+        parts.append(f"the mass gives the spring constant k\u00a0=\u00a0{kept(x['spring_constant'])}")
+    start = f"{motion.damping.t0:.2f}\u00a0s"
+    parts.append(
+        f"its amplitude by the fit at t\u00a0=\u00a0{start} is A₀\u00a0=\u00a0{kept(prefixed(x['amplitude']))}"
+    )
+    if "damping_rate" in x:
+        parts.append(f"its damping rate at the start is λ\u00a0=\u00a0{kept(x['damping_rate'])}")
+    return f"{sentence('; '.join(parts))} {damping_sentence(analysis)}"
+
+
+def _trust(analysis: Analysis, greatest: tuple[str, Contribution] | None) -> str:
+    noise = "more than noise" if is_about(analysis, "residuals") else "only noise"
+    text = f"{trust_text(analysis, page=True)} The fit leaves {noise} in the residuals"
+    if greatest is not None:
+        symbol, it = greatest
+        text += f"; {100.0 * it.share:.0f}\u00a0% of u({symbol})² comes from the {INPUTS[it.name].label}"
+    return f"{text}."
+
+
+def _greatest(analysis: Analysis) -> tuple[str, Contribution] | None:
+    """Return the largest part of the variance of the spring constant, or else of the period, with its symbol."""
+    rows = {row.name: row.contributions for row in budgets_of(analysis)}
+    chosen = ((symbol, rows[name][0]) for name, symbol in (("spring_constant", "k"), ("period", "T")) if rows.get(name))
+    return next(chosen, None)

@@ -18,7 +18,7 @@ from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import amplitude_csv, motion_csv
 from springmass.report.recorded import notes_of
-from springmass.report.summary import summary as sentences
+from springmass.report.words import summary as in_words
 from springmass.runs.comparing import Compared
 from springmass.runs.frames import smoothed_or_why
 from springmass.runs.json_results import plain
@@ -56,40 +56,6 @@ def write_report(
     directory, stems = Path(directory), _stems([run.name for run in runs])
     pdf: tuple[Kind, ...] = ("pdf",) if template is not None else ()
     kinds = list(dict.fromkeys((*figures, *pdf)))
-    with whole_folder(directory, _names(stems), PAGE) as folder:
-        _write(folder, runs, stems, compared, summary, kinds, script)
-        if template is not None:
-            _write_lab_report(folder, runs[0])
-    detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
-    return directory / PAGE
-
-
-def _names(stems: Sequence[str]) -> set[str]:
-    """Return the names of all files that a report of these runs may contain, or one of 0.2.0."""
-    charts = [f"{stem}{name}" for stem in stems for name in (*CHARTS, "classic", "logarithmic")]
-    figures = {
-        f"figures/{name}.{kind}"
-        for name in (*charts, "comparison", "overlay", "masses", "hooke")
-        for kind in get_args(Kind)
-    }
-    return {
-        PAGE,
-        LAB_REPORT,
-        *TABLES,
-        *figures,
-        *(f"{stem}{name}.csv" for stem in stems for name in ("motion", "amplitude")),
-    }
-
-
-def _write(
-    folder: Path,
-    runs: Sequence[Run],
-    stems: Sequence[str],
-    compared: Compared | None,
-    summary: Mapping[str, Any] | None,
-    kinds: Sequence[Kind],
-    script: str,
-) -> None:
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
     motions = [smoothed_or_why(analysis) for analysis in analyses]
     charts = [
@@ -105,49 +71,60 @@ def _write(
             several["masses"] = masses(compared.line)
         if compared.hooke is not None:
             several["hooke"] = static(compared.hooke)
-    pictures: dict[str, bytes] = {}
-    if kinds:
-        (folder / "figures").mkdir()
-        for stem, own in (("", several), *zip(stems, charts, strict=True)):
-            drawn = save(list(own.values()), folder / "figures", kinds, stem)
-            pictures |= {f"{stem}{name}": files["svg"] for name, files in drawn.items() if "svg" in files}
-    for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
-        if not isinstance(smoothed, str):
-            write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))
-        if amplitudes := amplitude_csv(analysis):
-            write_whole(folder / f"{stem}amplitude.csv", amplitudes)
-    results = [run.result for run in runs]
-    content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
-    text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    # Lone surrogates, which a file's name may contain, are written as JSON escapes.
-    tables: tuple[bytes | str, ...] = (
-        text.encode("utf-8", "backslashreplace"),
-        results_csv(names, analyses),
-        table_tex(names, analyses),
-        budget_csv(names, analyses),
-        budget_tex(names, analyses),
-    )
-    for name, table in zip(TABLES, tables, strict=True):
-        write_whole(folder / name, table)
-    page = render_html(
-        runs,
-        charts,
-        compared=compared,
-        several=several,
-        pictures=pictures,
-        stems=stems,
-        provenance=(summary or results[0])["provenance"],
-        script=script,
-    )
-    write_whole(folder / PAGE, page)
+    with whole_folder(directory, _names(stems), PAGE) as folder:
+        pictures: dict[str, bytes] = {}
+        if kinds:
+            (folder / "figures").mkdir()
+            for stem, own in (("", several), *zip(stems, charts, strict=True)):
+                drawn = save(list(own.values()), folder / "figures", kinds, stem)
+                pictures |= {f"{stem}{name}": files["svg"] for name, files in drawn.items() if "svg" in files}
+        for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
+            if not isinstance(smoothed, str):
+                write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))
+            if amplitudes := amplitude_csv(analysis):
+                write_whole(folder / f"{stem}amplitude.csv", amplitudes)
+        results = [run.result for run in runs]
+        content = plain(summary if summary is not None else results[0] if len(results) == 1 else results)
+        text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+        # Lone surrogates, which a file's name may contain, are written as JSON escapes.
+        tables: tuple[bytes | str, ...] = (
+            text.encode("utf-8", "backslashreplace"),
+            results_csv(names, analyses),
+            table_tex(names, analyses),
+            budget_csv(names, analyses),
+            budget_tex(names, analyses),
+        )
+        for name, table in zip(TABLES, tables, strict=True):
+            write_whole(folder / name, table)
+        page = render_html(
+            runs,
+            charts,
+            compared=compared,
+            several=several,
+            pictures=pictures,
+            stems=stems,
+            provenance=(summary or results[0])["provenance"],
+            script=script,
+        )
+        write_whole(folder / PAGE, page)
+        if template is not None:
+            captions = {name: charts[0][name].caption for name in OF_LAB_REPORT if name in charts[0]}
+            sentences = [text for title, text in in_words(analyses[0]) if title != "What to do"]
+            write_whole(folder / LAB_REPORT, lab_report_tex(runs[0], captions, sentences))
+    detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
+    return directory / PAGE
 
 
-def _write_lab_report(folder: Path, run: Run) -> None:
-    """Write the document to complete, with the figures for a lab report."""
-    charts = charts_of(run.analysis)
-    captions = {name: charts[name].caption for name in OF_LAB_REPORT if name in charts}
-    text = [text for title, text in sentences(run.analysis) if title != "What to do"]
-    write_whole(folder / LAB_REPORT, lab_report_tex(run, captions, text))
+def _names(stems: Sequence[str]) -> set[str]:
+    """Return the names of all files that a report of these runs may contain, or one of 0.2.0."""
+    charts = [f"{stem}{name}" for stem in stems for name in (*CHARTS, "classic", "logarithmic")]
+    figures = {
+        f"figures/{name}.{kind}"
+        for name in (*charts, "comparison", "overlay", "masses", "hooke")
+        for kind in get_args(Kind)
+    }
+    tables = (f"{stem}{name}.csv" for stem in stems for name in ("motion", "amplitude"))
+    return {PAGE, LAB_REPORT, *TABLES, *figures, *tables}
 
 
 def _stems(names: Sequence[str]) -> list[str]:

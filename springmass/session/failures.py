@@ -1,7 +1,11 @@
-"""Failures that do not end a recording: counted, written into the run once, and reported at its end."""
+"""Failures that do not end a recording: counted, written into the run once, and reported at its end.
+
+A ``Worker`` does what may fail or wait, such as showing the recording, on a thread of its own.
+"""
 
 from __future__ import annotations
 
+import queue
 import threading
 import traceback
 from collections.abc import Callable, Mapping
@@ -10,9 +14,8 @@ from typing import Any
 
 from storage.errors import one_line
 
-KINDS = 20
-"""Maximum number of kinds of failure counted separately; all further kinds are counted together."""
-OTHERS = "others"
+PATIENCE_S = 1.0
+"""Maximum time that the end of a recording waits for a worker's last step, s."""
 
 
 class Failures:
@@ -31,11 +34,8 @@ class Failures:
         where = raised_at(error)
         name = f"{what}: {type(error).__name__} at {where}"
         with self._lock:
-            known = name in self._counts
-            if not known and len(self._counts) >= KINDS:
-                name, known = OTHERS, True
+            tell = None if name in self._counts else self.tell
             self._counts[name] = self._counts.get(name, 0) + 1
-            tell = None if known else self.tell
         if tell is not None:
             tell(f"{what}_failed", {"error": type(error).__name__, "why": one_line(error), "where": where})
 
@@ -57,3 +57,40 @@ def raised_at(error: BaseException) -> str:
     """Return the file name, without its folder, and the line that raised an error."""
     frames = traceback.extract_tb(error.__traceback__)
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else "nowhere"
+
+
+class Worker:
+    """Takes steps in turn on a daemon thread; ``failed`` gets what a step raises, on that thread, and work goes on."""
+
+    def __init__(self, name: str, failed: Callable[[BaseException], None]) -> None:
+        self.failed = failed
+        self._steps: queue.SimpleQueue[Callable[[], object] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name=f"springmass-{name}", daemon=True)
+        try:
+            self._thread.start()
+        except RuntimeError as error:  # no memory for a thread
+            failed(error)
+
+    @property
+    def idle(self) -> bool:
+        """Whether no step waits for its turn."""
+        return self._steps.empty()
+
+    def put(self, step: Callable[[], object]) -> None:
+        """Add a step, without waiting for it."""
+        self._steps.put(step)
+
+    def close(self, why: str) -> None:
+        """Take no more steps, and wait for the last one; if it hangs, ``why`` is a failure."""
+        if self._thread.ident is not None:
+            self._steps.put(None)
+            self._thread.join(PATIENCE_S)
+            if self._thread.is_alive():
+                self.failed(TimeoutError(why))
+
+    def _work(self) -> None:
+        while (step := self._steps.get()) is not None:
+            try:
+                step()
+            except BaseException as error:  # no error of a display may cost a reading
+                self.failed(error)

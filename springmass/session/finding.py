@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import describe_bytes, probe
@@ -16,19 +15,12 @@ PROBE_S = 1.0
 BAUDS = (115200, 9600)
 
 
-@dataclass(frozen=True, slots=True)
-class Named:
-    """Ports of a recording, with the family of the sensor on each, and their speed if it was measured."""
-
-    ports: tuple[str, ...]
-    sensors: tuple[str, ...]
-    baud: int | None
-
-
-def name_sensors(ports: tuple[str, ...], sensors: tuple[str, ...], baud: int | None) -> Named:
-    """Return ports and sensors of a recording; those that were not named are known by what speaks on the ports."""
+def name_sensors(
+    ports: tuple[str, ...], sensors: tuple[str, ...], baud: int | None
+) -> tuple[tuple[str, ...], tuple[str, ...], int | None]:
+    """Return ports, families and speed of a recording; what was not named is known by what speaks on the ports."""
     if ports and sensors:
-        return Named(ports, sensors, baud)
+        return ports, sensors, baud
     addresses = ports or [port.device for port in list_ports()]
     descriptions, known = [], []
     for address in addresses:
@@ -47,7 +39,7 @@ def name_sensors(ports: tuple[str, ...], sensors: tuple[str, ...], baud: int | N
     for address, name, speed in known:
         tell(f"{address}: a {name} sensor at {speed} baud")
     measured = known[0][2] if len(known) == 1 else None
-    return Named(tuple(each[0] for each in known), tuple(each[1] for each in known), baud or measured)
+    return tuple(each[0] for each in known), tuple(each[1] for each in known), baud or measured
 
 
 def listen(device: str, bauds: Sequence[int] = BAUDS) -> tuple[str, list[str], int]:

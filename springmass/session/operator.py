@@ -7,13 +7,12 @@ sensors, which has a separate thread. The page is informed of each action after 
 from __future__ import annotations
 
 import contextlib
-import queue
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import CalibrationError
 from acquisition.live.calibration import StillPoint
@@ -22,20 +21,14 @@ from springmass.session.trigger import Trigger
 from storage.errors import WriteFailed
 from storage.recorder import Recorder
 
+if TYPE_CHECKING:
+    from springmass.page.process import PageProcess
+
 LOOK_S = 0.05
 PREVIEW_NS = 600_000_000_000
 """Maximum duration of a preview log; then a new log replaces it, and the old one is deleted."""
 STILL_S = 3.0
 LONGEST_KEEP_S = 60.0
-
-
-class Page(Protocol):
-    """The part of the page that the operator uses."""
-
-    requests: queue.SimpleQueue[dict[str, Any]]
-
-    def tell(self, phase: str, **facts: Any) -> None:
-        """Report the state of the recording."""
 
 
 class Closed(Exception):
@@ -47,7 +40,7 @@ class Operator:
     """Carries out requests from the page until a run begins in ``log``, at a listening session."""
 
     session: Session
-    page: Page
+    page: PageProcess
     log: Path
     rest: StillPoint | None = None
     _folder: Path | None = None

@@ -18,9 +18,7 @@ from acquisition.decoders.family import Family
 from acquisition.live.decoding import SensorChain
 from pipeline.options import options_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
-from springmass.session.failures import Failures
-from springmass.session.reads import Tee
-from storage.recorder import Recorder, RecorderStatus
+from storage.recorder import RecorderStatus
 from storage.wire_log.wire_samples import Origin
 
 SECOND_NS = 1_000_000_000
@@ -80,39 +78,37 @@ class Usefulness:
     def __init__(self) -> None:
         self.usable = 0
         self._last = math.nan
-        self._end = self._missing_since = self._same_since = math.nan
+        self._end = self._target = self._change = math.nan  # times of the last sample, distance and change of it
 
     def push(self, block: Block) -> None:
         """Take samples."""
         if not len(block):
             return
-        known = np.isfinite(block.distance)
-        self.usable += int(np.count_nonzero(known))
+        if math.isnan(self._end):
+            self._target = self._change = float(block.t[0])
         self._end = float(block.t[-1])
-        if known.any():
-            behind = int(np.flatnonzero(known)[-1]) + 1
-            self._missing_since = float(block.t[behind]) if behind < len(block) else math.nan
-            distance = block.distance[known]
-            changed = np.flatnonzero(np.diff(distance, prepend=self._last) != 0.0)  # the first differs from NaN
+        if (known := np.isfinite(block.distance)).any():
+            t, distance = block.t[known], block.distance[known]
+            self.usable += t.size
+            self._target = float(t[-1])
+            changed = np.flatnonzero(np.diff(distance, prepend=self._last))  # the first differs from NaN
             if changed.size:
-                self._same_since = float(block.t[known][changed[-1]])
+                self._change = float(t[changed[-1]])
             self._last = float(distance[-1])
-        elif math.isnan(self._missing_since):
-            self._missing_since = float(block.t[0])
 
     def trouble(self, family: Family) -> Trouble | None:
         """Return the trouble and what to check; None if there is no trouble."""
-        near, far = family.range_m
-        if self._end - self._missing_since >= USELESS_S:
+        (near, far), missing_s, same_s = family.range_m, self._end - self._target, self._end - self._change
+        if missing_s >= USELESS_S:
             return Trouble(
                 TroubleKind.NO_TARGET,
-                f"no target for {self._end - self._missing_since:.0f} s: check that the bob hangs over the sensor, "
+                f"no target for {missing_s:.0f} s: check that the bob hangs over the sensor, "
                 f"{near:g} to {far:g} m away, and that the sensor points at it",
             )
-        if self._end - self._same_since >= USELESS_S:
+        if same_s >= USELESS_S:
             return Trouble(
                 TroubleKind.UNCHANGED,
-                f"{self._last * 1e3:.1f} mm unchanged for {self._end - self._same_since:.0f} s: "
+                f"{self._last * 1e3:.1f} mm unchanged for {same_s:.0f} s: "
                 "does the bob hang still, or does something fixed stand in the beam?",
             )
         return None
@@ -195,50 +191,7 @@ def demand_room() -> None:
         raise MemoryError(f"{ROOM_BYTES >> 20} MiB are not available") from error
 
 
-def progress_of(
-    shown: LiveState,
-    failures: Failures,
-    chains: Sequence[SensorChain],
-    tee: Tee,
-    recorder: Recorder | None,
-    start_ns: int,
-    now_ns: int,
-    marks: Sequence[tuple[int, str]] = (),
-    *,
-    tick: bool = True,
-) -> Progress:
-    """Return the progress of a recording; without a recorder, the recording is waiting for its trigger."""
-
-    def motion() -> LiveMotion | NotYet:
-        """Return the motion, or the reason why its calculation failed; the rest of the line is not affected."""
-        try:
-            return shown.motion(now_ns)
-        except BaseException as error:
-            failures.note("analysis", error)
-            return NotYet(f"no motion shown ({type(error).__name__})")
-
-    shown.follow(tee.first)
-    zero_ns = start_ns if shown.origin.ns is None else shown.origin.ns
-    return Progress(
-        seconds=(now_ns - start_ns) * 1e-9,
-        missing=shown.missing,
-        gaps=sum(len(chain.timebase.gaps) + int(chain.timebase.gaps_left_out["count"]) for chain in chains),
-        rate_hz=shown.rate_hz(now_ns),
-        motion=motion,
-        status=None if recorder is None else recorder.status,
-        disk_free_bytes=None if recorder is None else _free_bytes(recorder.path.parent),
-        waiting=recorder is None,
-        unshown=tee.unshown,
-        gone=tuple(tee.gone.values()),
-        silent_s=shown.silent_s(now_ns),
-        missing_share=shown.missing_share,
-        trouble=_trouble(shown, chains, waiting=recorder is None),
-        marks=[((host_ns - zero_ns) * 1e-9, text) for host_ns, text in marks],
-        tick=tick,
-    )
-
-
-def _trouble(shown: LiveState, chains: Sequence[SensorChain], *, waiting: bool) -> Trouble | None:
+def trouble_of(shown: LiveState, chains: Sequence[SensorChain], *, waiting: bool) -> Trouble | None:
     """Return the trouble of the first sensor in channel order that has one."""
     for channel, useful in sorted(shown.useful.items()):
         trouble = useful.trouble(chains[channel].family)
@@ -250,8 +203,9 @@ def _trouble(shown: LiveState, chains: Sequence[SensorChain], *, waiting: bool) 
     return None
 
 
-def _free_bytes(folder: Path) -> int | None:
+def free_bytes(folder: Path) -> int | None:
+    """Return the free space of a folder's disk; None if the folder was renamed, which is reported elsewhere."""
     try:
         return shutil.disk_usage(folder).free
-    except OSError:  # the folder was renamed, which is reported elsewhere
+    except OSError:
         return None

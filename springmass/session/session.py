@@ -1,7 +1,7 @@
 """Run a recording session: listen to the sensors on open ports, and record their bytes until the end.
 
 The reading thread passes bytes unchanged to the recorder, and then through the decoders. The session's own thread waits
-for the end and puts marks into the run. The displayed values are calculated on a separate thread (``display``), which
+for the end and puts marks into the run. The displayed values are calculated on a separate thread, which
 takes samples once a second. It cannot delay or end the other two threads, not even by an exception.
 """
 
@@ -11,7 +11,7 @@ import contextlib
 import math
 import queue
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,11 +23,11 @@ from acquisition.block import Block
 from acquisition.clock import Clock
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortReader
+from pipeline.streaming import LiveMotion, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
-from springmass.session.display import Display, Samples
-from springmass.session.failures import Failures
-from springmass.session.progress import SECOND_NS, LiveState, Progress, progress_of
+from springmass.session.failures import Failures, Worker
+from springmass.session.progress import SECOND_NS, LiveState, Progress, free_bytes, trouble_of
 from springmass.session.reads import Tee
 from springmass.session.sensors import ANSWERED, Sensor, meeting
 from springmass.session.trigger import Disarmed, Trigger, Watch
@@ -37,12 +37,13 @@ from storage.recorder import Recorder, RecorderStatus
 from storage.wire_log.records import LogHeader
 from storage.wire_log.scanning import LogContents
 
-SAY_NS = 1_500_000_000  # silence before a run that is reported, ns
 HEAR_S = 3.0  # silence before a run after which the sensor counts as absent
 HEARD = 3  # number of readings after which a sensor counts as heard
 LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # maximum number of blocks kept for the display before the run begins
 BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
+
+Samples = Sequence[tuple[int, Block]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +105,7 @@ class Session:
         self._marks: list[tuple[int, str]] = []
 
     def listen(self, say: Callable[[str], None] = lambda _: None) -> None:
-        """Start reading, and wait until every sensor has been heard; ``say`` gets lines about silence and identities.
+        """Start reading, and wait until every sensor has been heard; ``say`` gets lines about what they are.
 
         A sensor that is not heard after 3 s, or after five periods of a slow sensor, raises a ProgramError that
         describes what was received instead.
@@ -118,14 +119,9 @@ class Session:
         # A slow sensor can be distinguished from silence only after several of its periods.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
-        due_ns: int | None = self._clock.now_ns() + SAY_NS
         while self._waits_for_word() or any(getattr(chain.decoder, "undecided", False) for chain in self._chains):
-            mute = next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)
-            if mute is not None and due_ns is not None and self._clock.now_ns() > due_ns:
-                say(f"{self.sensors[mute].port.name}: nothing readable so far; check power, wiring and --baud")
-                due_ns = None
             if self._clock.now_ns() > deadline:
-                if mute is None:
+                if (mute := next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)) is None:
                     break
                 self._end_unheard(mute)
             self._wait_until(self._clock.now_ns() + 50_000_000)
@@ -209,24 +205,22 @@ class Session:
         self._chains = [sensor.chain() for sensor in self.sensors]
         with self.stops.counted():
             recorder = self.recorder = Recorder(log, self._header(), self._clock)
-            display = self._display(listeners.progress)
             start_ns = self._clock.now_ns()
             self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
-            try:
-                self._tee.start(recorder, self._chains, since_ns)
-                listeners.begun(recorder.path)
-                if rest is not None:
-                    recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
-                if trigger is not None:
-                    facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
-                    # The time of the sample itself, because an analysis leaves out the rest before it.
-                    recorder.event(0, moment_ns, "trigger", facts)
-                by = self._loop(recorder, display, start_ns, limits.seconds, listeners.marks)
-            finally:
-                self._tee.stop()
-                end_ns = self._clock.now_ns()
-                display.close()
-                self.failures.tell = None
+            with self._display(listeners, start_ns, recorder) as show:
+                try:
+                    self._tee.start(recorder, self._chains, since_ns)
+                    listeners.begun(recorder.path)
+                    if rest is not None:
+                        recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
+                    if trigger is not None:
+                        facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
+                        # The time of the sample itself, because an analysis leaves out the rest before it.
+                        recorder.event(0, moment_ns, "trigger", facts)
+                    by = self._loop(recorder, show, start_ns, limits.seconds, listeners.marks)
+                finally:
+                    self._tee.stop()
+                    end_ns = self._clock.now_ns()
             counts = self.failures.counts
             recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
             with contextlib.suppress(WriteFailed):  # the status states the error
@@ -252,20 +246,16 @@ class Session:
     def _loop(
         self,
         recorder: Recorder,
-        display: Display,
+        show: Callable[..., None],
         start_ns: int,
         seconds: float | None,
         marks: queue.SimpleQueue[str] | None,
     ) -> EndReason:
         """Wait for the end of the recording, and return the reason for it."""
-
-        def show(*, tick: bool = True) -> None:
-            self._ring(display, self._tee.blocks, start_ns, recorder, tick=tick)
-
         end_ns = None if seconds is None else start_ns + int(seconds * 1e9)
         # Without marks, one turn per second suffices: samples are shown once a second, and a disk error persists.
         wait_ns, tick_ns = int((1.0 if marks is None else LOOK_FOR_MARKS_S) * 1e9), start_ns + SECOND_NS
-        show(tick=False)
+        show(self._tee.blocks, tick=False)
         while end_ns is None or self._clock.now_ns() < end_ns:
             turn_ns = min(self._clock.now_ns() + wait_ns, tick_ns, tick_ns if end_ns is None else end_ns)
             try:
@@ -278,14 +268,14 @@ class Session:
                 now_ns, text = self._clock.now_ns(), marks.get()
                 recorder.mark(text, host_ns=now_ns)
                 self._marks.append((now_ns, text))
-                show(tick=False)
+                show(self._tee.blocks, tick=False)
             if turn_ns == end_ns:
                 break
             if turn_ns == tick_ns:
-                show()
+                show(self._tee.blocks)
                 tick_ns += SECOND_NS
         self._tee.stop()  # data received while the last line is shown are not part of the run
-        show()
+        show(self._tee.blocks)
         return EndReason.SECONDS
 
     def _wait_for(self, trigger: Trigger, rest: StillPoint | None, listeners: RunListeners) -> int:
@@ -293,9 +283,9 @@ class Session:
         watch = Watch(trigger, math.nan if rest is None else rest.rest_m)
         keep_ns, start_ns = int(trigger.keep_s * 1e9), self._clock.now_ns()
         self._tee.keep(True)
-        display, tick_ns = self._display(listeners.progress), start_ns + SECOND_NS
+        tick_ns = start_ns + SECOND_NS
         seen: deque[tuple[int, Block]] = deque(maxlen=HELD_BLOCKS)
-        try:
+        with self._display(listeners, start_ns, None) as show:
             while True:
                 for channel, block in self.poll(LOOK_FOR_TRIGGER_S):
                     seen.append((channel, block))
@@ -308,10 +298,8 @@ class Session:
                 # One second more than needed, because samples may wait for a moment before they are examined.
                 self._tee.forget(self._clock.now_ns() - keep_ns - SECOND_NS)
                 if self._clock.now_ns() >= tick_ns:
-                    self._ring(display, lambda: [seen.popleft() for _ in range(len(seen))], start_ns, None)
+                    show(lambda: [seen.popleft() for _ in range(len(seen))])
                     tick_ns += SECOND_NS
-        finally:
-            display.close()
 
     def _wait_until(self, deadline_ns: int) -> None:
         """Wait until a deadline or a request to end, and record a failure of the reader, if any."""
@@ -322,22 +310,66 @@ class Session:
             self._reader_failure = failure
             self.failures.note("reader", failure)
 
-    def _display(self, progress: Callable[[Progress], None]) -> Display:
-        self.shown = LiveState(self._chains[0].timebase.rate_hz)
-        return Display(self.shown, progress, self.failures)
+    @contextlib.contextmanager
+    def _display(
+        self, listeners: RunListeners, start_ns: int, recorder: Recorder | None
+    ) -> Iterator[Callable[..., None]]:
+        """Yield a function that takes samples and shows the state, on a thread that cannot delay or end the recording.
 
-    def _ring(
-        self,
-        display: Display,
-        take: Callable[[], Samples],
-        start_ns: int,
-        recorder: Recorder | None,
-        *,
-        tick: bool = True,
-    ) -> None:
-        now_ns = self._clock.now_ns()
-        state = (self.failures, self._chains, self._tee, recorder, start_ns, now_ns, tuple(self._marks))
-        display.ring(take, lambda shown: progress_of(shown, *state, tick=tick))
+        A display that is still busy skips a turn, and shows the latest state at its next one.
+        """
+        self.shown = shown = LiveState(self._chains[0].timebase.rate_hz)
+        worker = Worker("display", lambda error: self.failures.note("display", error))
+
+        def show(take: Callable[[], Samples], *, tick: bool = True) -> None:
+            now_ns = self._clock.now_ns()
+
+            def turn() -> None:
+                shown.push(take())
+                listeners.progress(self._progress(shown, start_ns, now_ns, recorder, tick=tick))
+
+            if worker.idle:
+                worker.put(turn)
+
+        try:
+            yield show
+        finally:
+            worker.close("the last turn has not ended")
+            self.failures.tell = None  # the log takes no more events
+
+    def _progress(
+        self, shown: LiveState, start_ns: int, now_ns: int, recorder: Recorder | None, *, tick: bool
+    ) -> Progress:
+        """Return the progress of the recording; without a recorder, it is waiting for its trigger."""
+
+        def motion() -> LiveMotion | NotYet:
+            """Return the motion, or the reason why its calculation failed; the rest of the line is not affected."""
+            try:
+                return shown.motion(now_ns)
+            except BaseException as error:
+                self.failures.note("analysis", error)
+                return NotYet(f"no motion shown ({type(error).__name__})")
+
+        tee, chains, waiting = self._tee, self._chains, recorder is None
+        shown.follow(tee.first)
+        zero_ns = start_ns if shown.origin.ns is None else shown.origin.ns
+        return Progress(
+            seconds=(now_ns - start_ns) * 1e-9,
+            missing=shown.missing,
+            gaps=sum(len(chain.timebase.gaps) + int(chain.timebase.gaps_left_out["count"]) for chain in chains),
+            rate_hz=shown.rate_hz(now_ns),
+            motion=motion,
+            status=None if recorder is None else recorder.status,
+            disk_free_bytes=None if recorder is None else free_bytes(recorder.path.parent),
+            waiting=waiting,
+            unshown=tee.unshown,
+            gone=tuple(tee.gone.values()),
+            silent_s=shown.silent_s(now_ns),
+            missing_share=shown.missing_share,
+            trouble=trouble_of(shown, chains, waiting=waiting),
+            marks=[((host_ns - zero_ns) * 1e-9, text) for host_ns, text in self._marks],
+            tick=tick,
+        )
 
     def _header(self) -> LogHeader:
         return LogHeader(

@@ -8,19 +8,16 @@ writes are counted, and the end waits at most a second for the thread.
 from __future__ import annotations
 
 import os
-import queue
 import sys
 import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TextIO
 
 from acquisition.errors import visible
+from springmass.session.failures import Worker
 
 if TYPE_CHECKING:
     from rich.live import Live
-
-PATIENCE_S = 1.0
-"""Maximum time that the end waits for pending lines to be written, s."""
 
 
 class Console:
@@ -30,25 +27,11 @@ class Console:
     """
 
     def __init__(self, failed: Callable[[BaseException], None]) -> None:
-        self._failed = failed
         self._stream = _duplicate(sys.stderr)
         self._live: Live | None = None
         self._lines: Sequence[str] = ()
         self._drawing = False  # whether the queue contains a step that draws the latest lines
-        self._steps: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name="springmass-console", daemon=True)
-        try:
-            self._thread.start()
-        except RuntimeError as error:  # no memory for a thread
-            failed(error)
-
-    @property
-    def terminal(self) -> bool:
-        """Whether the stream is a terminal."""
-        try:
-            return self._stream is not None and self._stream.isatty()
-        except (OSError, ValueError):
-            return False
+        self._worker = Worker("console", failed)
 
     @property
     def columns(self) -> int:
@@ -61,46 +44,32 @@ class Console:
     def line(self, text: str) -> None:
         """Write text as one line, with line breaks joined and control characters made visible."""
         line = visible(" ".join(text.splitlines()))
-        self._steps.put(lambda: self._write(line))
+        self._worker.put(lambda: self._write(line))
 
     def draw(self, lines: Sequence[str]) -> None:
         """Draw lines on the terminal over the earlier ones; a slow terminal gets only the latest lines."""
         self._lines = [visible(line) for line in lines]
         if not self._drawing:
             self._drawing = True
-            self._steps.put(self._draw)
+            self._worker.put(self._draw)
 
     def settle(self) -> None:
         """Leave the drawn lines in place, and restore the cursor."""
-        self._steps.put(self._settle)
+        self._worker.put(self._settle)
 
     def wait(self, seconds: float) -> None:
         """Wait until all lines are written; report a failure if this takes longer than the given time."""
         written = threading.Event()
-        self._steps.put(written.set)
+        self._worker.put(written.set)
         if not written.wait(seconds):
-            self._failed(TimeoutError("nobody reads stderr"))
+            self._worker.failed(TimeoutError("nobody reads stderr"))
 
     def close(self) -> None:
         """Wait until all lines are written, at most a second; lines not written by then are lost."""
-        if self._thread.ident is not None:
-            self.settle()
-            self._steps.put(None)
-            self._thread.join(PATIENCE_S)
-            if self._thread.is_alive():
-                self._failed(TimeoutError("nobody reads stderr"))
-
-    def _run(self) -> None:
-        while (step := self._steps.get()) is not None:
-            self._attempt(step)
+        self.settle()
         if self._stream is not None and self._stream is not sys.stderr:
-            self._attempt(self._stream.close)
-
-    def _attempt(self, step: Callable[[], None]) -> None:
-        try:
-            step()
-        except BaseException as error:  # no error may prevent later lines
-            self._failed(error)
+            self._worker.put(self._stream.close)
+        self._worker.close("nobody reads stderr")
 
     def _write(self, line: str) -> None:
         if self._stream is None:

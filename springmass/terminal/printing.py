@@ -13,8 +13,7 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
 from springmass.runs.reported import Reported
-from springmass.terminal.quantities import concise
-from springmass.terminal.style import PLAIN, TerminalStyle
+from springmass.terminal.style import PLAIN, TerminalStyle, concise
 from springmass.terminal.table1 import aligned, readable, shortened
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pipeline.streaming import LiveMotion, NotYet
 from springmass.session.progress import Progress, TroubleKind
 from springmass.terminal.console import Console
-from springmass.terminal.quantities import concise, shown
-from springmass.terminal.style import PLAIN, TerminalStyle
+from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 
 # Without a terminal, one of this many lines is printed: the motion for each would add a tenth to the recording's cost.
 UNWATCHED_LINES = 30

@@ -1,10 +1,13 @@
-"""Determine the capabilities of a stream: terminal or pipe, characters, width."""
+"""What a stream can show: terminal or pipe, characters, width; and quantities in its characters."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
 from typing import TextIO
+
+from pipeline.numerics.estimate import Estimate, UpperLimit, format_value, in_brackets
+from springmass.typeset import page_unit, prefixed, pretty, typeset
 
 WIDEST = 100
 
@@ -40,3 +43,30 @@ def watched(stream: TextIO | None) -> bool:
         )
     except (OSError, ValueError):
         return False
+
+
+def shown(estimate: Estimate | None, style: TerminalStyle) -> str:
+    """Return an estimate as text: plain SI for a pipe, with prefix and ± if the terminal supports it."""
+    if estimate is None:
+        return "-"
+    chosen = estimate if style.si else prefixed(estimate)
+    if style.unicode:
+        return pretty(chosen)
+    if isinstance(chosen, UpperLimit):
+        return str(chosen).replace("µ", "u")
+    return format_value(chosen.value, chosen.u, chosen.unit.replace("µ", "u"))
+
+
+def concise(estimate: Estimate | None, style: TerminalStyle) -> str:
+    """Return an estimate with its uncertainty as digits in parentheses, for many estimates side by side.
+
+    >>> concise(Estimate(0.05145, 2e-5, "m"), TerminalStyle(True, True, si=False))
+    '51.450(20) mm'
+    """
+    if estimate is None or isinstance(estimate, UpperLimit):
+        return shown(estimate, style)
+    chosen = estimate if style.si else prefixed(estimate)
+    written = in_brackets(chosen.value, chosen.u)
+    if not style.unicode:
+        return f"{written} {chosen.unit.replace('µ', 'u')}".rstrip()
+    return f"{typeset(written)} {page_unit(chosen.unit)}".rstrip()

@@ -3,33 +3,21 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
-from pipeline.numerics.estimate import Estimate
-from springmass.runs.rows import TableKey, table_rows
-from springmass.terminal.quantities import concise, shown
-from springmass.terminal.style import PLAIN, TerminalStyle
+from springmass.runs.rows import table_rows
+from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 
 NARROW, NARROWEST = 24, 12  # width of the column for the names of quantities, which wrap, for several runs and for one
 
 
-def text_table(
-    names: Sequence[str], runs: Sequence[Analysis | Mapping[TableKey, Estimate]], style: TerminalStyle = PLAIN
-) -> str:
+def text_table(names: Sequence[str], runs: Sequence[Analysis], style: TerminalStyle = PLAIN) -> str:
     """Return Table 1 in aligned columns; runs that do not fit side by side follow in another block.
 
     Names that are wider than their column are shortened. If the runs do not fit side by side, the uncertainty is given
     as digits in parentheses.
-
-    >>> import numpy as np
-    >>> from pipeline.analyse import analyse
-    >>> from pipeline.track import Track
-    >>> t = np.arange(1000) / 100
-    >>> y = 0.2 + 0.05 * np.cos(8.3 * t) + 1e-4 * np.random.default_rng(1).standard_normal(1000)
-    >>> text_table(["bob"], [analyse(Track.from_arrays(t, y))]).splitlines()[2].split()[::4]
-    ['period', '0.000022']
     """
     rows = table_rows(runs, missing=True)
     symbols = [row.on_screen if style.unicode else row.symbol for row in rows]

@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 import tty
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -124,6 +124,13 @@ class Recording:
             assert time.monotonic() < end, "nothing is recorded"
             threading.Event().wait(0.02)
 
+    def said(self) -> str:
+        """Return what is said on stderr until the process ends, which is never a traceback."""
+        assert self.process.stderr is not None
+        output = self.process.stderr.read().decode()
+        assert "Traceback" not in output
+        return output
+
     def ended(self, limit_s: float = LIMIT_S) -> int:
         """Wait for the end; return the exit code."""
         return self.process.wait(limit_s)
@@ -161,9 +168,11 @@ def numbers_of(run_file: Path) -> list[int]:
     return [int(number) for number in whole]
 
 
-def demand_whole(numbers: Sequence[int]) -> None:
-    """Fail where a reading between the first and the last is missing, wrong or out of order."""
-    assert list(numbers) == list(range(numbers[0], numbers[0] + len(numbers))), "readings are missing"
+def whole_numbers_of(run_file: Path) -> list[int]:
+    """Return the numbers, and fail where a reading between the first and the last is missing or out of order."""
+    numbers = numbers_of(run_file)
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), "readings are missing"
+    return numbers
 
 
 @dataclass(frozen=True)
@@ -172,9 +181,6 @@ class Bench:
 
     feeder: Callable[[], Feeder]
     record: Callable[..., Recording]
-    numbers: Callable[[Path], list[int]]
-    demand_whole: Callable[[Sequence[int]], None]
-    line: Callable[..., bytes]
 
 
 @pytest.fixture
@@ -186,7 +192,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
         started.append(start_recording(*arguments, **options))
         return started[-1]
 
-    yield Bench(lambda: Feeder(tmp_path), record, numbers_of, demand_whole, line_of)
+    yield Bench(lambda: Feeder(tmp_path), record)
     for recording in started:
         if recording.process.poll() is None:
             recording.process.kill()

@@ -19,7 +19,7 @@ import pytest
 
 from springmass.cli import main
 from storage.run_file.reading import open_run
-from tests.faults.conftest import usual_signals
+from tests.faults.conftest import usual_signals, whole_numbers_of
 
 ANSWER_S = 100.0
 """The program answers within ten seconds of the end, or of a fault's, where the machine is not ten times as busy."""
@@ -131,9 +131,7 @@ def play(bench: Any, folder: Path, display: str, end: str) -> None:
         recording = bench.record(feeder.port, out, *arguments, prepare=prepare, **started)
         bring(recording)
         assert recording.ended(ANSWER_S + RUN_S * (end == "seconds")) == code
-    numbers = bench.numbers(out)
-    bench.demand_whole(numbers)
-    assert len(numbers) > FEW
+    assert len(whole_numbers_of(out)) > FEW
     assert not recording.log.exists()
     with open_run(out) as run:
         (ended,) = [event["facts"] for event in run.provenance["events"] if event["kind"] == "ended"]
@@ -187,14 +185,6 @@ Recorder.close = closing
 """
 
 
-def output_of(recording: Any) -> str:
-    """Return what is said until the process ends."""
-    assert recording.process.stderr is not None
-    output = recording.process.stderr.read().decode()
-    assert "Traceback" not in output
-    return str(output)
-
-
 @pytest.mark.trials
 def test_a_second_ctrl_c_while_the_disk_hangs_leaves_the_log_and_says_where(bench: Any, tmp_path: Path) -> None:
     """The first waits for the disk; the second ends immediately, removes nothing, and names the log and a remedy."""
@@ -210,15 +200,13 @@ def test_a_second_ctrl_c_while_the_disk_hangs_leaves_the_log_and_says_where(benc
         threading.Event().wait(TOGETHER_S)
         recording.process.send_signal(signal.SIGINT)
         assert recording.ended(ANSWER_S) == 130
-        output = output_of(recording)
+        output = recording.said()
     assert f"the log stays: {recording.log}" in output
     assert "springmass recover" in output
     assert re.search(r"\b[1-9][0-9]+ reads", output), "what was given up is counted on the screen"
     assert not out.exists()
     assert main(["recover", str(recording.log)]) == 0
-    numbers = bench.numbers(out)
-    bench.demand_whole(numbers)
-    assert len(numbers) > FEW
+    assert len(whole_numbers_of(out)) > FEW
 
 
 @pytest.mark.trials
@@ -233,12 +221,10 @@ def test_a_disk_that_takes_nothing_more_ends_the_recording_with_what_it_has(benc
     with bench.feeder() as feeder:
         recording = bench.record(feeder.port, out, stderr=subprocess.PIPE, prepare=limited)
         assert recording.ended(ANSWER_S) == 4
-        output = output_of(recording)
+        output = recording.said()
     assert "could not be continued (File too large)" in output
     assert recording.log.exists()
     assert "springmass recover" in output  # the run file holds the log, so the limit is too low for it as well
     assert not out.exists()
     assert main(["recover", str(recording.log)]) == 0
-    numbers = bench.numbers(out)
-    bench.demand_whole(numbers)
-    assert len(numbers) > FEW
+    assert len(whole_numbers_of(out)) > FEW

@@ -40,11 +40,15 @@ WAIT_S = 120.0
 class Hanging:
     """A real file whose writes stand still until they are let go; a sync may stand still with them."""
 
-    def __init__(self, path: Path) -> None:
-        self._file: LogFile = open_log_file(path)
+    def __init__(self) -> None:
         self.goes = threading.Event()
         self.goes.set()
         self.hangs = threading.Event()
+
+    def open(self, path: Path) -> LogFile:
+        """Open the file as a recorder does."""
+        self._file: LogFile = open_log_file(path)
+        return self
 
     def write(self, data: bytes | memoryview) -> int:
         """Write, when the disk goes."""
@@ -101,11 +105,7 @@ def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_
     header = LogHeader(
         sensors=tuple(SensorEntry(channel, "ffhls") for channel in range(len(sensors.reads_hz))), mono_ns=0, unix_ns=0
     )
-    disk: list[Hanging] = []
-
-    def hanging(path: Path) -> LogFile:
-        disk.append(Hanging(path))
-        return disk[0]
+    disk = Hanging()
 
     def hung(stamp_ns: int) -> bool:
         return SECOND_NS <= stamp_ns < (1.0 + hang_s) * SECOND_NS
@@ -117,15 +117,15 @@ def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_
             put[channel].append((stamp_ns, data))
             recorder.reads([(channel, stamp_ns, data)])
 
-    with Recorder(tmp_path / "run.wire", header, VirtualClock(), open_file=hanging) as recorder:
+    with Recorder(tmp_path / "run.wire", header, VirtualClock(), open_file=disk.open) as recorder:
         send(recorder, 0.0, 1.0)
         recorder.drain()
-        disk[0].goes.clear()
+        disk.goes.clear()
         send(recorder, 1.0, 1.1)
-        assert disk[0].hangs.wait(WAIT_S)
+        assert disk.hangs.wait(WAIT_S)
         send(recorder, 1.1, 1.0 + hang_s)
         status = recorder.status
-        disk[0].goes.set()
+        disk.goes.set()
         recorder.drain()
         send(recorder, 1.0 + hang_s, 2.0 + hang_s)
     # What was put while the disk hung, but for the read that hung with it and those that went along.
@@ -183,30 +183,25 @@ class Kept:
 
 def test_the_reading_thread_never_waits_for_the_disk(tmp_path: Path) -> None:
     """A port whose own buffer holds 4 KiB is read on while the disk hangs: 200 kB that were sent then are all there."""
-    disk: list[Hanging] = []
-
-    def hanging(path: Path) -> LogFile:
-        disk.append(Hanging(path))
-        return disk[0]
-
+    disk = Hanging()
     sent = b"".join(b"%06d line by line\n" % number for number in range(10_000))
     device, port = os.openpty()
     tty.setraw(port)
     header = LogHeader(sensors=(SensorEntry(0, "text-lines"),), mono_ns=0, unix_ns=0)
     writer = threading.Thread(target=write_all, args=(device, sent), daemon=True)
-    with Recorder(tmp_path / "run.wire", header, SystemClock(), open_file=hanging) as recorder:
+    with Recorder(tmp_path / "run.wire", header, SystemClock(), open_file=disk.open) as recorder:
         recorded = Kept(recorder, len(sent))
         reader = PortReader([Line(SerialPort(os.ttyname(port), 9600))], recorded, SystemClock())
         reader.start()
-        disk[0].goes.clear()
+        disk.goes.clear()
         writer.start()
         writer.join(WAIT_S)
         assert not writer.is_alive()
         assert recorded.all_came.wait(WAIT_S)
         reader.stop()
-        assert disk[0].hangs.wait(WAIT_S)
+        assert disk.hangs.wait(WAIT_S)
         assert (recorder.status.dropped_records, recorder.status.records) == (0, 1)
-        disk[0].goes.set()
+        disk.goes.set()
     os.close(device)
     os.close(port)
     data = [record.payload for record in read_log(tmp_path / "run.wire") if record.kind is Kind.DATA]
@@ -227,25 +222,20 @@ def swinging(number: int) -> bytes:
 
 def test_what_did_not_fit_is_a_gap_with_its_time_and_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Ten seconds beyond a small queue: the run has the event, the gap where they are missing, and says so."""
-    disk: list[Hanging] = []
-
-    def hanging(path: Path) -> LogFile:
-        disk.append(Hanging(path))
-        return disk[0]
-
+    disk = Hanging()
     header = LogHeader(sensors=(SensorEntry(0, "ffhls"),), mono_ns=0, unix_ns=0)
     room = 50 * (HEAD_BYTES + 4)
-    with Recorder(tmp_path / "run.wire", header, VirtualClock(), queue_bytes=room, open_file=hanging) as recorder:
+    with Recorder(tmp_path / "run.wire", header, VirtualClock(), queue_bytes=room, open_file=disk.open) as recorder:
         for number in range(400):
             if number == 100:
                 recorder.drain()
-                disk[0].goes.clear()
+                disk.goes.clear()
             recorder.put(0, SECOND_NS * number // 10, swinging(number))
             if number == 100:
-                assert disk[0].hangs.wait(WAIT_S)
+                assert disk.hangs.wait(WAIT_S)
             if number == 249:
-                disk[0].goes.set()
-            if disk[0].goes.is_set():
+                disk.goes.set()
+            if disk.goes.is_set():
                 recorder.drain()
     assert recorder.status.dropped_records == 99
     assert main(["recover", str(tmp_path / "run.wire")]) == 0

@@ -7,6 +7,7 @@ for all 50.
 
 from __future__ import annotations
 
+import binascii
 import json
 import math
 import os
@@ -32,20 +33,10 @@ HELD_BYTES = 250_000
 """A socket's buffer on the way: what a longer dropout adds is lost."""
 
 
-def crc16(body: bytes) -> int:
-    """CRC-16/CCITT-FALSE, bit by bit."""
-    value = 0xFFFF
-    for byte in body:
-        value ^= byte << 8
-        for _ in range(8):
-            value = (value << 1 ^ 0x1021 if value & 0x8000 else value << 1) & 0xFFFF
-    return value
-
-
 def timed_line(number: int, device_us: int, distance_m: float) -> bytes:
     """One line of the line protocol, as docs/reference/line-protocol.md has it."""
     body = f"R1,{number},{device_us % 2**32},{2e6 * distance_m / 344.0:.2f},2150,E".encode()
-    return b"$" + body + f"*{crc16(body):04X}\n".encode()
+    return b"$" + body + f"*{binascii.crc_hqx(body, 0xFFFF):04X}\n".encode()
 
 
 def counted_line(number: int, device_us: int, distance_m: float) -> bytes:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import select
 import socket
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,17 +26,7 @@ from storage.run_file.reading import open_run
 # pyserial 3.5 starts its reading thread in the old way.
 pytestmark = pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\) is deprecated:DeprecationWarning")
 
-OMEGA = 16.7
-CLOCK = SystemClock()
-
-
-@contextmanager
-def swinging() -> Iterator[str]:
-    """Yield the port of a simulated sensor of a bob that swings."""
-    finder = VirtualRangefinder(lambda t: 0.4 + 0.05 * np.cos(OMEGA * t), VirtualSensor(), np.random.default_rng(5))
-    with VirtualPort(get_family("line-protocol"), finder, CLOCK, seconds=60.0) as port:
-        port.start()
-        yield port.path
+LINE = get_family("line-protocol")
 
 
 class Pty(serial.Serial):
@@ -50,100 +41,45 @@ class Pty(serial.Serial):
     _update_dtr_state = _update_rts_state
 
 
-class Bridge:
-    """Serves one serial port by RFC 2217 to one client after the other, as pyserial's example server does."""
-
-    def __init__(self, path: str) -> None:
-        self._serial = Pty(path, timeout=0)
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self._listener.settimeout(0.1)
-        self._stop = threading.Event()
-        self.hang_up = threading.Event()
-        self.served = 0
-        self.address = f"rfc2217://127.0.0.1:{self._listener.getsockname()[1]}"
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Hang up and close."""
-        self._stop.set()
-        self._thread.join()
-        self._listener.close()
-        self._serial.close()
-
-    @property
-    def baud(self) -> int:
-        """What the client set the port to."""
-        return int(self._serial.baudrate)
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            try:
-                connection, _ = self._listener.accept()
-            except TimeoutError:
-                continue
-            self.served += 1
-            with connection:
-                self._serve(connection)
-
-    def _serve(self, connection: socket.socket) -> None:
-        manager = PortManager(self._serial, Writer(connection))
-        while not self._stop.is_set():
-            if self.hang_up.is_set():
-                self.hang_up.clear()
-                return
-            ready, _, _ = select.select([self._serial, connection], [], [], 0.05)
-            try:
-                if self._serial in ready:
-                    connection.sendall(b"".join(manager.escape(self._serial.read(self._serial.in_waiting))))
-                request = connection.recv(1024) if connection in ready else None
-            except OSError:
-                return
-            if request == b"":
-                return
-            self._serial.write(b"".join(manager.filter(request or b"")))
-
-
-class Writer:
-    """What the manager answers through."""
-
-    def __init__(self, connection: socket.socket) -> None:
-        self._connection = connection
-
-    def write(self, data: bytes) -> None:
-        """Send to the client."""
-        self._connection.sendall(data)
-
-
-@contextmanager
-def bridged(path: str) -> Iterator[Bridge]:
-    """Put a port behind a server."""
-    bridge = Bridge(path)
-    try:
-        yield bridge
-    finally:
-        bridge.close()
-
-
-def hang_up_while_it_records(bridge: Bridge, log: Path) -> None:
-    """Break the connection once something is recorded."""
-    until = time.monotonic() + 60.0
-    while not (log.exists() and log.stat().st_size > 4000) and time.monotonic() < until:
-        threading.Event().wait(0.02)
-    bridge.hang_up.set()
+def serve(port: serial.Serial, listener: socket.socket, breaks: list[Callable[[], bool]]) -> None:
+    """Serve a port to one client after the other, as pyserial's example server does; each until its break is due."""
+    for is_due in breaks:
+        connection, _ = listener.accept()
+        manager = PortManager(port, SimpleNamespace(write=connection.sendall))
+        with connection, contextlib.suppress(OSError):
+            while not is_due():
+                ready, _, _ = select.select([port, connection], [], [], 0.05)
+                if port in ready:
+                    connection.sendall(b"".join(manager.escape(port.read(port.in_waiting))))
+                if connection in ready:
+                    if not (request := connection.recv(1024)):
+                        break
+                    port.write(b"".join(manager.filter(request)))
 
 
 def test_a_server_that_hangs_up_is_a_gap_and_the_run_goes_on(tmp_path: Path) -> None:
     """After the connection breaks the reader connects again, and the gap stands in the run with its length."""
-    out = tmp_path / "run.h5"
-    with swinging() as port, bridged(port) as bridge:
-        breaker = threading.Thread(target=hang_up_while_it_records, args=(bridge, out.with_suffix(".wire")))
-        breaker.start()
-        options = ["--port", bridge.address, "--sensor", "line-protocol", "--seconds", "5"]
-        assert main(["record", *options, "-o", str(out)]) == 0
-        breaker.join()
-        assert bridge.served == 2
-        assert bridge.baud == get_family("line-protocol").baud
+    out, until = tmp_path / "run.h5", time.monotonic() + 60.0
+
+    def recorded() -> bool:
+        log = out.with_suffix(".wire")
+        return (log.exists() and log.stat().st_size > 4000) or time.monotonic() > until
+
+    finder = VirtualRangefinder(lambda t: 0.4 + 0.05 * np.cos(16.7 * t), VirtualSensor(), np.random.default_rng(5))
+    with (
+        VirtualPort(LINE, finder, SystemClock(), seconds=60.0) as sensor,
+        Pty(sensor.path, timeout=0) as port,
+        socket.create_server(("127.0.0.1", 0)) as listener,
+    ):
+        sensor.start()
+        listener.settimeout(60.0)
+        server = threading.Thread(target=serve, args=(port, listener, [recorded, lambda: False]))
+        server.start()
+        address = f"rfc2217://127.0.0.1:{listener.getsockname()[1]}"
+        assert main(["record", "--port", address, "--sensor", LINE.name, "--seconds", "5", "-o", str(out)]) == 0
+        server.join(60.0)
+        assert not server.is_alive()
+        assert port.baudrate == LINE.baud
     with open_run(out) as run:
         events = run.provenance["events"]
         gaps = run.provenance["decoding"]["gaps"]

@@ -25,6 +25,7 @@ import serial
 
 from springmass.cli import main
 from storage.run_file.reading import open_run
+from tests.faults.conftest import line_of, numbers_of, whole_numbers_of
 from tests.sampling import sampled
 
 RATE_HZ = 100.0
@@ -124,34 +125,13 @@ def test_every_binary_reading_is_a_sample(family: str, send: Send, tmp_path: Pat
 
 
 @pytest.mark.parametrize("place", [on_a_terminal, on_a_socket])
-def test_every_line_is_a_sample_at_the_devices_time(bench: Any, tmp_path: Path, place: Callable[[Send], Any]) -> None:
+def test_every_line_is_a_sample_at_the_devices_time(tmp_path: Path, place: Callable[[Send], Any]) -> None:
     """On a cable and over the network: all readings, and their times to the microsecond, whatever the delays."""
-    with place(bench.line) as port:
+    with place(line_of) as port:
         samples = recorded(port, "line-protocol", tmp_path / "run.h5")
-    numbers = bench.numbers(tmp_path / "run.h5")
-    bench.demand_whole(numbers)
-    assert len(numbers) >= 20
+    assert len(whole_numbers_of(tmp_path / "run.h5")) >= 20
     assert not samples.flags.any()
     # Ten milliseconds by the sensor's clock, and half of what the echo came later.
-    np.testing.assert_allclose(np.diff(samples.t), 0.01 + 0.125e-6, atol=1e-9)
-
-
-def test_a_stall_loses_nothing(bench: Any, tmp_path: Path) -> None:
-    """Readings that were held for a quarter of a second come together, and each has its own time."""
-    held = []
-
-    def stalling(number: int) -> bytes:
-        held.append(bench.line(number))
-        if 40 <= number < 65:
-            return b""
-        data = b"".join(held)
-        held.clear()
-        return data
-
-    with on_a_terminal(stalling) as port:
-        samples = recorded(port, "line-protocol", tmp_path / "run.h5")
-    numbers = bench.numbers(tmp_path / "run.h5")
-    bench.demand_whole(numbers)
     np.testing.assert_allclose(np.diff(samples.t), 0.01 + 0.125e-6, atol=1e-9)
 
 
@@ -177,11 +157,11 @@ def spoiled(line: Callable[[int], bytes], kind: str) -> Send:
 
 
 @pytest.mark.parametrize("kind", sampled(["flipped bits", "lost bytes", "noise", "flood"]))
-def test_a_bad_cable_gives_no_wrong_value(bench: Any, tmp_path: Path, kind: str) -> None:
+def test_a_bad_cable_gives_no_wrong_value(tmp_path: Path, kind: str) -> None:
     """Spoiled lines are lost and counted; every sample is a reading that was sent, in its order."""
-    with on_a_terminal(spoiled(bench.line, kind)) as port:
+    with on_a_terminal(spoiled(line_of, kind)) as port:
         recorded(port, "line-protocol", tmp_path / "run.h5")
-    numbers = np.array(bench.numbers(tmp_path / "run.h5"))
+    numbers = np.array(numbers_of(tmp_path / "run.h5"))
     assert np.all(np.diff(numbers) > 0)
     span = numbers[-1] - numbers[0] + 1
     assert 0.55 * span < len(numbers) < span

@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from playwright.sync_api import Page
+import numpy as np
+from playwright.sync_api import BrowserContext, Page
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 import springmass
+from acquisition.block import Block
+from storage.run_file.reading import open_run
 
 LIMIT_S = 180.0
 OLD_RUN = springmass.sample_data() / "damped_simulated_position.txt"
@@ -31,6 +34,14 @@ STAGES = """() => {
   window.stages = [];
   new MutationObserver(() => stages.push(stage.textContent)).observe(stage, { childList: true, characterData: true });
 }"""
+
+
+def opened(context: BrowserContext, address: str, until: str) -> Page:
+    """Open a page, and wait until something holds on it."""
+    page = context.new_page()
+    page.goto(address)
+    page.wait_for_function(until)
+    return page
 
 
 def answer(page: Page, *texts: str) -> None:
@@ -56,6 +67,14 @@ class Program:
     messages: list[str]
     out: Path
     reader: threading.Thread
+
+    def whole_run(self) -> Block:
+        """Return the samples of the run file, of which none is missing."""
+        with open_run(self.out) as run:
+            samples = run.samples()
+        assert np.isfinite(samples.distance).all()
+        assert np.diff(samples.t).max() < 0.015
+        return samples
 
     def ended(self) -> int:
         """Wait for its end and its last message; return the exit code."""

@@ -22,7 +22,7 @@ from playwright.sync_api import Browser, BrowserContext, Page
 from springmass.cli import main
 from tests.browser import chromium, headless
 from tests.courses import damped, write_recording
-from tests.pages.bench import LIMIT_S, MOVES, OLD_RUN, SEEN, Program
+from tests.pages.bench import LIMIT_S, MOVES, OLD_RUN, SEEN, Program, opened
 
 SCENE = """
 [bob]
@@ -127,8 +127,8 @@ def watched(browser: Browser, **options: Any) -> Iterator[BrowserContext]:
 @pytest.fixture
 def context(browser: Browser) -> Iterator[BrowserContext]:
     """Return a browser with separate cookies."""
-    with watched(browser) as opened:
-        yield opened
+    with watched(browser) as found:
+        yield found
 
 
 @pytest.fixture(scope="session")
@@ -136,9 +136,7 @@ def old_run(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Itera
     """The address of the page of an old run, and the cookies of the browser that opened it."""
     with started(tmp_path_factory.mktemp("old"), "page", str(OLD_RUN)) as program:
         with watched(browser) as first:
-            page = first.new_page()
-            page.goto(program.address)
-            page.wait_for_function(MOVES)
+            opened(first, program.address, MOVES)
             cookies = first.storage_state()
         yield program.address.partition("?")[0], cookies
 
@@ -148,9 +146,7 @@ def replay(browser: Browser, old_run: tuple[str, Any]) -> Iterator[Page]:
     """Return the page of an old run, as it is when it has been opened."""
     address, cookies = old_run
     with watched(browser, storage_state=cookies) as context:
-        page = context.new_page()
-        page.goto(address)
-        page.wait_for_function(SEEN.format(count=11000))
+        page = opened(context, address, SEEN.format(count=11000))
         page.wait_for_function(MOVES)
         yield page
 
@@ -172,16 +168,8 @@ def page_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
             assert main(["analyse", clipped, "--output", str(out)]) == 0
             return out / "clipped_simulated_position.txt.results" / "report.html"
         if name == "simulate":
-            words = [
-                "simulate",
-                "--scene",
-                str(data / "damped.scene.toml"),
-                "--against",
-                str(OLD_RUN),
-                "--seconds",
-                "20",
-            ]
-            assert main([*words, "--folder", str(out)]) == 0
+            words = ["--scene", str(data / "damped.scene.toml"), "--against", str(OLD_RUN), "--seconds", "20"]
+            assert main(["simulate", *words, "--folder", str(out)]) == 0
             return out / "damped.simulated" / "simulation.html"
         if name == "compare":
             assert main(["compare", undamped, slow, *scenes, "--output", str(out / "compared")]) == 0
@@ -209,10 +197,10 @@ def course_of(top: Path) -> Path:
 def page(browser: Browser) -> Iterator[Page]:
     """A page without network, its errors kept as failures."""
     with watched(browser, offline=True) as context:
-        opened = context.new_page()
+        made = context.new_page()
         failed: list[str] = []
-        opened.on("requestfailed", lambda request: failed.append(request.url))
-        yield opened
+        made.on("requestfailed", lambda request: failed.append(request.url))
+        yield made
         assert failed == []
 
 

@@ -14,7 +14,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import BrowserContext, Page
 
 import springmass
-from tests.pages.bench import OLD_RUN
+from tests.pages.bench import OLD_RUN, opened
 from tests.sampling import sampled
 
 # The old run is served once for all tests; each opens its page anew.
@@ -149,8 +149,6 @@ def test_everybody_can_read_it(replay: Page, width: int, scheme: Any) -> None:
 def test_a_stated_law_is_named(start: Callable[..., Any], context: BrowserContext) -> None:
     """Next to the numbers that depend on it, and in the legend of the amplitudes."""
     program = start("page", str(OLD_RUN), "--law", "linear")
-    page = context.new_page()
-    page.goto(program.address)
-    page.wait_for_function("() => motion && motion.stated_law === 'linear'")
+    page = opened(context, program.address, "() => motion && motion.stated_law === 'linear'")
     assert page.locator("#estimates", has_text="damping rate, law linear").count() == 1
     assert page.evaluate("amplitude.panel.series.some((s) => s.role === 'law' && s.label.includes('linear'))")

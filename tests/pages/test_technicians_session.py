@@ -17,7 +17,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import BrowserContext, Page
 
 from springmass.runs.run import Run
-from tests.pages.bench import FITTED, PHASE, SEEN, STAGES, answer, press
+from tests.pages.bench import FITTED, PHASE, SEEN, STAGES, answer, opened, press
 
 WIDTHS = {1366: 768, 768: 1024, 390: 844}
 WHOLE = "() => motion && motion.accuracy === 'standard' && motion.estimates"
@@ -72,10 +72,8 @@ def test_a_session_from_the_first_minute_to_the_report(
 ) -> None:
     """Each number is the same on the page, in the report, by ``analyse`` and on the page of the saved run."""
     program = record("--ready", "--lan")
-    page = context.new_page()
+    page = opened(context, program.address, PHASE.format(phase="ready"))
     page.set_viewport_size({"width": 1366, "height": 768})
-    page.goto(program.address)
-    page.wait_for_function(PHASE.format(phase="ready"))
     page.wait_for_function("() => rate_hz() !== null")
     assert page.evaluate("rate_hz()") == pytest.approx(100.0, abs=5.0)
     look_at(page, "1-ready")
@@ -148,9 +146,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     assert marks == [[mark["t_s"], mark["text"]] for mark in analysed.loaded.provenance["marks"]]
 
     again = start("page", str(program.out))
-    page = context.new_page()
-    page.goto(again.address)
-    page.wait_for_function(WHOLE)
+    page = opened(context, again.address, WHOLE)
     assert page.evaluate(NUMBERS) == shown
     assert page.evaluate("state.marks") == marks
     assert page.evaluate("position.panel.label") == "displacement / mm"

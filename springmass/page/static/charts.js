@@ -1,5 +1,5 @@
 "use strict";
-// Every chart of reports, courses, simulations, the page of a recording and notebooks. A chart is an object as
+// Every chart of reports, courses, simulations and the page of a recording. A chart is an object as
 // springmass/charts/chart.py makes it: panels of series, each with a role. uPlot draws the axes, this script the series.
 
 // The look of each role; springmass/charts/draw.py reads this table for files. Every colour has a contrast of at least
@@ -16,7 +16,7 @@ const LOOKS = {
 };
 const RANK = { data: 0, law: 1, other: 2, rest: 3, flagged: 4, band: 5, mark: 6 }, MANY = 2000, ZOOM = 0.5, PAN = 0.25, FONT = "system-ui, sans-serif";
 
-// Light text means a dark background, whatever the page or the notebook takes its colours from.
+// Light text means a dark background, whatever the page takes its colours from.
 function isDark(box) {
   const [r, g, b] = getComputedStyle(box).color.match(/[\d.]+/g).map(Number);
   return 0.3 * r + 0.6 * g + 0.1 * b > 128;

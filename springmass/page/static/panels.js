@@ -1,7 +1,7 @@
 "use strict";
 // Numbers with their age, and the four charts.
 const WINDOWS = [5, 10, 30, 60, 300, Infinity];
-const LABELS = { period: "period", amplitude_now: "amplitude now", spring_constant: "spring constant k", damping_rate: "damping rate", noise: "noise", offset: "rest position", quality_factor: "quality factor", sample_rate: "sampling rate", drop_outs: "drop-outs" };
+const LABELS = { period: "period", amplitude_now: "amplitude now", spring_constant: "spring constant k", damping_rate: "damping rate", noise: "noise", offset: "rest position", quality_factor: "quality factor" };
 // Estimates that depend on the damping law, which may be stated.
 const OF_LAW = new Set(["damping_rate", "quality_factor"]);
 const KINDS = { voltage: "voltage", angle: "angle", acceleration: "acceleration", force: "force", length: "position" };

@@ -91,7 +91,7 @@ function show_region_fits() {
   const part = (region && region.estimates) || {}, whole = (motion && motion.estimates) || {};
   $("region-why").textContent = region ? region.why || "" : "Fitting the selection ...";
   $("region-other").textContent = run.source === "REPLAY" || is_over() ? "Whole run" : "All samples so far";
-  const names = Object.keys(LABELS).filter((name) => part[name] && !/^(sample_rate|drop_outs)$/.test(name));
+  const names = Object.keys(LABELS).filter((name) => part[name]);
   $("region-fits").hidden = !names.length;
   $("region-estimates").replaceChildren(...names.map((name) => {
     const row = document.createElement("tr"), head = document.createElement("th");

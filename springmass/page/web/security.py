@@ -19,7 +19,7 @@ from starlette.requests import HTTPConnection
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from springmass.report.script import script_sha256
+from springmass.report.html import script_sha256
 
 LOOK, ACT = "look", "act"
 """Rights of a request; the controller has both."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import json
 import logging
 import socket
@@ -18,11 +19,10 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from springmass.errors import complain
+from springmass.errors import SENSOR, ProgramError, complain
 from springmass.page.state import PageState
 from springmass.page.view import View, json_of
 from springmass.page.web.security import ACT, REPORT, Access, guarded
-from springmass.page.web.sharing import code_svg
 from springmass.session.failures import raised_at
 from storage.errors import one_line
 
@@ -69,23 +69,16 @@ def checked(text: str | None) -> dict[str, Any]:
         request = json.loads(text or "")
         found = {"type": request["type"]}
         for name, limits in REQUESTS[request["type"]].items():
-            found[name] = _text(request[name]) if limits is None else _number(request[name], *limits)
+            if limits is None:
+                found[name] = " ".join(request[name].split())[:LONGEST_TEXT]
+            elif limits[0] <= (number := float(request[name])) <= limits[1]:
+                found[name] = number
+            else:
+                raise ValueError
     # These include the errors for integers of thousands of digits and for deeply nested lists.
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise Refused("a message that is none of the page's") from error
     return found
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise TypeError
-    return " ".join(value.split())[:LONGEST_TEXT]
-
-
-def _number(value: Any, least: float, greatest: float) -> float:
-    if not least <= (number := float(value)) <= greatest:
-        raise ValueError
-    return number
 
 
 class Server:
@@ -182,7 +175,10 @@ class Server:
             if self._page.view is not None and view is not self._page.view:
                 view = self._page.view
                 sent, texts = [0] * len(view.series), {}
-                await browser.send_text(json_of(self._hello(view, acts=ACT in browser.auth.scopes)))
+                acts = ACT in browser.auth.scopes
+                hello = view.hello(controls=acts and self._page.controls is not None)
+                role = {"role": "controller" if acts else "viewer", "share": self._share}
+                await browser.send_text(json_of(hello | role))
             if view is not None:
                 for number, series in enumerate(view.series):
                     while sent[number] < len(series):
@@ -203,10 +199,6 @@ class Server:
         if key not in self._frames:
             self._frames[key] = view.series[number].message(number, first)
         return self._frames[key]
-
-    def _hello(self, view: View, *, acts: bool) -> dict[str, Any]:
-        hello = view.hello(controls=acts and self._page.controls is not None)
-        return {**hello, "role": "controller" if acts else "viewer", "share": self._share}
 
 
 def application(page: PageState, share: str = "", polled: Callable[[int], None] = lambda _: None) -> Starlette:
@@ -304,3 +296,35 @@ class _Lines(logging.Handler):
             text += f" ({self._left_out} earlier messages were left out)"
             self._left_out = 0
         complain(f"page: {text}")
+
+
+ELSEWHERE = ("192.0.2.1", 9)
+"""An address for documentation (RFC 5737): nothing is sent to it; the system only chooses the route to it."""
+
+
+def address_in_network() -> str:
+    """Return this computer's address in the network through which it would send."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(ELSEWHERE)
+        except OSError as error:
+            raise ProgramError(f"--lan: no network ({error.strerror}); join one, or leave --lan out", SENSOR) from error
+        return str(probe.getsockname()[0])
+
+
+def code_svg(address: str) -> bytes:
+    """Return an address as a QR code in SVG format, dark on light and with a quiet zone."""
+    import segno
+
+    made = io.BytesIO()
+    segno.make(address, micro=False).save(made, kind="svg", scale=5, border=4, light="#ffffff", dark="#000000")
+    return made.getvalue()
+
+
+def code_for_terminal(address: str) -> str:
+    """Return an address as a QR code of block characters."""
+    import segno
+
+    made = io.StringIO()
+    segno.make(address, micro=False).terminal(made, compact=True)
+    return made.getvalue()

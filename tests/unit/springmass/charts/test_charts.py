@@ -14,7 +14,7 @@ from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Note, Panel, Series, decoded, to_json
-from springmass.charts.drag_map import DragRun, drag_map
+from springmass.charts.drag_map import drag_map
 from springmass.charts.draw import render
 from springmass.charts.run import charts_of
 from springmass.charts.several import comparison, course, overlay
@@ -113,13 +113,10 @@ def test_frequency_and_spectrum(charts: dict[str, Drawn], damped: Analysis) -> N
 
 
 def test_drag_and_energy(charts: dict[str, Drawn], damped: Analysis) -> None:
-    """The energy begins at k A²/2, kinetic and potential are half of it each; the drag is above its quadratic part."""
+    """The energy begins at k A²/2; the drag is above its quadratic part."""
     start = 0.5e3 * damped.estimates["spring_constant"].value * damped.estimates["amplitude"].value ** 2
-    t, law = charts["energy"].xy("law")
+    _, law = charts["energy"].xy("law")
     assert law[0] == pytest.approx(start, rel=1e-3)
-    for part in ("kinetic", "potential"):
-        at, mean = charts["energy"].xy(part)
-        np.testing.assert_allclose(mean, 0.5 * np.interp(at, t, law), rtol=0.02)
     _, drag = charts["drag"].xy("law")
     assert drag.min() > damped.estimates["drag_coefficient"].value
 
@@ -160,7 +157,7 @@ def test_several_runs(damped: Analysis, motion: Oscillation) -> None:
 def test_a_map_of_drag() -> None:
     """A line for each disc against both numbers, the gap between its runs kept."""
     points = np.array([[100.0, 1.0, 3.0, 0.1], [200.0, 2.0, 2.5, 0.1]])
-    chart = drag_map([DragRun("10 cm", points), DragRun("10 cm", 2.0 * points)])
+    chart = drag_map([("10 cm", points), ("10 cm", 2.0 * points)])
     assert chart is not None
     found = Drawn(chart)
     for panel, column in enumerate((0, 1)):
@@ -168,7 +165,7 @@ def test_a_map_of_drag() -> None:
         np.testing.assert_allclose(x[:2], points[:, column])
         np.testing.assert_allclose(y[:2], points[:, 2], rtol=1e-6)
         assert np.isnan(y[2])
-    assert drag_map([DragRun("", np.zeros((0, 4)))]) is None
+    assert drag_map([("", np.zeros((0, 4)))]) is None
 
 
 def test_a_long_series_keeps_its_extremes() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from springmass.page.web.security import ACT, LOOK, Access, guarded
-from springmass.report.script import script_sha256
+from springmass.report.html import script_sha256
 
 HOST = "127.0.0.1:8000"
 

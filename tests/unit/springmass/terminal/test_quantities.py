@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipeline.numerics.estimate import Estimate
-from springmass.terminal.quantities import concise, shown
-from springmass.terminal.style import PLAIN, TerminalStyle
+from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 from springmass.typeset import prefixed
 
 
