@@ -83,9 +83,7 @@ def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = F
     """Read a recording, a run file or a wire log, or standard input.
 
     All digests of a run file are checked before any sample is used. With ``scene_given`` the caller uses another scene,
-    and none is said to be read from the notes. Raises NeedsAnswer if the file leaves something
-    open that the options do not give, FormatError or StorageError if it cannot be read, and ProgramError if no sample
-    lies within the chosen time interval, or an option is given that the file states itself.
+    and none is said to be read from the notes. NeedsAnswer says what the file leaves open and the options do not give.
     """
     if str(path) == STDIN:
         return _load_stdin(options)
