@@ -96,8 +96,7 @@ def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp
     assert cli("convert", first, second, "--scene", data / "undamped.scene.toml").code == 0
     with open_run(first) as a, open_run(second) as b:
         assert same_samples(a.samples(), b.samples())
-        assert (a.info, a.header.title, a.header.traps) == (b.info, b.header.title, b.header.traps)
-        assert a.header.format == b.header.format
+        assert (a.info, a.header.title, a.traps, a.header.format) == (b.info, b.header.title, b.traps, b.header.format)
         assert a.originals() == b.originals()
         assert dict(b.provenance) | dict(a.provenance) == b.provenance
         assert b.header.scene == read_scene(data / "undamped.scene.toml").to_mapping()
