@@ -132,7 +132,10 @@ def _load_stdin(options: ReadOptions) -> Loaded:
             raise ProgramError("standard input is closed; name a file", UNREADABLE)
         with open(spooled, "wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
-        loaded = load(spooled, options)
+        try:
+            loaded = load(spooled, options)
+        except NeedsAnswer as error:
+            raise NeedsAnswer(replace(error.question, path=STDIN)) from None
         kept = loaded.originals  # read while the file exists
     return replace(loaded, path=Path(STDIN), kept=kept)
 
