@@ -16,7 +16,7 @@ import numpy as np
 
 from acquisition.block import Block, SourceInfo
 from acquisition.decoders.family import RESONATOR_PPM
-from acquisition.errors import NeedsAnswer
+from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.clock_fit import fit_clock
 from acquisition.recordings.identify import open_recording
@@ -135,7 +135,9 @@ def _load_stdin(options: ReadOptions) -> Loaded:
         try:
             loaded = load(spooled, options)
         except NeedsAnswer as error:
-            raise NeedsAnswer(replace(error.question, path=STDIN)) from None
+            raise NeedsAnswer(replace(error.question, path=STDIN), line=error.line) from None
+        except FormatError as error:
+            raise type(error)(STDIN, error.problem, error.remedy, line=error.line) from None
         kept = loaded.originals  # read while the file exists
     return replace(loaded, path=Path(STDIN), kept=kept)
 
