@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
 from pipeline.analyse import Oscillation
+from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
@@ -231,7 +232,11 @@ def _compared(compared: Compared) -> dict[str, Any]:
     return {
         "found": found,
         "message": typeset(" ".join([found.message, *beside(compared)])),
-        "findings": [picked(x, ("code", "severity", "message", "advice", "details")) for x in compared.findings],
+        "findings": [
+            picked(x, ("code", "severity", "message", "advice", "details"))
+            | {"reported": "reported" in kinds()[x.code].about}
+            for x in compared.findings
+        ],
         "reported": compared.reported,
         "rows": list(zip(itertools.count(1), found.names, found.each, found.pulls, strict=False)),
         "joint": [laws_across(joint) for joint in compared.joint],
