@@ -11,11 +11,9 @@ class Clock(Protocol):
 
     def now_ns(self) -> int:
         """Return the monotonic time in nanoseconds."""
-        ...
 
     def sleep_until_ns(self, deadline_ns: int) -> None:
         """Wait until :meth:`now_ns` reaches ``deadline_ns``; return immediately if the deadline has passed."""
-        ...
 
 
 class SystemClock:

@@ -32,3 +32,14 @@ def load_entry(
             f"{what} ({entry.value}): cannot be loaded ({type(error).__name__}: {reason}); "
             "repair or remove the package that provides it"
         ) from error
+
+
+def load_named(group: str, name: str, kind: type[Any], refused: type[Error]) -> Any:
+    """Load what another package adds to a group under a name, which must be of a kind and have that name."""
+
+    def checked(loaded: Any) -> Any:
+        if not isinstance(loaded, kind) or loaded.name != name:
+            raise refused(f"expected {kind.__name__} of the name {name!r}, got {loaded!r:.80}")
+        return loaded
+
+    return load_entry(entry_points_of(group)[name], f"{kind.__name__.lower()} {name!r}", refused, checked)

@@ -25,7 +25,7 @@ from pipeline.motion.averaged import Fitted, check_coherence, fit_windows, typic
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
 from pipeline.motion.equation import fit_equation
 from pipeline.motion.overdamped import LEAST_DAMPING, Overdamped, find_overdamped
-from pipeline.motion.two_modes import find_two_modes
+from pipeline.motion.two_modes import WEAKER, find_two_modes
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
 from pipeline.results.derive import derive
@@ -37,13 +37,10 @@ from pipeline.windows.cycles import NoOscillation
 from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated, demodulate
 from pipeline.windows.disturbances import Disturbances, separate
 from pipeline.windows.free_part import FreePart, free_part, start_of
+from pipeline.windows.rounding import rounded
 from pipeline.windows.sinusoid import check_sinusoid
 
 __all__ = ["Analysis", "Oscillation", "Overdamped", "Still", "analyse"]
-
-# Share of the amplitude by which typical periods differ from the fitted oscillation, above which two modes are fitted:
-# the difference if one mode is a third of the other.
-BEATING = 0.3
 
 
 @one_thread
@@ -74,6 +71,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     if (why := check_sinusoid(samples, windows)) is not None:
         return without_period(samples, why, scene, options)
     windows, disturbances = separate(samples, part.cycles, windows, modes=options.modes)
+    windows = rounded(windows, samples.quantum_m)
     laws = fit_laws(windows, start_of(samples, windows.angular_frequency), options.laws, options.known_law, track.unit)
 
     # For strong damping, or friction that stops the bob, the equation of motion is fitted, not its cycle average.
@@ -83,7 +81,7 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
         return overdamped(samples, relaxed, scene, options)
     missed = 0.0 if fitted.method == "equation" else typical_miss(fitted)
     incoherent = check_coherence(fitted, missed)
-    if (incoherent or missed > BEATING) and (two := find_two_modes(samples)) is not None:
+    if (incoherent or missed > WEAKER) and (two := find_two_modes(samples)) is not None:
         return two_modes(samples, two, scene, options)
     if incoherent is not None:
         return still(samples, incoherent, scene, options)

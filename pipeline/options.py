@@ -8,8 +8,7 @@ from typing import Literal
 from pipeline.damping.laws import LAWS, Law
 from pipeline.damping.select import FEW_LAWS
 from pipeline.errors import AnalysisError
-
-ANY_LAW = "any"
+from pipeline.registry.laws import ANY_LAW
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from acquisition.decoders.family import Family as Sensor
-    from acquisition.recordings.base import Format
+    from acquisition.recordings.recording import Format
     from pipeline.bench.scene import Scene
     from pipeline.damping.laws import LAWS
     from pipeline.damping.laws.of_function import make_law
@@ -33,7 +33,7 @@ else:
     # Imported on first use, so that `springmass --help` need not wait for numpy; a type checker sees the imports above.
     _WHERE = {
         "Error": "springmass.errors",
-        "Format": "acquisition.recordings.base",
+        "Format": "acquisition.recordings.recording",
         "LAWS": "pipeline.damping.laws",
         "Run": "springmass.runs.run",
         "Scene": "pipeline.bench.scene",
@@ -64,22 +64,9 @@ else:
 
 __version__ = "0.3.0"
 
+# fmt: off
 __all__ = [
-    "LAWS",
-    "Error",
-    "Format",
-    "Run",
-    "Scene",
-    "Sensor",
-    "Stream",
-    "__version__",
-    "analyse",
-    "batch",
-    "compare",
-    "load",
-    "make_law",
-    "results",
-    "sample_data",
-    "simulate",
-    "source",
+    "LAWS", "Error", "Format", "Run", "Scene", "Sensor", "Stream", "__version__", "analyse", "batch", "compare", "load",
+    "make_law", "results", "sample_data", "simulate", "source",
 ]
+# fmt: on

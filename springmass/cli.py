@@ -8,20 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from springmass.errors import (
-    INTERNAL,
-    INTERRUPTED,
-    NO_MEMORY,
-    OK,
-    SENSOR,
-    SOME_FAILED,
-    UNREADABLE,
-    USAGE,
-    ProgramError,
-    complain,
-    internal_error,
-    printing,
-)
+from springmass import errors
 from springmass.stops import STOPS
 
 
@@ -29,7 +16,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return its exit code; a user's error and a program defect each give one line on stderr."""
     STOPS.begin()
     try:
-        with printing():
+        with errors.printing():
             return _run(arguments)
     finally:
         STOPS.end(program=arguments is None)
@@ -45,31 +32,31 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         return _call(words)
     except KeyboardInterrupt:
-        complain("interrupted")
-        return INTERRUPTED
+        errors.complain("interrupted")
+        return errors.INTERRUPTED
     except ImportError as error:
-        complain(f"{error}; this installation is not whole, springmass doctor says what is wrong with it")
-        return SOME_FAILED
+        errors.complain(f"{error}; this installation is not whole, springmass doctor says what is wrong with it")
+        return errors.SOME_FAILED
     except MemoryError:
-        complain(NO_MEMORY)
-        return UNREADABLE
+        errors.complain(errors.NO_MEMORY)
+        return errors.UNREADABLE
     except BrokenPipeError:
         # The reader of the output has closed the pipe (`| head`): print nothing more, not even at exit.
         _abandon_output()
-        return OK
+        return errors.OK
     except Exception as error:
         if isinstance(error, RuntimeError) and "start new thread" in str(error):
-            complain("no memory for another thread; end other programs, or raise the limit")
-            return UNREADABLE
+            errors.complain("no memory for another thread; end other programs, or raise the limit")
+            return errors.UNREADABLE
         if isinstance(error, OSError) and error.filename is None and error.errno in _OUTPUT_FULL:
             _abandon_output()
-            complain(f"standard output cannot be written: {error.strerror}; write to another disk")
-            return USAGE
+            errors.complain(f"standard output cannot be written: {error.strerror}; write to another disk")
+            return errors.USAGE
         code = _exit_code(error)
         if code is None:
-            complain(internal_error(error))
-            return INTERNAL
-        complain(error)
+            errors.complain(errors.internal_error(error))
+            return errors.INTERNAL
+        errors.complain(error)
         return code
 
 
@@ -77,7 +64,7 @@ def _call(words: Sequence[str]) -> int:
     """Call a command; answer command-line errors and a reader's questions, because both need the command line."""
     from cyclopts import CycloptsError
 
-    from springmass.commands import call, without_reading
+    from springmass.commands import call
 
     try:
         with STOPS.raised():
@@ -85,8 +72,8 @@ def _call(words: Sequence[str]) -> int:
     except CycloptsError as error:
         what = " ".join(str(error).split()).rstrip(".")
         called = " ".join(("springmass", *(error.command_chain or ())))
-        complain(f"{what}{' ' if what.endswith('?') else '; '}{called} --help shows what it takes")
-        return USAGE
+        errors.complain(f"{what}{' ' if what.endswith('?') else '; '}{called} --help shows what it takes")
+        return errors.USAGE
     except Exception as error:
         from acquisition.errors import NeedsAnswer
 
@@ -94,8 +81,7 @@ def _call(words: Sequence[str]) -> int:
             raise
         from springmass.runs.questions import for_command
 
-        others, given = without_reading(words)
-        raise error.with_remedy(for_command(error.question, ["springmass", *others], given)) from None
+        raise error.with_remedy(for_command(error.question, ["springmass", *words])) from None
 
 
 _OUTPUT_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
@@ -110,14 +96,14 @@ def _abandon_output() -> None:
 
 def _exit_code(error: Exception) -> int | None:
     """Return the exit code of an error that is meant for the user, or None for a defect of the program."""
-    if isinstance(error, ProgramError):
+    if isinstance(error, errors.ProgramError):
         return error.exit_code
     from acquisition.errors import AcquisitionError, CalibrationError, PortError, SensorError
     from pipeline.errors import DynamicsError, PipelineError, SceneError
     from storage.errors import DiskNearlyFull, StorageError, WriteFailed
 
     if isinstance(error, PortError | CalibrationError | DiskNearlyFull):
-        return SENSOR
+        return errors.SENSOR
     if isinstance(error, SceneError | DynamicsError | WriteFailed | SensorError):
-        return USAGE
-    return UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None
+        return errors.USAGE
+    return errors.UNREADABLE if isinstance(error, AcquisitionError | PipelineError | StorageError) else None

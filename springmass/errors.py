@@ -27,17 +27,9 @@ NO_MEMORY = "there is not enough memory; end other programs, or raise the limit"
 
 
 class ProgramError(Error):
-    """An error for the user: a message of one line and an exit code.
+    """An error for the user: one line that says where, what is wrong, the value and what to do; and an exit code."""
 
-    Parameters
-    ----------
-    message : str
-        Where the error is, what is wrong, the value, and what to do.
-    exit_code : int
-        One of the codes above.
-    """
-
-    def __init__(self, message: str, exit_code: int) -> None:
+    def __init__(self, message: str, exit_code: int = USAGE) -> None:
         super().__init__(message)
         self.exit_code = exit_code
 

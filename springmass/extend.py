@@ -7,23 +7,19 @@ add.
 
 from __future__ import annotations
 
-from acquisition.block import Block, Flag
+from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
-from acquisition.decoders.framed import FramedDecoder
-from acquisition.decoders.lines import LineSplitter
-from acquisition.decoders.sum_frames import SumFrames, with_sum
+from acquisition.decoders.frames import FramedDecoder, LineSplitter, SumFrames, with_sum
 from acquisition.errors import FormatError, NeedsAnswer, SensorError
 from acquisition.readings import Reading, Readings
-from acquisition.recordings.base import Format, SurveyFormat
 from acquisition.recordings.families.declared import dialect
 from acquisition.recordings.questions import Missing, MissingItem, Question
-from acquisition.recordings.recording import Original, Recording, Trap
+from acquisition.recordings.recording import Format, Original, Recording, SurveyFormat, Trap
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.table import Column, Header, Table
-from acquisition.source import SourceInfo
 from pipeline.damping.laws.law import Law
 from pipeline.damping.laws.of_function import make_law
 from pipeline.dynamics import Equation, Integrator, Problem, Trajectory, get_integrator

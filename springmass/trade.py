@@ -20,7 +20,7 @@ from pipeline.analysis import Oscillation
 from pipeline.damping.laws import Law, find_law
 from pipeline.dynamics import Equation, Problem, integrators
 from pipeline.dynamics.halving import auto
-from pipeline.dynamics.solve_ivp import SolveIvp
+from pipeline.dynamics.methods import SolveIvp
 from pipeline.errors import DynamicsError, PipelineError
 from pipeline.options import TIERS, options_for
 from pipeline.track import F8, Track

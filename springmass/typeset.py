@@ -82,7 +82,7 @@ def prefixed(estimate: Estimate) -> Estimate:
     for below, factor, unit in _PREFIXES.get(estimate.unit, ()):
         if 0.0 < size < below:
             value, u = (float(f"{x * factor:.15g}") for x in (estimate.value, estimate.u))
-            return replace(estimate, value=value, u=u, unit=unit, variable=None)
+            return replace(estimate, value=value, u=u, unit=unit)
     return estimate
 
 

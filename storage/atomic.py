@@ -1,4 +1,4 @@
-"""Write files whole or not at all: temporary file, fsync, rename, fsync of the folder.
+"""Write files whole or not at all: temporary file, fsync, rename, fsync of the folder. Replace the files of a folder.
 
 A file that exists is therefore complete, even after a power cut. The temporary file of NAME is always .NAME.part, and
 its writer holds a lock on it. A second writer of the same file waits for the lock; the file that a killed writer left
@@ -11,8 +11,9 @@ import contextlib
 import errno
 import hashlib
 import os
+import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from storage.errors import RunExists, WriteFailed, one_line
@@ -164,3 +165,50 @@ def sync_folder(folder: Path) -> None:
 
 def _exists(target: Path) -> RunExists:
     return RunExists(target, "already exists", "choose another name or allow overwriting")
+
+
+@contextlib.contextmanager
+def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str) -> Iterator[Path]:
+    """Yield an empty folder to fill, and move its files into place when the ``with`` ends without an error.
+
+    ``names`` are all files that a build may make, as relative paths with slashes; those of an earlier build that this
+    one did not make are removed. ``last`` is the file that shows that the folder is complete. Raises WriteFailed if the
+    folder cannot be made; after an error of the body the old files are unchanged.
+    """
+    target = Path(path).resolve()
+    part, lock = part_of(target), None
+    with writing(path):
+        if target.exists() and not target.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "a file of that name exists")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if os.name == "nt":
+            part.mkdir(exist_ok=True)
+        else:
+            lock = lock_new(part, _open_folder)
+    try:
+        with writing(path):
+            for leftover in part.iterdir():
+                shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink()
+        yield part
+        with writing(path):
+            _move(part, target, names, last)
+            sync_folder(target)
+            sync_folder(target.parent)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _move(part: Path, target: Path, names: Collection[str], last: str) -> None:
+    new = sorted(each.relative_to(part).as_posix() for each in part.rglob("*") if not each.is_dir())
+    for name in (last, *sorted(set(names) - {*new})):
+        (target / name).unlink(missing_ok=True)
+    for name in sorted(new, key=lambda name: name == last):
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        os.replace(part / name, target / name)
+
+
+def _open_folder(path: Path) -> int:
+    path.mkdir(exist_ok=True)
+    return os.open(path, os.O_RDONLY)

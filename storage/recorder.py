@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import queue
+import shutil
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +20,8 @@ from typing import Any, Self
 
 from acquisition.clock import Clock
 from acquisition.readings import Read
-from storage.errors import NotALog, WriteFailed, one_line
-from storage.wire_log.appending import Item, WireLogWriter
-from storage.wire_log.log_file import LogFile, open_log_file
+from storage.errors import DiskNearlyFull, NotALog, WriteFailed, one_line
+from storage.wire_log.appending import Item, LogFile, WireLogWriter, open_log_file
 from storage.wire_log.records import HEAD_BYTES, HIGHEST_CHANNEL, MAX_PAYLOAD, Kind, LogHeader, event_payload
 from storage.wire_log.scanning import LogContents, read_log
 
@@ -42,31 +42,10 @@ class RecorderStatus:
     bytes: int
     synced_records: int
     synced_bytes: int
-    queued_records: int
     queued_bytes: int
     dropped_records: int
     dropped_bytes: int
     error: str
-    closed: bool
-
-
-@dataclass(slots=True)
-class _Overflow:
-    """The reads that one channel has lost since the queue became full."""
-
-    first_ns: int
-    last_ns: int
-    records: int = 0
-    bytes: int = 0
-
-    def add(self, mono_ns: int, size: int) -> None:
-        self.last_ns = mono_ns
-        self.records += 1
-        self.bytes += size
-
-    def event(self, channel: int) -> Item:
-        facts = {"records": self.records, "bytes": self.bytes, "first_ns": self.first_ns}
-        return Kind.EVENT, channel, self.last_ns, event_payload("overflow", facts)
 
 
 class Recorder:
@@ -103,10 +82,11 @@ class Recorder:
         self._wakeup: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._queued_bytes = 0
         self._taken: list[Item] = []  # what the disk has not answered yet
-        self._overflows: dict[int, _Overflow] = {}
+        # The reads that each channel has lost since the queue became full: time of the last one, and the event's facts.
+        self._overflows: dict[int, tuple[int, dict[str, int]]] = {}
         self._dropped_records = self._dropped_bytes = 0
         self._error: WriteFailed | None = None
-        self._closing = self._closed = False
+        self._closing = False
         self._stop_sync = threading.Event()
         self._appender = threading.Thread(target=self._append_all, name="springmass-log", daemon=True)
         self._syncer = threading.Thread(target=self._sync_often, name="springmass-sync", daemon=True)
@@ -129,9 +109,8 @@ class Recorder:
     def status(self) -> RecorderStatus:
         """The state of the recording; any thread may read it."""
         with self._lock:
-            queued, dropped = (len(self._queue), self._queued_bytes), (self._dropped_records, self._dropped_bytes)
-            error = str(self._error or "")
-            return RecorderStatus(*self._log.written, *self._log.synced, *queued, *dropped, error, self._closed)
+            pending = self._queued_bytes, self._dropped_records, self._dropped_bytes
+            return RecorderStatus(*self._log.written, *self._log.synced, *pending, str(self._error or ""))
 
     def unwritten(self) -> tuple[int, int]:
         """Return the number of reads that the disk has not taken, and their bytes: they still wait, or were dropped."""
@@ -181,8 +160,6 @@ class Recorder:
             self._guarded(self._append_end)
         self._guarded(self._log.sync)
         self._guarded(self._log.close)
-        with self._lock:
-            self._closed = True
         if self._error is not None:
             raise self._error
 
@@ -211,7 +188,10 @@ class Recorder:
                 self._dropped_records += 1
                 self._dropped_bytes += len(payload)
                 if accepting:
-                    self._overflows.setdefault(channel, _Overflow(mono_ns, mono_ns)).add(mono_ns, len(payload))
+                    first = {"records": 0, "bytes": 0, "first_ns": mono_ns}
+                    lost = self._overflows[channel][1] if channel in self._overflows else first
+                    more = {"records": lost["records"] + 1, "bytes": lost["bytes"] + len(payload)}
+                    self._overflows[channel] = mono_ns, lost | more
             if not was_waiting and (self._queue or self._overflows):
                 self._wakeup.put(None)
 
@@ -234,7 +214,10 @@ class Recorder:
         while True:
             with self._lock:
                 items, self._queue, self._queued_bytes = self._queue, [], 0
-                items += [lost.event(channel) for channel, lost in self._overflows.items()]
+                items += [
+                    (Kind.EVENT, channel, mono_ns, event_payload("overflow", lost))
+                    for channel, (mono_ns, lost) in self._overflows.items()
+                ]
                 self._overflows.clear()
                 self._taken = items
                 if not items:
@@ -286,3 +269,15 @@ def _in_records(records: Sequence[Read]) -> Iterable[Read]:
         for channel, mono_ns, payload in records
         for start in range(0, len(payload), MAX_PAYLOAD)
     ]
+
+
+def check_disk(path: Path, needed_bytes: int) -> None:
+    """Raise DiskNearlyFull if the disk of a file has less space, and WriteFailed if the file's folder is missing."""
+    try:
+        free = shutil.disk_usage(path.absolute().parent).free
+    except OSError as error:
+        problem = f"its folder cannot be read ({error.strerror or one_line(error)})"
+        raise WriteFailed(path, problem, "make the folder first") from error
+    if free < needed_bytes:
+        problem = f"the run needs {needed_bytes / 1e6:.1f} MB, but {free / 1e6:.1f} MB are free"
+        raise DiskNearlyFull(path, problem, "free disk space, record for a shorter time or use another disk")

@@ -26,11 +26,8 @@ _SHOWN = 60
 class ValueRefused(ValueError):
     """A value that is not allowed for its key: the dotted path of the key, and the reason."""
 
-    def __init__(self, key: str, reason: str) -> None:
-        super().__init__(key, reason)
-
-    def __str__(self) -> str:
-        return "{}: {}".format(*self.args)
+    def __init__(self, key: str, reason: str = "") -> None:
+        super().__init__(f"{key}: {reason}" if reason else key)  # from a pickle comes the whole text
 
 
 def parsed(text: bytes, key: str) -> Any:

@@ -16,16 +16,7 @@ aging (Murata P16E)."""
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """How a device identifies itself.
-
-    Parameters
-    ----------
-    model, version : str
-    name : str
-        Name that the owner gave the device; may be empty.
-    settings : mapping of str to int
-        Settings of the device; their names include the units.
-    """
+    """How a device identifies itself; names of settings include the units."""
 
     model: str
     version: str
@@ -58,20 +49,16 @@ class Decoder(Protocol):
 
         "garbage_bytes" counts the bytes outside of frames. Their fraction shows whether a stream is of this family.
         """
-        ...
 
     @property
     def pending(self) -> int:
         """Number of bytes of an incomplete frame; it is bounded for any input."""
-        ...
 
     def feed(self, host_ns: int, data: bytes) -> Readings:
         """Decode the bytes of one read of the port, and return the readings of the completed frames, if any."""
-        ...
 
     def flush(self) -> None:
         """Discard an incomplete frame, after the port was reopened or a reply timed out."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +91,6 @@ class Encoder(Protocol):
         self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
     ) -> bytes:
         """Return one frame; a NaN distance means no target."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +99,8 @@ class Family:
 
     Parameters
     ----------
-    name : str
-    title : str
-        One line for the user that lists the devices of the family.
+    name, title : str
+        Name in the registry, and one line for the user that lists the devices of the family.
     baud : int
         Default speed of the port (8 data bits, no parity, one stop bit).
     rate_hz : float

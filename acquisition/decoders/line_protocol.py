@@ -13,8 +13,7 @@ import re
 from binascii import crc_hqx
 
 from acquisition.decoders.family import DeviceStatus, Family, Identity
-from acquisition.decoders.framed import FramedDecoder
-from acquisition.decoders.lines import LineSplitter
+from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.readings import NAN, Reading
 
 LONGEST = 96  # maximum length of a line without its line feed, bytes

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import re
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from acquisition.decoders.family import Family
-from acquisition.decoders.framed import FramedDecoder
-from acquisition.decoders.lines import LineSplitter
+from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.readings import NAN, Reading
 
 _LONGEST = 64  # bytes; the lines of the start-up banner are shorter, and are counted as faults like any other text
@@ -56,68 +55,30 @@ class MaxbotixDecoder(FramedDecoder):
         return Reading(host_ns, distance_m=NAN if number in self._no_target else number * self._unit_m)
 
 
-def _family(name: str, title: str, form: Form, **facts: Any) -> Family:
-    decoder = partial(MaxbotixDecoder, form)
-    return Family(name=name, title=title, baud=9600, resolution_m=form.unit_m, decoder=decoder, **facts)
-
+_LV = "Steps of one inch, and everything nearer than 6 inches reads 6."
+_XL = "Steps of 1 cm at 10 Hz."
+_HR = "10 Hz, and everything nearer than 300 mm reads 300."
+_WR = "The free-running output is filtered to 1.2 to 1.5 Hz, useless for oscillations: trigger each reading."
+_TABLE = (
+    ("lv", "LV-MaxSonar-EZ", "Rddd, inches", Form(3, 0.0254, (255,)), 20.0, (0.1524, 6.45), _LV),
+    ("lv-p", "LV-ProxSonar-EZ", "Rddd Pn, inches", Form(3, 0.0254, (255,)), 20.0, (0.1524, 6.45), _LV),
+    ("xl", "XL-MaxSonar, 7.6 m models", "Rddd, cm", Form(3, 0.01, (765,)), 10.0, (0.2, 7.65), _XL),
+    ("xl-long", "XL-MaxSonar, 10 m models", "Rdddd, cm", Form(4, 0.01, (1068,)), 10.0, (0.2, 10.68), _XL),
+    ("hr", "HRLV- and HRUSB-MaxSonar", "Rdddd, mm", Form(4, 0.001, (5000,)), 10.0, (0.3, 5.0), _HR),
+    ("wr", "HRXL-MaxSonar-WR", "Rdddd, mm", Form(4, 0.001, (4999, 9999)), 7.5, (0.3, 9.998), _WR),
+)
 
 FAMILIES = {
-    family.name: family
-    for family in (
-        _family(
-            "maxbotix-lv",
-            "MaxBotix LV-MaxSonar-EZ (Rddd, inches)",
-            Form(3, 0.0254, (255,)),
-            rate_hz=20.0,
-            range_m=(0.1524, 6.45),
-            limits="Steps of one inch, and everything nearer than 6 inches reads 6.",
-            source="MaxBotix LV-MaxSonar-EZ data sheet",
-        ),
-        _family(
-            "maxbotix-lv-p",
-            "MaxBotix LV-ProxSonar-EZ (Rddd Pn, inches)",
-            Form(3, 0.0254, (255,)),
-            rate_hz=20.0,
-            range_m=(0.1524, 6.45),
-            limits="Steps of one inch, and everything nearer than 6 inches reads 6.",
-            source="MaxBotix LV-ProxSonar-EZ data sheet",
-        ),
-        _family(
-            "maxbotix-xl",
-            "MaxBotix XL-MaxSonar, 7.6 m models (Rddd, cm)",
-            Form(3, 0.01, (765,)),
-            rate_hz=10.0,
-            range_m=(0.2, 7.65),
-            limits="Steps of 1 cm at 10 Hz.",
-            source="MaxBotix XL-MaxSonar-EZ and -WR data sheets",
-        ),
-        _family(
-            "maxbotix-xl-long",
-            "MaxBotix XL-MaxSonar, 10 m models (Rdddd, cm)",
-            Form(4, 0.01, (1068,)),
-            rate_hz=10.0,
-            range_m=(0.2, 10.68),
-            limits="Steps of 1 cm at 10 Hz.",
-            source="MaxBotix XL-MaxSonar-EZL and -WRL data sheets",
-        ),
-        _family(
-            "maxbotix-hr",
-            "MaxBotix HRLV- and HRUSB-MaxSonar (Rdddd, mm)",
-            Form(4, 0.001, (5000,)),
-            rate_hz=10.0,
-            range_m=(0.3, 5.0),
-            limits="10 Hz, and everything nearer than 300 mm reads 300.",
-            source="MaxBotix HRLV-MaxSonar-EZ and HRUSB-MaxSonar-EZ data sheets",
-        ),
-        _family(
-            "maxbotix-wr",
-            "MaxBotix HRXL-MaxSonar-WR (Rdddd, mm)",
-            Form(4, 0.001, (4999, 9999)),
-            rate_hz=7.5,
-            range_m=(0.3, 9.998),
-            limits="The free-running output is filtered to 1.2 to 1.5 Hz, useless for oscillations: "
-            "trigger each reading.",
-            source="MaxBotix HRXL-MaxSonar-WR data sheet",
-        ),
+    f"maxbotix-{name}": Family(
+        name=f"maxbotix-{name}",
+        title=f"MaxBotix {model} ({lines})",
+        baud=9600,
+        rate_hz=rate_hz,
+        resolution_m=form.unit_m,
+        range_m=range_m,
+        limits=limits,
+        decoder=partial(MaxbotixDecoder, form),
+        source=f"MaxBotix {model.partition(',')[0]} data sheet",
     )
+    for name, model, lines, form, rate_hz, range_m, limits in _TABLE
 }

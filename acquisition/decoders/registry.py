@@ -6,6 +6,7 @@ entry point in the group ``springmass.sensors`` that refers to a :class:`acquisi
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
@@ -17,25 +18,18 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from importlib.metadata import EntryPoint
 
-    from acquisition.decoders.text_lines import TextLinesDecoder
-
 GROUP = "springmass.sensors"
 
-_TABLE = {
-    "line-protocol": "acquisition.decoders.line_protocol",
-    "maxbotix-lv": "acquisition.decoders.maxbotix",
-    "maxbotix-lv-p": "acquisition.decoders.maxbotix",
-    "maxbotix-xl": "acquisition.decoders.maxbotix",
-    "maxbotix-xl-long": "acquisition.decoders.maxbotix",
-    "maxbotix-hr": "acquisition.decoders.maxbotix",
-    "maxbotix-wr": "acquisition.decoders.maxbotix",
-    "ffhls": "acquisition.decoders.ffhls",
-    "us100": "acquisition.decoders.us100",
-    "urm37": "acquisition.decoders.urm37",
-    "sen0149": "acquisition.decoders.sen0149",
-    "text-lines": "acquisition.decoders.text_lines",
+_MODULES = {
+    "line-protocol": "line_protocol",
+    **dict.fromkeys([f"maxbotix-{model}" for model in ("lv", "lv-p", "xl", "xl-long", "hr", "wr")], "maxbotix"),
+    "ffhls": "summed",
+    "us100": "us100",
+    "urm37": "summed",
+    "sen0149": "summed",
+    "text-lines": "text_lines",
 }
-"""The module of each family; it has the object FAMILY, or FAMILIES by name."""
+"""The module of each family in this package; it has the object FAMILY, or FAMILIES by name."""
 
 _ENOUGH = 0.5
 """Minimum fraction of bytes in valid frames for a family to be recognised."""
@@ -43,18 +37,18 @@ _ENOUGH = 0.5
 
 def families() -> tuple[Family, ...]:
     """Return all families, with those of this package first."""
-    added = [_load(entry) for name, entry in entry_points_of(GROUP).items() if name not in _TABLE]
-    return (*map(_built_in, _TABLE), *added)
+    added = [_load(entry) for name, entry in entry_points_of(GROUP).items() if name not in _MODULES]
+    return (*map(_built_in, _MODULES), *added)
 
 
 def get_family(name: str) -> Family:
     """Return the family with a given name; the SensorError of an unknown name lists the known ones."""
-    if name in _TABLE:
+    if name in _MODULES:
         return _built_in(name)
     entries = entry_points_of(GROUP)
     if name in entries:
         return _load(entries[name])
-    known = ", ".join(dict.fromkeys([*_TABLE, *entries]))
+    known = ", ".join(dict.fromkeys([*_MODULES, *entries]))
     raise SensorError(f"sensor must be one of {known}, got {name!r}")
 
 
@@ -67,8 +61,11 @@ def probe(data: bytes) -> list[str]:
     all_families = families()
     shares = {family.name: _share(family, data) for family in all_families if family.self_framing}
     recognised = sorted((name for name, share in shares.items() if share >= _ENOUGH), key=lambda name: -shares[name])
+    others = (family for family in all_families if not family.self_framing)
     return recognised or [
-        family.name for family in all_families if not family.self_framing and _all_in_range(family, data)
+        family.name
+        for family in others
+        if len(readings := family.decoder().feed(0, data)) > 1 and not readings.flags.any()
     ]
 
 
@@ -84,7 +81,7 @@ def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> str:
     if len(set(data)) == 1:
         return f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?"
     if b"\n" in data and sum(byte in b"\t\r\n" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data):
-        return cast("TextLinesDecoder", get_family("text-lines").decoder(**(unread or {}))).unread(data)
+        return cast(str, cast(Any, get_family("text-lines").decoder(**(unread or {}))).unread(data))
     return "looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?"
 
 
@@ -96,14 +93,14 @@ def _share(family: Family, data: bytes) -> float:
     return 1 - decoder.faults.get("garbage_bytes", 0) / whole if len(readings) else 0.0
 
 
-def _all_in_range(family: Family, data: bytes) -> bool:
-    readings = family.decoder().feed(0, data)
-    return len(readings) > 1 and not readings.flags.any()
-
-
 def _built_in(name: str) -> Family:
-    module = import_module(_TABLE[name])
-    return _checked(name, module.FAMILIES if hasattr(module, "FAMILIES") else module.FAMILY)
+    module = import_module(f"acquisition.decoders.{_MODULES[name]}")
+    family: Family = module.FAMILIES[name] if hasattr(module, "FAMILIES") else module.FAMILY
+    return family
+
+
+def _load(entry: EntryPoint) -> Family:
+    return cast(Family, load_entry(entry, f"sensor {entry.name!r}", SensorError, partial(_checked, entry.name)))
 
 
 def _checked(name: str, loaded: Any) -> Family:
@@ -112,8 +109,3 @@ def _checked(name: str, loaded: Any) -> Family:
     if not isinstance(family, Family):
         raise SensorError(f"sensor {name!r}: expected a Family, got {type(family).__name__}; repair the package")
     return family
-
-
-def _load(entry: EntryPoint) -> Family:
-    family = load_entry(entry, f"sensor {entry.name!r}", SensorError, lambda family: _checked(entry.name, family))
-    return cast(Family, family)

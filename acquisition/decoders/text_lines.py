@@ -14,8 +14,7 @@ from itertools import pairwise
 from typing import Any
 
 from acquisition.decoders.family import DeviceStatus, Family
-from acquisition.decoders.framed import FramedDecoder
-from acquisition.decoders.lines import LineSplitter
+from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.errors import SensorError
 from acquisition.line_numbers import LENGTHS_M, TIMES_US, Number, find_distance, has_decimal_comma, numbers
 from acquisition.readings import NAN, Reading

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.block import F8, I8
 
@@ -171,10 +170,10 @@ def _stalls(x: F8, delay: F8, late: F8) -> list[tuple[int, int]]:
     return stalls
 
 
-def _steps(x: F8, delay: F8, stretches: int = 48) -> I8:
+def _steps(x: F8, delay: F8) -> I8:
     """Return the rows at which one clock jumped relative to the other, found by steps in the minimum delay."""
-    parts = [part for part in _parts(x, stretches) if part.size]
-    if len(parts) < stretches // 4:
+    parts = _parts(x, 48)
+    if len(parts) < 12:
         return np.empty(0, np.int64)
     lowest = np.array([part[np.argmin(delay[part])] for part in parts])
     dx, rise = np.diff(x[lowest]), np.diff(delay[lowest])
@@ -185,15 +184,15 @@ def _steps(x: F8, delay: F8, stretches: int = 48) -> I8:
 
 
 def _parts(x: F8, stretches: int) -> list[I8]:
-    """Divide the readings into stretches of equal duration, and return the rows of each stretch."""
+    """Divide the readings into stretches of equal duration, and return the rows of each that has any."""
     edges = np.linspace(x[0], x[-1], stretches + 1)
-    return np.split(np.arange(x.size), np.searchsorted(x, edges[1:-1]))
+    return [rows for rows in np.split(np.arange(x.size), np.searchsorted(x, edges[1:-1])) if rows.size]
 
 
-def _through_minima(x: F8, delay: F8, part: NDArray[np.int64], stretches: int = 12) -> tuple[float, float]:
+def _through_minima(x: F8, delay: F8, part: I8) -> tuple[float, float]:
     slope, line_u = 0.0, math.inf
-    parts = [rows for rows in _parts(x, stretches) if rows.size]
-    if len(parts) < stretches // 2:  # too few points are always close to a line
+    parts = _parts(x, 12)
+    if len(parts) < 6:  # too few points are always close to a line
         return 0.0, math.inf
     # The minima are taken relative to the current line; otherwise a steep line would move them to the stretch ends.
     for _ in range(3):
@@ -203,7 +202,7 @@ def _through_minima(x: F8, delay: F8, part: NDArray[np.int64], stretches: int = 
     return slope, line_u
 
 
-def _through_all(x: F8, delay: F8, part: NDArray[np.int64]) -> tuple[float, float]:
+def _through_all(x: F8, delay: F8, part: I8) -> tuple[float, float]:
     slope, u = _line(x, delay, part)
     residual = _within(delay - slope * x, part)
     power = float(residual @ residual)
@@ -218,7 +217,7 @@ def _through_all(x: F8, delay: F8, part: NDArray[np.int64]) -> tuple[float, floa
     return slope, u * math.sqrt(length)
 
 
-def _within(y: F8, part: NDArray[np.int64]) -> F8:
+def _within(y: F8, part: I8) -> F8:
     """Return the values minus the mean of their part."""
     if part[0] == part[-1]:
         return np.asarray(y - y.mean())
@@ -226,7 +225,7 @@ def _within(y: F8, part: NDArray[np.int64]) -> F8:
     return np.asarray(y - (np.bincount(number, y) / np.bincount(number))[number])
 
 
-def _line(x: F8, y: F8, part: NDArray[np.int64]) -> tuple[float, float]:
+def _line(x: F8, y: F8, part: I8) -> tuple[float, float]:
     """Fit lines with a common slope and an offset for each part; return the slope and its standard uncertainty.
 
     The uncertainty comes from the residuals. The scatter of a few points is itself uncertain, so the uncertainty is the

@@ -6,19 +6,18 @@ Live view, recording, recovery and replay from wire bytes all use this chain, so
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from acquisition.block import F8, Block, Flag
+from acquisition.block import F8, Block, Flag, Kind, SourceInfo
 from acquisition.decoders.family import DeviceStatus, Family
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, fit_clock
 from acquisition.live.timebase import Timebase, demand_within
 from acquisition.readings import NO_READINGS, Reading, Readings, carried
-from acquisition.source import Kind, SourceInfo
 
 CLOCKS_PPM = (0.0, 1e6)
 """Allowed range of ``clock_ppm``, the maximum rate error of a clock, ppm."""
@@ -78,11 +77,6 @@ class SensorChain:
         """
         self.last = readings = self.decoder.feed(host_ns, data)
         self._held += readings
-
-    def take_all(self, reads: Iterable[tuple[int, bytes]]) -> None:
-        """Decode the bytes of several reads, given as pairs of host time and bytes; see :meth:`take`."""
-        for host_ns, data in reads:
-            self.take(host_ns, data)
 
     def block(self) -> Block:
         """Return the samples of the held readings, with the next sample indices of the run.
@@ -165,9 +159,5 @@ class SensorChain:
 
 def _median(counts: Counter[float]) -> float:
     """Return the lower median of values that are counted; there is at least one."""
-    below = 0
-    for value in sorted(counts):
-        below += counts[value]
-        if 2 * below >= counts.total():
-            break
-    return value
+    values = sorted(counts)
+    return values[int(np.searchsorted(2 * np.cumsum([counts[value] for value in values]), counts.total()))]

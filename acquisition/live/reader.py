@@ -28,11 +28,9 @@ class Sink(Protocol):
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Receive reads of one port."""
-        ...
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Receive the event "lost", "reopened" or "timeout"."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from acquisition.block import Flag
+from acquisition.block import ClockKind, Flag
 from acquisition.errors import SensorError
 from acquisition.readings import Reading
-from acquisition.source import ClockKind
 
 RATES_HZ = (1e-6, 1e9)
 """Minimum and maximum allowed number of readings per second, far beyond any real experiment."""

@@ -1,4 +1,4 @@
-"""The formats of recordings, and the identification of a file's format.
+"""The formats of recordings, the identification of a file's format, and a remedy for known files that none reads.
 
 The module of a format is imported on demand. Another package adds a format with an entry point in the group
 ``springmass.formats``; a user can declare one without code (:mod:`acquisition.recordings.families.declared`).
@@ -7,17 +7,19 @@ The module of a format is imported on demand. Another package adds a format with
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
+from pathlib import Path, PurePath
 from typing import Any, cast
 
-from acquisition.errors import AcquisitionError, UnknownFormat
-from acquisition.recordings.base import Format, Survey, SurveyFormat, dialect_folder, read_bytes
-from acquisition.recordings.foreign import unknown_format
-from acquisition.recordings.recording import Recording
-from acquisition.recordings.tables.text import HEAD_BYTES, restated
+from platformdirs import user_config_path
+
+from acquisition.errors import AcquisitionError, FormatError, UnknownFormat
+from acquisition.recordings.recording import Format, Recording, Survey, SurveyFormat
+from acquisition.recordings.tables.text import HEAD_BYTES, head_lines, is_text, restated
+from acquisition.regular_file import open_regular
 from failure.extensions import entry_points_of, load_entry
 
 _MODULES = {
@@ -82,14 +84,7 @@ def open_recording(
     cells and the decimal mark of a text are found out unless they are stated.
     """
     name = os.fspath(path)
-    if delimiter or decimal:
-        original = read_bytes(path)
-        data = restated(name, original, delimiter, decimal)
-        reader = get_format(format) if format else _recognise(name, data[:HEAD_BYTES])
-        recording = _read(reader, name, data, answers)
-        return replace(recording, originals=(replace(recording.originals[0], data=original), *recording.originals[1:]))
-    reader = get_format(format) if format else _recognise(name, read_bytes(path, HEAD_BYTES))
-    data = read_bytes(path)
+    reader, original, data = _opened(name, format, delimiter, decimal)
     if velocity_path is not None:
         read_pair = getattr(reader, "read_pair", None)
         if read_pair is None:
@@ -97,25 +92,30 @@ def open_recording(
             raise UnknownFormat(name, problem, "leave the velocity file out")
         velocity = (os.fspath(velocity_path), read_bytes(velocity_path))
         return cast(Recording, read_pair((name, data), velocity, rate_hz=answers.get("rate_hz")))
-    return _read(reader, name, data, answers)
-
-
-def _read(reader: Format, name: str, data: bytes, answers: Mapping[str, Any]) -> Recording:
-    return reader.read(name, data, **{name: answer for name, answer in answers.items() if answer is not None})
+    recording = reader.read(name, data, **{name: answer for name, answer in answers.items() if answer is not None})
+    if data is original:
+        return recording
+    return replace(recording, originals=(replace(recording.originals[0], data=original), *recording.originals[1:]))
 
 
 def inspect(path: str | os.PathLike[str], *, delimiter: str | None = None, decimal: str | None = None) -> Inspection:
     """Return the format and the content of a file, before a channel is chosen."""
-    if delimiter or decimal:
-        data = restated(os.fspath(path), read_bytes(path), delimiter, decimal)
-        head = data[:HEAD_BYTES]
-    else:
-        data, head = b"", read_bytes(path, HEAD_BYTES)
-    reader = _recognise(os.fspath(path), head)
+    name = os.fspath(path)
+    reader, _, data = _opened(name, None, delimiter, decimal)
     if not isinstance(reader, SurveyFormat):
         return Inspection(reader.name, reader.title, "", ())
-    surveys = reader.survey(os.fspath(path), data or read_bytes(path))
-    return Inspection(reader.name, reader.title, reader.evidence(head), surveys)
+    return Inspection(reader.name, reader.title, reader.evidence(data[:HEAD_BYTES]), reader.survey(name, data))
+
+
+def _opened(path: str, format: str | None, delimiter: str | None, decimal: str | None) -> tuple[Format, bytes, bytes]:
+    """Return the format of a file, its bytes, and its bytes as they are to be read."""
+    if delimiter or decimal:
+        original = read_bytes(path)
+        data = restated(path, original, delimiter, decimal)
+        return get_format(format) if format else _recognise(path, data[:HEAD_BYTES]), original, data
+    reader = get_format(format) if format else _recognise(path, read_bytes(path, HEAD_BYTES))
+    data = read_bytes(path)
+    return reader, data, data
 
 
 def _recognise(path: str, head: bytes) -> Format:
@@ -134,17 +134,104 @@ def _loaders() -> dict[str, Callable[[], Format]]:
             if each.name in (*_MODULES, "table", "sketch"):
                 where = folder / f"{each.name}.toml"
                 raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')
-            loaders[each.name] = partial(_declared, each)
+            loaders[each.name] = partial(cast, Format, each)
     loaders |= {name: partial(_built_in, module) for name, module in _MODULES.items()}
     for name, entry in entry_points_of("springmass.formats").items():
         loaders.setdefault(name, partial(load_entry, entry, f'format "{name}"', AcquisitionError))
     return {**loaders, "table": partial(_built_in, "any_table"), "sketch": partial(_built_in, "sketch")}
 
 
-def _declared(each: Format) -> Format:
-    return each
-
-
 def _built_in(module: str) -> Format:
     name, _, variable = module.partition(":")
     return cast(Format, getattr(import_module(f"acquisition.recordings.families.{name}"), variable or "FORMAT"))
+
+
+def dialect_folder() -> Path:
+    """Return the folder of a user's dialects inside the system's folder for settings."""
+    return user_config_path("springmass", appauthor=False, roaming=True) / "dialects"
+
+
+def read_bytes(path: str | os.PathLike[str], limit: int = -1) -> bytes:
+    """Return the first bytes of a file, or all; raise an error if it cannot be read or is empty."""
+    name = os.fspath(path)
+    try:
+        with open_regular(name) as file:
+            data = file.read(limit)
+    except OSError as error:
+        problem = f"cannot be opened ({error.strerror or error})"
+        raise FormatError(name, problem, "check its name and permissions") from error
+    except ValueError as error:  # the name contains a NUL character
+        raise FormatError(repr(name), f"not a valid file name ({error})", "check the name") from error
+    if not data:
+        raise FormatError(name, "expected a recording, got an empty file", "check that the export ended")
+    return data
+
+
+_TEXT = 'export time and position as text, tab separated, under a line "Time (s)<TAB>Distance (m)"'
+_AS_CSV = "save the sheet as xlsx or CSV"
+
+
+def _is_hdf5(head: bytes) -> bool:
+    return any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048, 4096))
+
+
+def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:
+    return lambda head: head.startswith(with_bytes)
+
+
+_CONTENTS = (
+    ("a MATLAB file", _begins(b"MATLAB 5.0 MAT"), 'in MATLAB writematrix([t x], "run.csv")'),
+    ("an HDF5 file", _is_hdf5, "if it is a run file of springmass, open it as a run file"),
+    ("an OpenDocument file", lambda head: b"application/vnd.oasis.opendocument" in head[:200], _AS_CSV),
+    ("a TDMS index", _begins(b"TDSh"), "name the .tdms file next to it"),
+    ("a numpy file", _begins(b"\x93NUMPY"), 'in Python numpy.savetxt("run.csv", array, delimiter=",")'),
+    ("a page (PDF)", _begins(b"%PDF"), _TEXT),
+    ("a picture", lambda head: head.startswith((b"\x89PNG", b"\xff\xd8\xff", b"GIF8")), _TEXT),
+    (
+        "a video",
+        lambda head: head[4:8] == b"ftyp" or head[8:12] == b"AVI ",
+        "follow the mass in Tracker, and save there",
+    ),
+)
+_PROGRAMS = {
+    ".cap": ("a Capstone workbook", 'in Capstone "File", "Export Data", "CSV"'),
+    ".spk": ("a SPARKvue lab", 'in SPARKvue "Export Data", "CSV"'),
+    ".spklab": ("a SPARKvue lab", 'in SPARKvue "Export Data", "CSV"'),
+    ".pasco": ("a workbook of PASCO", 'in Capstone or SPARKvue "Export Data", "CSV"'),
+    ".ds": ("a DataStudio activity", 'in DataStudio "File", "Export Data"'),
+    ".qmbl": ("a LabQuest file", 'open it in Logger Pro or Graphical Analysis, and "Export", "CSV"'),
+    ".psdata": ("a PicoScope file", 'in PicoScope "File", "Save As", "CSV"'),
+    ".dwf3work": ("a WaveForms workspace", 'in WaveForms "File", "Export", "CSV"'),
+    ".wfm": ("an oscilloscope's waveform", "save it as CSV at the oscilloscope"),
+    ".isf": ("an oscilloscope's waveform", "save it as CSV at the oscilloscope"),
+    ".opj": ("an Origin project", 'in Origin "File", "Export", "ASCII"'),
+    ".opju": ("an Origin project", 'in Origin "File", "Export", "ASCII"'),
+    ".numbers": ("a Numbers sheet", 'in Numbers "File", "Export To", "CSV"'),
+    ".mat": ("a MATLAB file", 'in MATLAB writematrix([t x], "run.csv")'),
+    ".pkl": ("a pickle of Python", "save the numbers as CSV where they were made"),
+}
+"""Kind and remedy, by suffix, of program files that cannot be identified by their first bytes."""
+
+
+def foreign_format(path: str, head: bytes) -> UnknownFormat | None:
+    """Return the error for a known file that cannot be read, given its first bytes; None for an unknown file."""
+    for title, matches, remedy in _CONTENTS:
+        if matches(head):
+            return UnknownFormat(path, f"expected a recording, got {title}", remedy)
+    title, remedy = _PROGRAMS.get(PurePath(path).suffix.lower(), ("", ""))
+    return UnknownFormat(path, f"expected a recording, got {title}", remedy) if title else None
+
+
+def unknown_format(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
+    """Return the error for a file that none of the named formats recognises."""
+    if (known := foreign_format(path, head)) is not None:
+        return known
+    if not "".join(head_lines(head)).strip("\0 \t"):
+        return UnknownFormat(path, "expected a recording, got binary data or nothing", _TEXT)
+    if head.count(b"\n") + head.count(b"\r") == 0 and len(head) > 4096:
+        return UnknownFormat(path, "expected lines of text, got one line without end", _TEXT)
+    lines = [line.strip() for line in head_lines(head) if line.strip()]
+    if len(head) < HEAD_BYTES and len(lines) > 1 and is_text(head):
+        looks = f'{len(lines)} lines of text, the first "{lines[0][:40]}"'
+        return UnknownFormat(path, f"not a recording: no format recognises it, it looks like {looks}", _TEXT)
+    return UnknownFormat(path, f"not a recording that a format recognises (tried {', '.join(names)})", _TEXT)

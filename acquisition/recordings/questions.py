@@ -78,19 +78,6 @@ class MissingItem:
 
 
 @dataclass(frozen=True, slots=True)
-class Times:
-    """The range of the times of a channel, in the file's unit; ``step`` is the median of the first time steps."""
-
-    name: str
-    first: float
-    last: float
-    step: float
-
-    def __str__(self) -> str:
-        return f'"{self.name}" ({self.first:.6g} to {self.last:.6g}, {self.step:.3g} apart)'
-
-
-@dataclass(frozen=True, slots=True)
 class Question:
     """Everything that a reader needs before it can read one channel of a file.
 
@@ -104,8 +91,8 @@ class Question:
         answer only that item and read again, because the later items refer to the run and channel of the examples.
     columns : tuple of str
         The columns of the run, with their units.
-    times : Times or str
-        The range of the times, or only their name; an empty text if there are no times.
+    times : str
+        The name of the times in quotes, with their range and median step if known; empty if there are no times.
     reason : str
         The reason for the question, if the columns do not show it, for example an answer that does not fit.
     """
@@ -113,7 +100,7 @@ class Question:
     path: str
     needs: tuple[MissingItem, ...]
     columns: tuple[str, ...] = ()
-    times: Times | str = ""
+    times: str = ""
     reason: str = ""
 
     @property
@@ -129,12 +116,10 @@ class Question:
     @property
     def sentence(self) -> str:
         """The question in one sentence."""
-        times = f'"{self.times}"' if isinstance(self.times, str) and self.times else str(self.times)
         # The question lists the channels itself if it asks for one.
         shown = () if Missing.CHANNEL in self.missing else self.columns[:_MOST_LISTED]
-        more = len(self.columns) - len(shown) if shown else 0
-        named = [*([times] if times else []), *(f'"{each}"' for each in shown), *([f"{more} more"] if more else [])]
-        *others, last = named or [""]
+        more = f"{len(self.columns) - len(shown)} more" if shown and len(self.columns) > len(shown) else ""
+        *others, last = [name for name in (self.times, *(f'"{each}"' for each in shown), more) if name] or [""]
         columns = f"columns {', '.join(others)} and {last}" if others else last and f"column {last}"
         about = ", ".join(each for each in (self.reason, columns) if each)
         questions = ", and ".join(str(need) for need in self.needs)

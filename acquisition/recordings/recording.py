@@ -1,25 +1,17 @@
-"""A recording read by its format: its samples, the reader's remarks, and the bytes of the file."""
+"""The interface of a format of recordings, and a recording that it has read: samples, remarks, bytes of the file."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
 
-from acquisition.block import Block
-from acquisition.source import SourceInfo
+from acquisition.block import Block, SourceInfo
 
 
 @dataclass(frozen=True, slots=True)
 class Original:
-    """The bytes of a file, so that it can be restored bit for bit.
-
-    Parameters
-    ----------
-    name : str
-        The file's name without its folder.
-    data : bytes
-        Its content.
-    """
+    """The name of a file without its folder, and its bytes, so that it can be restored bit for bit."""
 
     name: str
     data: bytes = field(repr=False)
@@ -101,3 +93,64 @@ class Recording:
         """Yield the samples in blocks of at most ``size``."""
         for start in range(0, len(self.samples), size):
             yield self.samples[start : start + size]
+
+
+@runtime_checkable
+class Format(Protocol):
+    """A family of recordings. Files are identified by content, not by suffix."""
+
+    @property
+    def name(self) -> str:
+        """Name in the registry and on the command line."""
+
+    @property
+    def title(self) -> str:
+        """One line for the user."""
+
+    def recognises(self, head: bytes) -> bool:
+        """Return whether the first 8192 bytes of a file show that it belongs to this family.
+
+        This must be fast and never raise.
+        """
+
+    def read(
+        self,
+        path: str,
+        data: bytes,
+        *,
+        channel: str | None = None,
+        rate_hz: float | None = None,
+        unit: str | None = None,
+        run: str | None = None,
+        time: str | None = None,
+        time_unit: str | None = None,
+    ) -> Recording:
+        """Read one channel of one run of a file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """One channel of a file, as far as the file describes it.
+
+    ``rate_hz`` and ``span_s`` (from the earliest to the latest sample) are None if they cannot be determined, for
+    example because the user must give the rate.
+    """
+
+    run: str
+    channel: str
+    unit: str
+    samples: int
+    rate_hz: float | None
+    traps: tuple[Trap, ...]
+    span_s: float | None = None
+
+
+@runtime_checkable
+class SurveyFormat(Protocol):
+    """A family that states why it recognises a file and lists the channels of the file."""
+
+    def evidence(self, head: bytes) -> str:
+        """Return a few words on why a file belongs to this family, or an empty text if it does not."""
+
+    def survey(self, path: str, data: bytes) -> tuple[Survey, ...]:
+        """Return the description of every channel, as far as the file states it."""

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.block import F8, Block, Flag
+from acquisition.block import F8, Block, Flag, SourceInfo
 from acquisition.errors import FormatError
 from acquisition.recordings.tables.text import says_simulated
-from acquisition.source import SourceInfo
 
 _TITLE = "Motion Sensor Data File"
 _SHOWN = np.uint8(Flag.MISSING)  # this flag is not lost, because a NaN represents it

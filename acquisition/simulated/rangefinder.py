@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.block import Block, Flag
+from acquisition.block import Block, Flag, SourceInfo
 from acquisition.errors import SensorError
 from acquisition.readings import carried
-from acquisition.source import SourceInfo
 
 FALSE_ECHO_M = 5e-3
 """Mean distance of the false echoes beyond the bob, m."""

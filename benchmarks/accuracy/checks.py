@@ -7,6 +7,7 @@ and 5 % of an rms error.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -91,17 +92,15 @@ def name_of(case: Case) -> str:
 
 def efficiency(bench: Bench) -> Iterator[Line]:
     """Check that errors are near the bound, bias is far below it, and intervals cover the stated shares."""
-    for noise in NOISES_M:
-        case = Case(noise_m=noise)
+    for seconds, noise, tier in itertools.product((10.0, 120.0), NOISES_M, TIERS):
+        case = Case(seconds=seconds, noise_m=noise)
         bound = bounds(case)
-        for tier in TIERS:
-            outcomes = bench.run(case, tier)
-            yield all_found(f"{name_of(case)}, {tier}: an estimate", outcomes)
-            error, u = stacked(outcomes)
-            for k, quantity in enumerate(QUANTITIES):
-                yield from quantity_lines(
-                    f"{name_of(case)}, {tier}, {quantity}", error[:, k] / bound[k], u[:, k] / bound[k], tier
-                )
+        what = f"{name_of(case)}, {tier}"
+        outcomes = bench.run(case, tier)
+        yield all_found(f"{what}: an estimate", outcomes)
+        error, u = stacked(outcomes)
+        for k, quantity in enumerate(QUANTITIES):
+            yield from quantity_lines(f"{what}, {quantity}", error[:, k] / bound[k], u[:, k] / bound[k], tier)
 
 
 def quantity_lines(what: str, error: np.ndarray, u: np.ndarray, tier: str) -> Iterator[Line]:

@@ -30,7 +30,7 @@ WHAT = {
     "springmass.runs": "Run: a recording and its analysis",
     "springmass.charts": "every chart as data",
     "springmass.typeset": "numbers and units as text",
-    "springmass.values": "ranges of options",
+    "springmass.parameters": "options and their ranges",
     "springmass.stops": "Ctrl-C and other ends",
     "springmass.errors": "exit codes",
     "springmass.layout": "where the parts are",
@@ -64,13 +64,12 @@ WHAT = {
     "acquisition.replay": "a recording as a sensor",
     "acquisition.recordings": "files of other programs",
     "acquisition.decoders": "one family a sensor",
-    "acquisition.source": "what all sources are",
     "acquisition.block": "samples in a row",
     "acquisition.clock": "the only use of time",
 }
 ORDER = {
     "storage": [["recovery"], ["run_file"], ["wire_log", "recorder"]],
-    "acquisition": [["live", "simulated"], ["replay", "recordings"], ["decoders"], ["source"], ["block", "clock"]],
+    "acquisition": [["live", "simulated"], ["replay", "recordings"], ["decoders"], ["block", "clock"]],
 }
 """Packages whose rooms no contract orders."""
 

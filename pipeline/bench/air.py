@@ -33,11 +33,9 @@ TYPICAL_TEMPERATURE = Estimate(20.0, 3.0, "degC")
 TYPICAL_PRESSURE = Estimate(101325.0, 1500.0, "Pa")
 TYPICAL_HUMIDITY = Estimate(0.5, 0.2, "")
 
-GAS_CONSTANT = 8.314462618  # J/(mol K)
-MOLAR_MASS_DRY_KG = 28.96546e-3  # kg/mol, with the mole fraction CARBON_DIOXIDE
-MOLAR_MASS_WATER_KG = 18.01528e-3
-CARBON_DIOXIDE = 4e-4  # mole fraction
-ZERO_CELSIUS_K = 273.15
+GAS_CONSTANT, ZERO_CELSIUS_K = 8.314462618, 273.15  # J/(mol K), CODATA 2018; K, by definition (CGPM, 1954)
+CARBON_DIOXIDE = 4e-4  # mole fraction [1]_
+MOLAR_MASS_DRY_KG, MOLAR_MASS_WATER_KG = 28.96546e-3, 18.01528e-3  # kg/mol [1]_, with this fraction
 
 
 def saturation_pressure(temperature_c: float) -> float:

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 from pipeline.errors import TrackError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import SIGNIFICANT
 from pipeline.track import Track
 
+# Relative standard uncertainty of a crystal's rate: 50 ppm, as in data sheets, as the half-width of a rectangle.
 U_CRYSTAL = 50e-6 / math.sqrt(3.0)
-"""Relative standard uncertainty of a crystal's rate: 50 ppm as the half-width of a rectangular distribution."""
+# Maximum relative error of a host's clock, including its adjustment: the kernel slews by up to 500 ppm (RFC 5905).
 HOST_LIMIT = 500e-6
-"""Maximum relative error of a host's clock, including its adjustment: the kernel slews by up to 500 ppm (RFC 5905)."""
-CONTRADICTION = 3.0  # standard uncertainties at which the host's clock contradicts the sensor's
+# Time by which a host's time stamps may drift within a record although both clocks are right, s. A USB bridge delays
+# bytes by up to 16 ms (data sheet FTDI AN232B-04), and a host that becomes busy wakes its readers later.
 HOST_DELAY_S = 0.02
-"""Time by which a host's time stamps may drift within a record although both clocks are right, s. A USB bridge delays
-bytes by up to 16 ms (FTDI AN232B-04), and a host that becomes busy wakes its readers later."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ def _rate(track: Track) -> tuple[Estimate, str, bool]:
             f"{half * 1e6:.0f} ppm stand in every frequency's uncertainty as the half-width of a rectangle"
         )
         return Estimate(1.0, math.hypot(U_CRYSTAL, half / math.sqrt(3.0))), words, True
-    if abs(rate) > CONTRADICTION * math.hypot(u, math.sqrt(2.0) * U_CRYSTAL):
+    if abs(rate) > SIGNIFICANT * math.hypot(u, math.sqrt(2.0) * U_CRYSTAL):
         span_s = float(track.t[-1] - track.t[0])
         apart_s = abs(rate) * (span_s if track.compared_s is None else min(track.compared_s, span_s))
         if apart_s < HOST_DELAY_S:

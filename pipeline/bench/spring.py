@@ -7,10 +7,11 @@ import math
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 
-GRAVITY_M_PER_S2 = 9.80665  # standard gravity, by definition (3rd CGPM, 1901)
+# Maximum mass of an unweighed spring over the bob's; laboratory springs have 5 to 50 g for bobs of 0.1 to 0.5 kg.
 HEAVIEST_SHARE = 0.3
-"""Maximum mass of an unweighed spring over the bob's; laboratory springs have 5 to 50 g for bobs of 0.1 to 0.5 kg."""
-SERIES = 1e-4  # ratio of spring mass to load up to which the series is exact to 1e-13
+GRAVITY_M_PER_S2 = 9.80665  # standard gravity, by definition, 3rd CGPM (1901)
+# Ratio of spring mass to load up to which the series of Fox and Mahanty (1970) is exact to 1e-13.
+SERIES = 1e-4
 
 
 def oscillating_mass_kg(spring_kg: float, load_kg: float) -> float:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.motion.averaged import Phase
+from pipeline.numerics.levels import FALSE_ALARM, normal_quantile
 from pipeline.track import U8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
-LEAST = 3  # minimum number of false echoes in a cluster
-BRIDGED = 2  # maximum number of good samples between two false echoes of one cluster
-CHANCE = 1e-3  # probability of a finding for a record whose noise is normal
-SPREAD = 1.2  # maximum noise of a window over the record's: one in a hundred windows of twelve samples exceeds it
-TURNING = math.pi / 4.0  # phase from a turning point: this range contains half of the time, but only 0.29 of the path
-
+# Minimum number of false echoes in a cluster, and maximum distance between neighbours. Independent echoes on one sample
+# in a thousand form a cluster at a given one with a probability of 1e-5.
+CLUSTER = 3
 COUNTED = {
     str(quality.name).lower(): int(quality)
     for quality in Quality
@@ -54,7 +51,7 @@ def echoes_by_chance(before: U8, demodulated: Demodulated, clip_sigmas: float) -
     :math:`n\\alpha`, :math:`\\alpha = 2\\Phi(-c)`. No sample lies beyond the quantile of :math:`10^{-3}/2n`. The noise
     of a window is known only to a tenth, so up to twice as many samples are clipped.
     """
-    from scipy.special import ndtr, ndtri, pdtrc
+    from scipy.special import ndtr, pdtrc
 
     echo = np.uint8(Quality.FALSE_ECHO)
     if np.any(before & echo):
@@ -64,8 +61,8 @@ def echoes_by_chance(before: U8, demodulated: Demodulated, clip_sigmas: float) -
     farthest = float(np.max(np.abs(demodulated.residual[rows]), initial=0.0))
     expected = 2.0 * n * 2.0 * float(ndtr(-clip_sigmas))
     return bool(
-        farthest < -float(ndtri(0.5 * CHANCE / n)) * demodulated.noise_m * SPREAD
-        and pdtrc(rows.size - 1, expected) > CHANCE
+        farthest < normal_quantile(1.0 - FALSE_ALARM / n) * demodulated.noise_m
+        and pdtrc(rows.size - 1, expected) > FALSE_ALARM
     )
 
 
@@ -80,11 +77,11 @@ def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> Clust
     if not rows.size:
         return Clusters(0, 0, 0, 0.0)
     angle = phase.total(track.t[rows])
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1])
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(rows) > CLUSTER) + 1])
     sizes = np.diff(np.concatenate([starts, [rows.size]]))
-    clusters = sizes >= LEAST
+    clusters = sizes >= CLUSTER
     middles = angle[(starts + sizes // 2)[clusters]]
-    turning = np.abs(middles - math.pi * np.round(middles / math.pi)) <= TURNING
+    turning = np.cos(2.0 * middles) >= 0.0
     fitted = int(np.count_nonzero((demodulated.flags & UNUSABLE) == 0)) + rows.size
     residual = demodulated.residual[rows]
     residual[~np.isfinite(residual)] = 0.0

@@ -1,42 +1,35 @@
 """The judge: tests of the residual in order, and what they add to the uncertainties.
 
-Each test states the probability of a false alarm, or a size below which no user would act. A test that explains the
-residual takes its part away before the next; what no named cause explains is ``model_misfit``.
+A test fires with a stated probability, or above a size below which no user would act. One that explains the residual
+takes its part away before the next; what no named cause explains is ``model_misfit``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.checks.limits import beyond_limits
-from pipeline.checks.misfit import Misfit
 from pipeline.checks.model import colour, excess, halves, phases
-from pipeline.checks.residual import Outcome, Residual, residual_of
+from pipeline.checks.residual import Misfit, Outcome, Residual, residual_of
+from pipeline.checks.rounding import rounding
 from pipeline.checks.sensor import held, smoothed
 from pipeline.checks.shape import folded_shape
 from pipeline.motion.averaged import Fitted
+from pipeline.numerics.levels import FALSE_ALARM
 from pipeline.registry.found import Found
 from pipeline.samples.condition import Conditioned
 from pipeline.windows.lost_rows import LostRows
 
-
-class Test(NamedTuple):
-    """A test of the residual, and the probability with which it accuses a run that follows its model."""
-
-    run: Callable[[Residual], Outcome | None]
-    false_alarm: float | None  # None: it fires by size
-
-
-TESTS = (
-    Test(folded_shape, 1e-5),  # seven harmonics of 1e-6 each, and a ratio
-    Test(held, None),
-    Test(smoothed, None),  # at 64 samples a correlation of 0.4 is three standard deviations
-    Test(excess, None),
-    Test(halves, 1e-4),
-    Test(colour, 1e-4),
-    Test(phases, 1e-4),
+# The tests of the residual in order. Each may accuse a run that follows its model with an equal share of FALSE_ALARM.
+TESTS: tuple[Callable[[Residual, float], Outcome | None], ...] = (
+    folded_shape,
+    held,
+    smoothed,
+    excess,
+    halves,
+    colour,
+    phases,
 )
 
 
@@ -52,10 +45,12 @@ def judge(
     if lost is not None:
         missing = {"places": lost.places, "share": lost.share}
         outcomes.append(Outcome("lost_rows", missing, Misfit(name="lost_rows", clock=lost.share)))
+    if (rounded := rounding(samples, fitted)) is not None:
+        outcomes.append(rounded)
     if fitted.method != "equation":
         residual = residual_of(samples, fitted, filter_)
         for test in TESTS:
-            if (outcome := test.run(residual)) is not None:
+            if (outcome := test(residual, FALSE_ALARM / len(TESTS))) is not None:
                 outcomes.append(outcome)
                 residual = residual.less(outcome)
     numbers: dict[str, dict[str, float | str | None]] = {}

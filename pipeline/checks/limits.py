@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.bench.spring import GRAVITY_M_PER_S2
-from pipeline.checks.misfit import Misfit
-from pipeline.checks.residual import Outcome
+from pipeline.checks.residual import Misfit, Outcome
 from pipeline.motion.averaged import Fitted
+from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import UNUSABLE
@@ -48,7 +48,6 @@ LIMITS = (
     Limit("implausible_distance", "nearest_m", ("low_m", "high_m"), least=math.ulp(0.0), misfit=_no_distance),
     Limit("implausible_distance", "share_of_distance", ("low_m", "high_m"), most=1.0, misfit=_no_distance),
 )
-COUNTED = 0.02  # minimum share of negative values in positions counted from a place in the midst of the motion
 
 
 def beyond_limits(samples: Conditioned, fitted: Fitted) -> Iterator[Outcome]:
@@ -93,6 +92,6 @@ def _numbers(samples: Conditioned, fitted: Fitted) -> dict[str, float]:
         low_m, high_m = float(np.min(y)), float(np.max(y))
         numbers |= {"low_m": low_m, "high_m": high_m, "farthest_m": max(high_m, -low_m)}
         # Positions counted from rest have both signs; no sensor of distances gives many negative ones.
-        if float(np.mean(y < 0.0)) < COUNTED:
+        if float(np.mean(y < 0.0)) < NEGLIGIBLE:
             numbers |= {"nearest_m": low_m, "share_of_distance": amplitude_m / rest_m if rest_m else math.inf}
     return numbers

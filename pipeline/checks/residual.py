@@ -9,15 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.bench.sensor_filter import SensorFilter
-from pipeline.checks.misfit import Misfit
 from pipeline.motion.averaged import Fitted
+from pipeline.numerics.levels import FEWEST_FOR_LINE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import model_error
 
-FEWEST = 64  # minimum number of samples: four in each of the sixteen parts in which the shape is compared
-COARSE = 2.6  # ratio of step to noise above which the step is coarse: for rounding noise alone it is sqrt(12) = 3.5
+# Parts of the run that must agree on a shape. At a probability of 1e-6 its power must be 23 times its variance, instead
+# of 14 for infinitely many parts (F distribution with 2 and 30 degrees of freedom).
+PARTS = 16
+# Ratio of step to noise above which the step is coarse: rounding makes 56 % of the variance. It is 3.5 for rounding
+# alone. Readings with a ratio of 2.5 still have correlations, measured by `python -m tests.golden --only kamjha`.
+COARSE = 2.6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misfit:
+    """Standard uncertainties of the estimates because the model of the fit does not describe the record."""
+
+    name: str  # of the input in every budget
+    amplitude_m: float = 0.0
+    offset_m: float = 0.0
+    phase_rad: float = 0.0
+    damping_rate: float = 0.0
+    clock: float = 0.0  # relative, of all quantities measured by the times of the record
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +74,7 @@ class Residual:
     @property
     def enough(self) -> bool:
         """Whether there are enough samples for tests of them."""
-        return self.values.size >= FEWEST and self.seconds > 0.0
+        return self.values.size >= FEWEST_FOR_LINE * PARTS and self.seconds > 0.0
 
     @property
     def noisy(self) -> bool:

@@ -6,19 +6,24 @@ import math
 
 import numpy as np
 
-from pipeline.checks.misfit import Misfit
-from pipeline.checks.residual import Outcome, Residual
+from pipeline.checks.residual import Misfit, Outcome, Residual
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-ALIKE = 0.4  # correlation of neighbouring residuals that shows a filter: a running mean over two samples gives 0.5
-STEADY = 2.0  # maximum ratio of the covariances in the halves: noise is constant, residuals of the motion decay
+# Correlation of neighbouring residuals that shows a filter. A running mean over two samples gives 0.5; white noise of
+# 80 samples exceeds 0.4 with a probability of 2e-4.
+ALIKE = 0.4
+# Maximum ratio of the covariances in the halves: noise is constant, residuals of the motion decay. Without it ten
+# unfiltered recordings appear filtered, as measured by `python -m tests.golden`.
+STEADY = 2.0
 # Minimum fall of the correlation from one sample to the next, over the mean fall within the correlation length: 1 for a
-# running mean, 2 for a lag. A motion or a curve that is smooth by itself falls far less from the first to the second.
+# running mean, 2 for a lag, and 0 for a curve that is smooth by itself, as measured in `python -m tests.golden --only
+# ubsuny`.
 CUSP = 0.5
-LINES = 1.8  # samples per bend, over those of white noise, above which readings are joined by lines
-STEPS = 2.4  # maximum bend by rounding, over the noise, up to which bends by noise show
+# Samples per bend, over those of white noise, above which readings are joined by lines: two if every other one is, and
+# 1.0 for white noise. All records of `pytest tests/trials/test_sensor_causes.py` that are joined are above it.
+LINES = 1.8
 
 
 def held_count(samples: Conditioned) -> int:
@@ -45,7 +50,7 @@ def held_numbers(count: int, step_s: float) -> dict[str, float | None]:
     return {"count": count, "interval_s": count * step_s, "late_s": 0.5 * step_s * (count - 1)}
 
 
-def held(residual: Residual) -> Outcome | None:
+def held(residual: Residual, _: float) -> Outcome | None:
     """Test for readings that are held over N samples, or joined by straight lines.
 
     Holding acts as one running mean over N samples, joining as two without delay.
@@ -58,10 +63,11 @@ def held(residual: Residual) -> Outcome | None:
     if repeats == 1:
         y = samples.track.y[samples.used]
         rounding = max(2.02 * (samples.quantum_m or 0.0), 1e-12 * float(np.ptp(y)))
-        # White noise of deviation s bends the line by more than x at a share erfc(x/(sqrt(12) s)) of the samples.
-        white = math.erfc(rounding / (math.sqrt(12.0) * max(residual.noise_m, 1e-300)))
+        # White noise of deviation s bends the line by sqrt(6) s, and by more than x at a share erfc(x/(sqrt(12) s)).
+        bend_m = math.sqrt(6.0) * max(residual.noise_m, 1e-300)
+        white = math.erfc(rounding / (math.sqrt(2.0) * bend_m))
         share = max(float(np.mean(np.abs(np.diff(y, 2)) > rounding)), 1e-3)
-        if rounding > STEPS * residual.noise_m or share > white / LINES:
+        if rounding > bend_m or share > white / LINES:
             return None
         # A reading between two samples bends the line at both.
         count, late = 2.0 * white / share, 0.0
@@ -71,7 +77,7 @@ def held(residual: Residual) -> Outcome | None:
     return Outcome("held_samples", held_numbers(repeats, residual.step_s), misfit, lags=math.inf)
 
 
-def smoothed(residual: Residual) -> Outcome | None:
+def smoothed(residual: Residual, _: float) -> Outcome | None:
     """Test how far neighbouring samples are alike; None if that affects no result.
 
     A running mean over N samples correlates white noise over N samples, :math:`1 + 2\\sum\\rho_l = N`, takes

@@ -8,19 +8,20 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.checks.misfit import Misfit
-from pipeline.checks.residual import Outcome, Residual
+from pipeline.checks.residual import PARTS, Misfit, Outcome, Residual
+from pipeline.numerics.levels import IMPROBABLE
 from pipeline.track import F8
 
-BINS = 64  # phase bins per period; the eighth harmonic keeps sin(pi 8/64)/(pi 8/64) = 0.97 of its amplitude
-FALSE_ALARM = 1e-6  # probability that white noise shows a given harmonic
-HIGHEST = 8  # highest order of harmonics that are sought
-PARTS = 16  # number of parts of the run that must agree on a harmonic
-REPORTED = 0.002  # minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones
-CENTRES = 2.0 * math.pi * (np.arange(BINS) + 0.5) / BINS
+# Highest order of the harmonics that are sought; each further one adds IMPROBABLE to the probability of a false alarm.
+HIGHEST = 8
+BINS = HIGHEST**2  # phase bins per period: the highest harmonic keeps sin(x)/x = 0.97 of its amplitude, x = pi/8
+# Minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones. Those of a scale
+# bent by 1 % reach it, as measured by `python -m tests.trials.troubles --only bent`.
+REPORTED = 0.002
+CENTRES = math.tau * np.arange(BINS) / BINS + math.pi / BINS
 
 
-def folded_shape(residual: Residual) -> Outcome | None:
+def folded_shape(residual: Residual, _: float) -> Outcome | None:
     """Test for a wave that has the same shape in every period.
 
     The fit of every window removes the constant and the first harmonic. So the residuals contain the harmonics from the
@@ -50,7 +51,7 @@ def folded_shape(residual: Residual) -> Outcome | None:
         falling = _folded(residual, bins, orders, relative)
         if falls := float(np.min(falling[1])) < float(np.min(chance)):
             mean, chance = falling
-    stands = np.flatnonzero(chance < FALSE_ALARM)
+    stands = np.flatnonzero(chance < IMPROBABLE)
     each = np.real(mean[stands, None] * np.exp(1j * orders[stands, None] * CENTRES))
     wave = each.sum(axis=0)
     peak_m = float(np.max(np.abs(wave)))

@@ -5,58 +5,35 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, REJECTION, choose
-from pipeline.damping.law_fit import LawFit, rates_of
-from pipeline.damping.laws import Law, words_of
-from pipeline.damping.select import EVIDENCE, Damping
+from pipeline.damping.law_fit import NEGATIVE, LawFit, Rejection, choose
+from pipeline.damping.laws import words_of
+from pipeline.damping.select import Damping
 from pipeline.errors import AnalysisError
-from pipeline.numerics.estimate import Joint
+from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.levels import FALSE_ALARM, STRONG
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.track import F8
 
-Rejection = Literal["", "misfit", "differ", "negative"]
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JointFit:
-    """One law with coefficients that all runs share; ``chi2`` and ``dof`` are reduced for the correlation of points.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class JointFit(LawFit):
+    """One law with coefficients that all runs share; its amplitude at the start is the largest of them, and exact.
 
     ``excess_chi2`` is the increase of chi-square over separate coefficients, and ``excess_dof`` their number saved.
     The law is rejected if chi-square is improbable, if the coefficients differ or if one is negative.
     """
 
-    law: Law
-    coefficients: Joint
-    largest_m: float
     smallest_m: float
-    chi2: float
-    dof: float
-    bic: float
     excess_chi2: float
     excess_dof: float
-    rejection: Rejection
 
     @property
-    def rejected(self) -> bool:
-        """Whether the runs contradict one law with common coefficients."""
-        return self.rejection != ""
-
-    @property
-    def reduced_chi2(self) -> float:
-        """Chi-square over the degrees of freedom."""
-        return self.chi2 / self.dof if self.dof > 0 else math.nan
-
-    def rates(self, amplitude: F8) -> tuple[F8, F8]:
-        """Return -dA/dt at amplitudes (n,) in m, and its standard uncertainty, both (n,) in m/s."""
-        # The rate depends only on the coefficients, so any start amplitude gives the same result.
-        theta = np.concatenate([[1.0], self.coefficients.values])
-        covariance = np.zeros((theta.size, theta.size))
-        covariance[1:, 1:] = self.coefficients.covariance
-        return rates_of(self.law, amplitude, theta, covariance)
+    def coefficients(self) -> dict[str, Estimate]:
+        """The shared coefficients by name."""
+        return {name: self.joint[name] for name in self.joint.names[1:]}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,15 +73,15 @@ def join(runs: Sequence[tuple[str, Damping, float]]) -> JointDamping:
     fits = {name: _joined([damping.fits[name] for _, damping, _ in runs], last_s) for name in shared}
 
     def span(name: str) -> F8:
-        return np.array([fits[name].largest_m, fits[name].smallest_m])
+        return np.array([fits[name].joint.values[0], fits[name].smallest_m])
 
-    selected, admissible = choose(fits, EVIDENCE, span)
+    selected, admissible = choose(fits, STRONG, span)
     names = tuple(name for name, _, _ in runs)
     return JointDamping(names, fits, selected, admissible, _message(names, fits, selected, admissible))
 
 
 def _joined(each: Sequence[LawFit], last_s: Sequence[float]) -> JointFit:
-    law, units = each[0].law, each[0].joint.units
+    law = each[0].law
     theta = np.array([fit.joint.values[1:] for fit in each])
     # A law that chi-square rejects has a wider covariance, which must not hide that the coefficients differ.
     known = [np.linalg.pinv(fit.joint.covariance[1:, 1:] / fit.widening, hermitian=True) for fit in each]
@@ -115,25 +92,35 @@ def _joined(each: Sequence[LawFit], last_s: Sequence[float]) -> JointFit:
     chi2 = sum(fit.reduced_chi2 * fit.dof for fit in each if fit.dof > 0) + excess
     dof = sum(fit.dof for fit in each) + saved
     rejection: Rejection = ""
-    if dof >= 1.0 and chi2 > chi2_quantile(1.0 - REJECTION, dof):
+    if dof >= 1.0 and chi2 > chi2_quantile(1.0 - FALSE_ALARM, dof):
         rejection = "misfit"
-    elif saved and excess > chi2_quantile(1.0 - REJECTION, saved):
+    elif saved and excess > chi2_quantile(1.0 - FALSE_ALARM, saved):
         rejection = "differ"
     elif np.any(mean < -NEGATIVE * np.sqrt(np.diag(covariance))):
         rejection = "negative"
     ends = [fit.amplitude(np.array([0.0, seconds])) for fit, seconds in zip(each, last_s, strict=True)]
     count = len(each) + mean.size
     bic = chi2 + count * math.log(max(dof + count, 2.0))
-    coefficients = Joint(tuple(law.parameters)[1:], mean, covariance, units[1:])
+    joint = Joint(
+        tuple(law.parameters), np.append(np.max(ends), mean), np.pad(covariance, ((1, 0), (1, 0))), each[0].joint.units
+    )
     return JointFit(
-        law, coefficients, float(np.max(ends)), float(np.min(ends)), chi2, dof, bic, excess, saved, rejection
+        law,
+        joint,
+        chi2 / dof if dof > 0 else math.nan,
+        dof,
+        bic,
+        rejection,
+        smallest_m=float(np.min(ends)),
+        excess_chi2=excess,
+        excess_dof=saved,
     )
 
 
 def _message(names: tuple[str, ...], fits: Mapping[str, JointFit], selected: str, admissible: tuple[str, ...]) -> str:
     together, best = ", ".join(names), fits[selected]
     if admissible:
-        values = ", ".join(f"{name} = {value}" for name, value in best.coefficients.estimates().items()) or "none"
+        values = ", ".join(f"{name} = {value}" for name, value in best.coefficients.items()) or "none"
         rest = f"; {', '.join(admissible[1:])} would do as well" if len(admissible) > 1 else ""
         return f"One damping law holds across {together}: {words_of(best.law)} ({values}){rest}."
     alike = [words_of(fit.law) for fit in fits.values() if fit.rejection == "differ"]

@@ -8,22 +8,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, choose, least_chi2, weigh
-from pipeline.damping.law_fit import LawFit, fit_law, mean_squared_rate
+from pipeline.damping.law_fit import NEGATIVE, LawFit, choose, fit_law, least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import Fit
+from pipeline.numerics.levels import FALSE_ALARM, STRONG
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 
-# A law is not admissible if its BIC exceeds the lowest by more than this, which is "strong" evidence: R. E. Kass,
-# A. E. Raftery, J. Am. Stat. Assoc. 90 (1995) 773.
-EVIDENCE = 6.0
 FEW_LAWS = ("none", "linear", "quadratic", "linear+quadratic")  # those of the tier "fast"
-# Probability with which a record that follows one of the few laws still causes all to be tried.
-DOUBT = 0.01
 LOOSEST_POWER = 3.0  # maximum standard uncertainty of a free power that is stated: known powers lie between 0 and 2
 
 
@@ -133,17 +128,17 @@ def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> tuple[s
     if known in fits:
         return known, () if fits[known].rejected else (known,)
     ends = np.array([0.0, last_s])
-    return choose(fits, EVIDENCE, lambda name: fits[name].amplitude(ends))
+    return choose(fits, STRONG, lambda name: fits[name].amplitude(ends))
 
 
 def _curved(damping: Damping) -> bool:
     """Return whether the decay has a curvature that neither linear nor quadratic drag explains alone."""
     mixed, best = damping.of_powers(1, 2), damping.best
-    if best is mixed or (best.dof > 0 and best.reduced_chi2 * best.dof > chi2_quantile(1.0 - DOUBT, best.dof)):
+    if best is mixed or (best.dof > 0 and best.reduced_chi2 * best.dof > chi2_quantile(1.0 - FALSE_ALARM, best.dof)):
         return True
     if mixed is None:
         return False
-    below = math.sqrt(chi2_quantile(1.0 - DOUBT, 1.0))
+    below = math.sqrt(chi2_quantile(1.0 - FALSE_ALARM, 1.0))
     return any(term.value < -below * term.u for term in list(mixed.joint.estimates().values())[1:])
 
 

@@ -7,18 +7,14 @@ the group ``springmass.integrators``; :func:`springmass.testing.check` tests it.
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any, cast
-
-from failure.extensions import entry_points_of, load_entry
+from failure.extensions import entry_points_of, load_named
 from pipeline.dynamics.equation import Equation as Equation
+from pipeline.dynamics.equation import Problem as Problem
+from pipeline.dynamics.equation import effective_mass_kg as effective_mass_kg
 from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import Integrator as Integrator
 from pipeline.dynamics.integrator import Trajectory as Trajectory
-from pipeline.dynamics.methods import FORWARD_EULER, RK4, SYMPLECTIC_EULER, VERLET, YOSHIDA4
-from pipeline.dynamics.problem import Problem as Problem
-from pipeline.dynamics.problem import effective_mass_kg as effective_mass_kg
-from pipeline.dynamics.solve_ivp import DOP853
+from pipeline.dynamics.methods import DOP853, FORWARD_EULER, RK4, SYMPLECTIC_EULER, VERLET, YOSHIDA4
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 
@@ -51,16 +47,9 @@ def get_integrator(name: str) -> Integrator:
         return INTEGRATORS[name]
     if name not in _names():
         raise DynamicsError(f"unknown method {name!r}; allowed are auto, {', '.join(_names())}")
-    found = load_entry(entry_points_of(_GROUP)[name], f"method {name!r}", DynamicsError, partial(_named, name))
-    return cast(Integrator, found)
+    found: Integrator = load_named(_GROUP, name, Integrator, DynamicsError)
+    return found
 
 
 def _names() -> tuple[str, ...]:
     return tuple(dict.fromkeys((*INTEGRATORS, *entry_points_of(_GROUP))))
-
-
-def _named(name: str, loaded: Any) -> Any:
-    """Return what an entry point gives, if it is an integrator of that name."""
-    if not isinstance(loaded, Integrator) or loaded.name != name:
-        raise DynamicsError(f"expected an Integrator named {name!r}, got {loaded!r:.80}")
-    return loaded

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws.drag import amplitudes
-from pipeline.dynamics.problem import Problem, effective_mass_kg
+from pipeline.dynamics.equation import Problem, effective_mass_kg
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8
@@ -25,9 +25,9 @@ from pipeline.track import F8
 C16 = NDArray[np.complex128]
 
 LEVELS = ("low_95", "low_68", "high_68", "high_95")
-SHARES = (0.025, 0.158655, 0.841345, 0.975)  # share of the members below each level
-MEMBERS = 2000  # default ensemble size; the share inside the 95 % band then scatters by half a percent
-RADIANS = 0.4  # from one state to the next; between them the band is off by half a percent of its width (rms)
+SHARES = (0.025, 0.158655, 0.841345, 0.975)  # probabilities below each level
+MEMBERS = 2000  # default ensemble size; by chance, the share inside the 95 % band then scatters by half a percent
+RADIANS = 0.4  # from one state to the next; between them the band is off by half a percent of its width, as measured
 MOST_STEPS = 25_000  # maximum number of states of a band
 STRETCH = 1000  # number of states in memory at a time
 STRONGEST = 0.9  # maximum ratio of decay rate and angular frequency at which a motion is an oscillation

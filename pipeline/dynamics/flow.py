@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.integrator import Integrator
-from pipeline.dynamics.problem import Problem
 from pipeline.track import F8
 
 Entries = tuple[float, float, float, float]  # of the matrix (a, b; c, d) that advances displacement and velocity

@@ -15,16 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.flow import EXACT
-from pipeline.dynamics.integrator import Integrator, Trajectory, demand_times
-from pipeline.dynamics.problem import Problem
-from pipeline.dynamics.solve_ivp import LEAST_RTOL, SolveIvp
+from pipeline.dynamics.integrator import MOST_STEPS, Integrator, Trajectory, demand_times
+from pipeline.dynamics.methods import LEAST_RTOL, SolveIvp
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 
 LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
-MOST_STEPS = 2**25  # maximum number of steps of one run, about ten seconds; the finest run takes half of the total time
-LEAST_TOLERANCE = 1e-13
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,10 +147,10 @@ def rounding_error(problem: Problem, seconds: float) -> float:
 
 
 def demand_tolerance(problem: Problem, spacing_s: float, count: int, tolerance: float) -> None:
-    """Refuse a tolerance that double precision cannot reach: below twice the rounding of the phase, or 1e-13."""
+    """Refuse a tolerance that double precision cannot reach: below twice the rounding of the phase."""
     seconds = spacing_s * count
     demand_times(spacing_s, seconds)
-    least = max(LEAST_TOLERANCE, 2.0 * rounding_error(problem, seconds))
+    least = 2.0 * rounding_error(problem, seconds)
     if not least <= tolerance < math.inf:
         reach = f"at least {least:.1e}, what double precision can reach in {seconds:g} s"
         raise DynamicsError(f"the tolerance must be finite and {reach}, got {tolerance:g}")

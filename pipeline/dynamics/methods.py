@@ -1,24 +1,25 @@
-"""Explicit methods of fixed step: both Euler methods, velocity Verlet, Yoshida's composition, classical Runge-Kutta.
+"""Methods that do not locate turning points: explicit ones of fixed step, and scipy's DOP853.
 
-They repeat one step and do not locate turning points. Yoshida's weights: Phys. Lett. A 150 (1990) 262,
-doi:10.1016/0375-9601(90)90092-3.
+Those of fixed step are both Euler methods, velocity Verlet, Yoshida's composition and classical Runge-Kutta. Yoshida's
+weights: Phys. Lett. A 150 (1990) 262, doi:10.1016/0375-9601(90)90092-3.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 
-from pipeline.dynamics.equation import Equation
+import numpy as np
+
+from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.integrator import Integrator, kept
-from pipeline.dynamics.problem import Problem
+from pipeline.errors import DynamicsError, PipelineError
 from pipeline.track import F8
 
 Step = Callable[[float, float], tuple[float, float]]  # displacement and velocity before and after a step
-_OUTER = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
-_YOSHIDA = (_OUTER, 1.0 - 2.0 * _OUTER, _OUTER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,5 +159,57 @@ SYMPLECTIC_EULER = OneStep(
     "symplectic-euler", "symplectic Euler", 1, partial(_euler, symplectic=True), _symplectic_euler_limit
 )
 VERLET = OneStep("verlet", "velocity Verlet", 2, _composed, lambda omega, _: 2.0 / omega)
-YOSHIDA4 = OneStep("yoshida4", "Yoshida's fourth-order composition", 4, partial(_composed, weights=_YOSHIDA))
+_OUTER = (2.0 - math.cbrt(2.0)) ** -1.0
+_YOSHIDA = partial(_composed, weights=(_OUTER, 1.0 - 2.0 * _OUTER, _OUTER))
+YOSHIDA4 = OneStep("yoshida4", "Yoshida's fourth-order composition", 4, _YOSHIDA)
 RK4 = OneStep("rk4", "classical Runge-Kutta", 4, _rk4)
+
+
+MOST_CALLS = 3_000_000  # maximum number of evaluations of the right-hand side; measured: about ten seconds
+LEAST_RTOL = 3e-14  # scipy raises values below 100 times the machine epsilon: https://docs.scipy.org, RK45
+
+
+@dataclass(frozen=True, slots=True)
+class SolveIvp(Integrator):
+    """DOP853; the errors of all its steps, each within rtol of the amplitude, accumulate."""
+
+    name: str = "dop853"
+    words: str = "scipy's solve_ivp, DOP853"
+    order: int = 0
+    rtol: float = 1e-9
+
+    def refusal(self, problem: Problem) -> str:
+        """Return the reason for refusal if there is friction; empty otherwise."""
+        if problem.equation.friction_m_per_s2:
+            return "it does not locate the turning points at which friction may hold the bob; take strang or auto"
+        return ""
+
+    def march(self, problem: Problem, step_s: float, steps: int, every: int) -> tuple[F8, F8]:
+        """Solve at every kept time, and raise an error if that takes too long."""
+        from scipy.integrate import solve_ivp
+
+        omega, size = problem.equation.angular_frequency_per_s, problem.amplitude_m() or 1.0
+        pull, calls = acceleration(problem.equation), itertools.count()
+
+        def right_side(t: float, state: F8) -> tuple[float, float]:
+            if next(calls) > MOST_CALLS:
+                raise DynamicsError(f"{self.name} gave up at t = {t:g} s: too stiff or too long; take strang or auto")
+            y, v = float(state[0]), float(state[1])
+            return v, pull(y, v)
+
+        t: F8 = step_s * every * np.arange(steps // every + 1, dtype=np.float64)
+        start, tolerance = (problem.displacement_m, problem.velocity_m_per_s), self.rtol * size * np.array([1.0, omega])
+        try:
+            done = solve_ivp(
+                right_side, (0.0, float(t[-1])), start, method="DOP853", t_eval=t, rtol=self.rtol, atol=tolerance
+            )
+        except PipelineError:
+            raise
+        except ValueError as error:  # raised by scipy on overflow
+            raise DynamicsError(f"{self.name} gave up: {error}; take strang or auto") from error
+        if done.status < 0:
+            raise DynamicsError(f"{self.name} gave up: {done.message}; take strang or auto")
+        return done.y[0], done.y[1]
+
+
+DOP853 = SolveIvp()

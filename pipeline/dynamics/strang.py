@@ -14,15 +14,13 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from pipeline.dynamics.equation import Equation
+from pipeline.dynamics.equation import Equation, Problem
 from pipeline.dynamics.flow import Entries, flow
-from pipeline.dynamics.integrator import Integrator, kept
-from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.integrator import MOST_STEPS, Integrator, kept
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
 Stepper = Callable[[float, float, int, float, Entries], tuple[float, float]]
-LONGEST_WITH_FRICTION = 1e6  # maximum step with friction, rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +49,8 @@ class Strang(Integrator):
             y[1:], v[1:] = a * y[1:] + b * v[1:], c * y[1:] + d * v[1:]
             return y, v
         radians = eq.angular_frequency_per_s * step_s
-        if radians > LONGEST_WITH_FRICTION:
-            raise DynamicsError(f"strang with friction takes {radians:.3g} radians at once; take a shorter step")
+        if radians * steps > MOST_STEPS:
+            raise DynamicsError(f"strang with friction turns by {radians * steps:.3g} rad; take a shorter run")
         parts = max(1, math.ceil(radians))  # so that a step contains at most one turning point
         return kept(problem, _rubbing(problem, step_s / parts, every * parts), steps // every)
 

@@ -7,12 +7,9 @@ from collections.abc import Iterator
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import words_of
 from pipeline.damping.select import Damping
+from pipeline.numerics.levels import VERY_STRONG
 from pipeline.numerics.quantity import number
 from pipeline.registry.found import Found
-
-# Difference of BIC that is "very strong" evidence: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773. If two laws
-# have the same prior probability, a wrong law beats the true law by this much in fewer than exp(-5) of recordings.
-VERY_STRONG = 10.0
 
 
 def damping_findings(damping: Damping) -> Iterator[Found]:

@@ -11,12 +11,11 @@ from pipeline.bench.spring import GRAVITY_M_PER_S2
 from pipeline.motion.averaged import Fitted, Rest
 from pipeline.motion.by_samples import FEW_WINDOWS
 from pipeline.motion.overdamped import Overdamped
+from pipeline.numerics.levels import NOTICEABLE
 from pipeline.numerics.quantity import amount
 from pipeline.registry.found import Found
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import model_error
-
-SIDEWAYS = 0.01  # share of a second mode in the amplitude above which the finding is a warning and not a note
 
 
 def overdamped_findings(found: Overdamped) -> Iterator[Found]:
@@ -77,7 +76,7 @@ def _modes(fitted: Fitted, unit: str) -> Iterator[Found]:
     if not own:
         return
     f, size_m = own[0].frequency.value, own[0].amplitude.value
-    large = size_m > SIDEWAYS * float(np.median(fitted.demodulated.amplitude))
+    large = size_m > NOTICEABLE * float(np.median(fitted.demodulated.amplitude))
     further = ", ".join(f"{amount(m.amplitude.value, unit)} at {m.frequency.value:.4g} Hz" for m in own[1:])
     numbers = {
         "frequency_hz": f,

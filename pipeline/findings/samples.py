@@ -8,12 +8,10 @@ from collections.abc import Iterator, Sequence
 from pipeline.bench.instrument import Instrument
 from pipeline.checks.echoes import Clusters, count_quality
 from pipeline.checks.residual import COARSE
+from pipeline.numerics.levels import NEGLIGIBLE, SIGNIFICANT
 from pipeline.registry.found import Found
 from pipeline.samples.condition import Conditioned
 from pipeline.track import U8, Track
-
-MANY = 0.1  # share of false echoes from which the finding is a warning: the sensor is probably badly placed
-GUESSED = 3.0  # minimum ratio of a stated error to the scatter: a normal distribution has one sample in 370 beyond it
 
 
 def sample_findings(
@@ -53,13 +51,13 @@ def sample_findings(
         if clusters is not None and clusters.count:
             numbers |= {"clusters": clusters.count, "in_clusters": clusters.samples, "turning": clusters.turning}
             numbers["shift_m"] = clusters.shift_m
-        yield Found("false_echoes", numbers, "warning" if echoes > MANY * n else "info")
+        yield Found("false_echoes", numbers, "warning" if echoes > NEGLIGIBLE * n else "info")
     if counts["missing"]:
         yield Found("missing_samples", {"samples": counts["missing"], "n": n}, "info")
     for code in ("duplicate_time", "non_monotonic_time"):
         if counts[code]:
             yield Found(code, {"samples": counts[code]})
-    if track.stated_error_m is not None and track.stated_error_m > GUESSED * noise_m:
+    if track.stated_error_m is not None and track.stated_error_m > SIGNIFICANT * noise_m:
         yield Found("stated_error_is_not_noise", {"stated_error_m": track.stated_error_m, "noise_m": noise_m})
     if quantum_m is not None and quantum_m > COARSE * noise_m:
         yield Found("quantised", {"step_m": quantum_m, "noise_m": noise_m})

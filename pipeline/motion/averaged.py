@@ -14,11 +14,11 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from pipeline.damping.evidence import VERY_STRONG
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.laws import Law
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, NOTICEABLE, VERY_STRONG
 from pipeline.numerics.quantity import Unit
 from pipeline.numerics.regression import (
     Line,
@@ -40,12 +40,6 @@ BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency d
 POINTS = 2049  # number of points in the tables of the lag and of the integral of the amplitude
 MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
 NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
-DEGREE = 6  # maximum degree of the polynomial of a drifting rest position
-FEWEST, ASTRAY = 4, 1.0  # minimum number of windows, and maximum difference from one oscillation, over the amplitude
-REJECTION = 1e-3  # probability that the chi-square test rejects residuals that are only noise
-
-
-LARGE_SHIFT = 0.02  # of the frequency between very small swings and the first amplitude, beyond which it is checked
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +126,7 @@ class Fitted:
         windows, omega, small = self.demodulated, self.phase.angular_frequency.value, self.phase.small_swings
         start = self.damping.best.joint["A0"].value
         shift, last = kappa * start**2 / omega, max(2, windows.t.size // 20)
-        if small is None or abs(shift) < LARGE_SHIFT or last >= windows.t.size:
+        if small is None or abs(shift) < NOTICEABLE or last >= windows.t.size:
             return start, shift
         mean = float(np.mean(windows.amplitude[: last + 1]))
         turned, passed = (float(each[last] - each[0]) for each in (windows.phase, windows.t))
@@ -301,7 +295,7 @@ def _widening(line: Line, u: F8, spread: Scatter) -> tuple[float, float]:
     if free < 1:
         return 1.0, 1.0
     length = max(correlation_length(line.residual / u), spread.correlation)
-    too_large = line.chi2 > chi2_quantile(1.0 - REJECTION, free)
+    too_large = line.chi2 > chi2_quantile(1.0 - FALSE_ALARM, free)
     return length * (line.chi2 / free if too_large else 1.0), length
 
 
@@ -362,8 +356,8 @@ def fit_rest(windows: Demodulated, unit: str) -> Rest:
     """Fit a constant and a polynomial to the windows' rest positions, and decide by BIC whether they drift."""
     t, offset = windows.t, windows.offset
     u = np.maximum(np.sqrt(windows.covariance[:, 2, 2]), 1e-15 * float(np.max(np.abs(offset))) + 1e-100)
-    spread = scatter(t, offset, u, degree=DEGREE)
-    polynomial, gain = smooth_curve(t, offset, spread, degree=DEGREE)
+    spread = scatter(t, offset, u)
+    polynomial, gain = smooth_curve(t, offset, spread)
     weight = 1.0 / spread.u[spread.kept]
     mean = float(np.average(offset[spread.kept], weights=weight**2))
     left = (offset[spread.kept] - mean) * weight
@@ -386,7 +380,7 @@ def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
     phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
     differ from it by less, ``typical``.
     """
-    if typical < ASTRAY or fitted.demodulated.t.size < FEWEST:
+    if typical < 1.0 or fitted.demodulated.t.size < FEWEST_FOR_LINE:
         return None
     return NoOscillation(
         f"no period lasts: half of the motion misses one oscillation by {typical:.0%} of its amplitude or more"

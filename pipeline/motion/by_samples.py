@@ -8,34 +8,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.damping.evidence import BARE_MENTION
 from pipeline.damping.law_fit import LawFit, joint_of
-from pipeline.damping.laws import LAWS, Law, in_units
-from pipeline.damping.select import EVIDENCE, Damping
-from pipeline.motion.averaged import DEGREE, Averaged, Fitted, Phase, Rest, area_of, assembled, wrapped
+from pipeline.damping.laws import LAWS, Law
+from pipeline.damping.select import Damping
+from pipeline.motion.averaged import Averaged, Fitted, Phase, Rest, area_of, assembled, wrapped
 from pipeline.motion.fit import Bools, Rows, clipped, covariance_of, fit
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.least_squares import Fit, central_differences
-from pipeline.numerics.regression import solve_weighted
+from pipeline.numerics.least_squares import Fit
+from pipeline.numerics.levels import BARE_MENTION, ROUNDS, STRONG
+from pipeline.numerics.regression import DEGREE, solve_weighted
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8, UNUSABLE, Quality
 from pipeline.windows.demodulate import Demodulated, model_error, with_prior
 
 FEW_WINDOWS = 4  # minimum number of windows whose amplitudes can select a law; with fewer the samples do
-ROUNDS = 5  # maximum number of rounds of clipping and refitting
-STEPS = 25  # maximum number of evaluations of the model in one fit
-# A law that is fitted in addition to the selected and the admissible ones, even if the windows contradict it: the
-# single exponential is the usual reference for comparisons.
-BESIDES = "linear"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OfLaw:
-    """The fit of one law to the samples, with the parameters and their covariance in the record's unit."""
+    """The fit of one law to the samples, with the covariance of its parameters."""
 
     model: Averaged
     fit: Fit
-    values: F8
     covariance: F8
     dof: float
 
@@ -44,44 +38,39 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
     """Fit rest position, damping law and phase to all samples together.
 
     ``samples`` include the disturbances. Their columns are projected out, so that the record without them gives the
-    same fit. A drifting rest position follows a polynomial. Lengths are in units of the first amplitude, because in
-    metres a free power and its factor are nearly degenerate.
+    same fit. A drifting rest position follows a polynomial.
     """
     windows, damping, phase = fitted.demodulated, fitted.damping, fitted.phase
     few = windows.t.size < FEW_WINDOWS and not damping.by_statement
     laws, thetas = _short(windows, damping) if few else _considered(damping)
     first, *others = laws
-    unit_m, level = abs(float(thetas[first][0])) or 1.0, fitted.rest.mean.value
-    rows = _rows(fitted, samples, level, unit_m)
+    level = fitted.rest.mean.value
+    rows = _rows(fitted, samples, level)
     # The lag is that of the windows' law; a law that is tried in its place has its own, which is constant.
     lags = {name: None if few and name in ("none", "linear") else phase.lag for name in laws}
     model = replace(_model(fitted, rows, laws[first]), lag=lags[first])
-    rest, turning = (
-        np.zeros(model.degree + 1),
-        phase.coefficients * np.array([1.0, 1.0, unit_m**2])[: phase.coefficients.size],
-    )
+    rest = np.zeros(model.degree + 1)
     if model.degree:
-        rest = np.asarray(np.linalg.lstsq(model.rest(windows.t), (fitted.rest.curve - level) / unit_m, rcond=None)[0])
-    start = np.concatenate([in_units(laws[first], thetas[first], length_m=unit_m), turning, rest])
+        rest = np.asarray(np.linalg.lstsq(model.rest(windows.t), fitted.rest.curve - level, rcond=None)[0])
+    start = np.concatenate([thetas[first], phase.coefficients, rest])
     least_m = float(np.median(model_error(windows.amplitude, windows.decay, windows.angular_frequency)))
     for _ in range(1 if model.area is None else 2):
         if model.area is not None:  # until the last round the backbone's column belongs to other amplitudes
             model = replace(model, area=area_of(model.law, model.split(start)[0], model.t0, model.middle, model.last))
         # Few periods cannot tell false echoes from a motion that the model does not describe; the windows' stand.
-        scale = {"least_m": least_m / unit_m, "noise_m": windows.noise_m / unit_m}
-        found, rows = clipped(model, rows, start, **scale, rounds=1 if few else ROUNDS, steps=STEPS)
+        scale = {"least_m": least_m, "noise_m": windows.noise_m}
+        found, rows = clipped(model, rows, start, **scale, rounds=1 if few else ROUNDS)
         start = found.values
     if not found.converged:
         return replace(fitted, why=found.tried)
     stated, count = samples.track.sigma_m, windows.t.size
-    stated = None if stated is None else stated / unit_m
-    fits = {first: _described(model, found, rows, unit_m, count, stated)}
+    fits = {first: _described(model, found, rows, count, stated)}
     tail = found.values[len(model.law.parameters) :]
     for name in others:
         other = replace(model, law=laws[name], lag=lags[name])
-        own = fit(other, rows, np.concatenate([in_units(laws[name], thetas[name], length_m=unit_m), tail]), STEPS)
+        own = fit(other, rows, np.concatenate([thetas[name], tail]))
         if own.converged:
-            fits[name] = _described(other, own, rows, unit_m, count, stated)
+            fits[name] = _described(other, own, rows, count, stated)
     damping = _selected(damping, fits) if few else _refined(damping, fits)
     best = fits[damping.selected]
     free = fitted.disturbances.conditioned
@@ -90,7 +79,7 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
         replace(windows, flags=flags),
         fitted.disturbances,
         damping,
-        _phase(phase, windows, best, unit_m),
+        _phase(phase, windows, best),
         _rest(fitted.rest, best, level),
         "samples",
     )
@@ -98,7 +87,7 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
 
 def _considered(damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
     """Return laws and start values by name; the selected law first, which decides which samples are false echoes."""
-    names = [name for name in (damping.selected, *damping.admissible, BESIDES) if name in damping.fits]
+    names = [name for name in (damping.selected, *damping.admissible) if name in damping.fits]
     fits = {name: damping.fits[name] for name in names}
     return {n: x.law for n, x in fits.items()}, {n: x.joint.values for n, x in fits.items()}
 
@@ -121,8 +110,8 @@ def _short(windows: Demodulated, damping: Damping) -> tuple[dict[str, Law], dict
     return {name: LAWS[name] for name in thetas}, thetas
 
 
-def _rows(fitted: Fitted, samples: Conditioned, level: float, unit_m: float) -> Rows:
-    """Return the samples in units of ``unit_m``, of which those in clusters of false echoes may not return."""
+def _rows(fitted: Fitted, samples: Conditioned, level: float) -> Rows:
+    """Return the samples about a level, of which those in clusters of false echoes may not return."""
     free, flags = fitted.disturbances.conditioned, fitted.demodulated.flags
     track = free.track
     known = np.isfinite(track.y) & np.isfinite(track.t)
@@ -134,11 +123,11 @@ def _rows(fitted: Fitted, samples: Conditioned, level: float, unit_m: float) -> 
     others = ((flags & ~np.uint8(Quality.FALSE_ECHO)) | free.track.flags) & UNUSABLE != 0
     candidates = (usable | (echo & ~others)) & ~cluster
     t = np.where(np.isfinite(track.t), track.t, fitted.phase.middle)
-    y = (np.where(known, track.y, level) - level) / unit_m
+    y = np.where(known, track.y, level) - level
     columns = fitted.disturbances.columns(samples.track.t)
 
     def near_plateau(position: F8) -> Bools:
-        return free.near_plateau(level + unit_m * position, fitted.demodulated.noise_m)
+        return free.near_plateau(level + position, fitted.demodulated.noise_m)
 
     used = usable & ((flags & UNUSABLE) == 0)
     return Rows(t, y, candidates, used, 1.0, columns if columns.size else None, near_plateau)
@@ -159,19 +148,12 @@ def _model(fitted: Fitted, rows: Rows, law: Law) -> Averaged:
     )
 
 
-def _described(model: Averaged, found: Fit, rows: Rows, unit_m: float, windows: int, stated: float | None) -> _OfLaw:
-    """Return a fit with its values and covariance in the record's unit; a noise may be stated for its samples."""
-
-    def in_metres(values: F8) -> F8:
-        theta, turning, rest = model.split(values)
-        bend = np.array([1.0, 1.0, unit_m**-2])[: turning.size]
-        return np.concatenate([in_units(model.law, theta, length_m=1.0 / unit_m), turning * bend, rest * unit_m])
-
+def _described(model: Averaged, found: Fit, rows: Rows, windows: int, stated: float | None) -> _OfLaw:
+    """Return a fit with its covariance; a noise may be stated for its samples."""
     count = found.values.size + (0 if rows.columns is None else rows.columns.shape[1])
     dof = max(float(np.count_nonzero(rows.used) - count), 1.0)
-    covariance = covariance_of(found, model, rows, with_prior(math.sqrt(found.cost / dof), dof, stated), windows)
-    turn = central_differences(in_metres, found.values)
-    return _OfLaw(model, found, in_metres(found.values), turn @ covariance @ turn.T, dof)
+    noise = with_prior(math.sqrt(found.cost / dof), dof, stated)
+    return _OfLaw(model, found, covariance_of(found, model, rows, noise, windows), dof)
 
 
 def _refined(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
@@ -179,7 +161,7 @@ def _refined(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
     changed = {}
     for name, one in fits.items():
         size, unit = len(one.model.law.parameters), damping.fits[name].joint.units[0]
-        joint = joint_of(one.model.law, one.values[:size], one.covariance[:size, :size], unit)
+        joint = joint_of(one.model.law, one.fit.values[:size], one.covariance[:size, :size], unit)
         changed[name] = replace(damping.fits[name], joint=joint)
     return replace(damping, fits={**damping.fits, **changed})
 
@@ -193,25 +175,25 @@ def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
     for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
         one, law = fits[name], LAWS[name]
         size, count = len(law.parameters), float(one.fit.residual.size)
-        joint = joint_of(law, one.values[:size], one.covariance[:size, :size], damping.best.joint.units[0])
-        bic = count * math.log(max(one.fit.cost, 1e-300) / count) + one.values.size * math.log(count)
+        joint = joint_of(law, one.fit.values[:size], one.covariance[:size, :size], damping.best.joint.units[0])
+        bic = count * math.log(max(one.fit.cost, 1e-300) / count) + one.fit.values.size * math.log(count)
         found[name] = LawFit(law, joint, 1.0, one.dof, bic, "")
     least = min(one.bic for one in found.values())
     selected = next(name for name, one in found.items() if one.bic - least < BARE_MENTION)
-    admissible = tuple(name for name, one in found.items() if one.bic - least <= EVIDENCE)
+    admissible = tuple(name for name, one in found.items() if one.bic - least <= STRONG)
     if damping.stated in found:
         selected, admissible = damping.stated, (damping.stated,)
     unfitted = {name: why for name, why in damping.unfitted.items() if name not in found}
     return replace(damping, fits=found, selected=selected, admissible=admissible, unfitted=unfitted)
 
 
-def _phase(phase: Phase, windows: Demodulated, best: _OfLaw, unit_m: float) -> Phase:
+def _phase(phase: Phase, windows: Demodulated, best: _OfLaw) -> Phase:
     """Return the phase with the values of the fit to the samples; its frequency is again the record's mean."""
     model = best.model
-    _, turning, _ = model.split(best.values)
+    _, turning, _ = model.split(best.fit.values)
     first = len(model.law.parameters)
     covariance = best.covariance[first : first + turning.size, first : first + turning.size]
-    area = None if model.area is None else (model.area[0], model.area[1] * unit_m**2)
+    area = model.area
     found = replace(phase, coefficients=turning, area=area, lag=model.lag)
     gradient = np.array([1.0, phase.t0 - phase.middle])
     omega = Estimate(float(turning[1]), math.sqrt(covariance[1, 1]), "rad/s")
@@ -230,7 +212,7 @@ def _phase(phase: Phase, windows: Demodulated, best: _OfLaw, unit_m: float) -> P
 
 def _rest(rest: Rest, best: _OfLaw, level: float) -> Rest:
     """Return the constant, or the curve, of the fit to the samples."""
-    _, _, still = best.model.split(best.values)
+    _, _, still = best.model.split(best.fit.values)
     curve = level + best.model.rest(rest.t) @ still
     if best.model.degree:
         return replace(rest, curve=curve, drift_m=float(np.ptp(curve)))

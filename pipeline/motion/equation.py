@@ -14,15 +14,16 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.damping.evidence import NEGATIVE, least_chi2, weigh
-from pipeline.damping.law_fit import mean_squared_rate
+from pipeline.damping.law_fit import NEGATIVE, least_chi2, mean_squared_rate, weigh
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.select import Damping, select_law
 from pipeline.motion.averaged import Fitted, Phase, Rest, Waveform, wrapped
 from pipeline.motion.fit import Rows, clipped, fit
+from pipeline.motion.overdamped import LEAST_DAMPING
 from pipeline.motion.solved import STATE, FreeMotion, Solved, envelope
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.least_squares import Fit, central_differences
+from pipeline.numerics.levels import MISFIT, NOTICEABLE
 from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
@@ -32,12 +33,6 @@ from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances
 
 MOST_PERIODS = 250  # maximum number of periods for the fit of a weakly damped motion that stops within the record
-# Damping ratio :math:`-\\dot A/A\\omega` at the first sample above which the equation of motion is fitted.
-LEAST_DAMPING = 0.01
-# Damping ratio above which it is fitted even if the windows, which are then few, show linear drag or none.
-ALWAYS = 0.05
-# Maximum root mean square of the residual of the law with most parameters, in units of the record's noise.
-MISFIT = 1.25
 
 
 def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *, stopped: bool) -> Fitted | str | None:
@@ -62,7 +57,7 @@ def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *
     if not laws or not _required(damping, windows, ratio, stopped=stopped):
         return None
     periods = windows.angular_frequency / (2.0 * math.pi) * float(np.ptp(windows.t))
-    if ratio <= LEAST_DAMPING and periods > MOST_PERIODS:
+    if ratio <= NOTICEABLE and periods > MOST_PERIODS:
         return (
             f"the bob stops within the record, and whether friction stopped it was not settled: over {periods:.0f} "
             f"periods the equation of motion takes too long to solve (at most {MOST_PERIODS}); the averaged "
@@ -106,13 +101,13 @@ def _fittable(damping: Damping) -> list[Drag]:
 
 
 def _required(damping: Damping, windows: Demodulated, ratio: float, *, stopped: bool) -> bool:
-    if stopped or ratio > ALWAYS:
+    if stopped or ratio > LEAST_DAMPING:
         return True
     best = damping.best.law
     if isinstance(best, Drag) and set(best.powers) <= {1}:
         return False  # for these laws the amplitude law is exact
     last = damping.best.amplitude(np.array([float(np.max(windows.t)) - damping.t0]))
-    return ratio > LEAST_DAMPING or bool(last[0] <= 0.0)
+    return ratio > NOTICEABLE or bool(last[0] <= 0.0)
 
 
 def _rows(samples: Conditioned, windows: Demodulated, damping: Damping) -> Rows:

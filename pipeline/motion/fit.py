@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics import least_squares
-from pipeline.numerics.least_squares import STEPS, Fit
+from pipeline.numerics.least_squares import EPS, Fit
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, MISFIT, ROUNDS
 from pipeline.numerics.regression import correlation_length
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, Quality
@@ -27,9 +28,6 @@ Bools = NDArray[np.bool_]
 # Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
 # with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
 STEADY = 1e-4
-MORE_THAN_NOISE = 1.5  # ratio of residuals to noise above which no sample is excluded by its size
-DEPENDENT = 1e-13  # eigenvalue, relative to the largest, below which columns count as linearly dependent
-FEWEST_PERIODS = 8  # minimum number of periods whose sums show how far residuals are correlated
 
 
 class Model(Protocol):
@@ -105,14 +103,14 @@ class Rows:
         normal = part.T @ part
         scale = np.maximum(np.sqrt(np.diag(normal)), 1e-300)
         values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-        kept = values > DEPENDENT * values[-1]
+        kept = values > values.size * EPS * values[-1]  # the rule of numpy.linalg.matrix_rank
         return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])
 
 
-def fit(model: Model, rows: Rows, start: F8, steps: int = STEPS) -> Fit:
+def fit(model: Model, rows: Rows, start: F8) -> Fit:
     """Fit a model to the rows that are used."""
     at = least_squares.remembering(rows.residuals(model))
-    return least_squares.minimise(lambda x: at(x)[0], start, lambda x: at(x)[1](), steps=steps)
+    return least_squares.minimise(lambda x: at(x)[0], start, lambda x: at(x)[1]())
 
 
 def clipped(
@@ -122,8 +120,7 @@ def clipped(
     *,
     least_m: float,
     noise_m: float = math.inf,
-    rounds: int = 5,
-    steps: int = STEPS,
+    rounds: int = ROUNDS,
 ) -> tuple[Fit, Rows]:
     """Fit until the set of false echoes is stable; return the fit and its rows.
 
@@ -132,11 +129,11 @@ def clipped(
     not if hardly any sample lies on the model.
     """
     for left_rounds in range(rounds, 0, -1):
-        found = fit(model, rows, start, steps)
+        found = fit(model, rows, start)
         left = rows.left(model, found.values)
         spread = mad_sigma(left[rows.candidates])
         candidates = rows.candidates & ~rows.on_plateau(rows.y - left)
-        near = rows.used if spread > MORE_THAN_NOISE * noise_m else np.abs(left) <= CLIP_SIGMAS * max(spread, least_m)
+        near = rows.used if spread > MISFIT * noise_m else np.abs(left) <= CLIP_SIGMAS * max(spread, least_m)
         chosen = candidates & near
         if (count := int(np.count_nonzero(chosen))) < 2 * start.size:
             few = replace(found, converged=False, tried=f"only {count} samples lie on the model")
@@ -157,7 +154,7 @@ def covariance_of(found: Fit, model: Model, rows: Rows, noise: float, periods: i
     inverse, u = found.covariance, np.sqrt(np.diag(found.covariance)) * noise
     factors = np.ones(u.size)
     starts = np.arange(0, rows.t.size, max(round(rows.t.size / max(periods, 1)), 1), dtype=np.int64)
-    if starts.size < FEWEST_PERIODS:
+    if starts.size < FEWEST_FOR_CURVE:
         return np.asarray(inverse * noise**2 * correlation_length(found.residual))
     if np.all(u > 0):
         scores = np.zeros((rows.t.size, u.size))

@@ -12,14 +12,13 @@ from pipeline.damping.laws.drag import COEFFICIENTS, Drag
 from pipeline.dynamics import Equation, Problem, Trajectory
 from pipeline.dynamics.equation import Real
 from pipeline.dynamics.strang import STRANG
+from pipeline.numerics.least_squares import CENTRAL_STEP
 from pipeline.track import F8
 
 STATE = ("rest", "displacement", "velocity", "angular_frequency")
 STEP = 0.08  # time step in radians; splitting and interpolation then err by less than 1e-4 of the amplitude
 REACH = 3.0  # maximum ratio, either way, of a frequency to its start value
-DIFFERENCE = 1e-6  # change of a coefficient in a difference quotient, relative to the coefficient's scale
 LENGTHS = (1, 1, 1, 0, 1, 0, -1)  # power of length in the unit of each parameter
-KEPT = 8  # maximum number of cached trajectories
 
 
 def envelope(y: float, v: float, omega: float, mu: float, gamma: float, beta: float) -> tuple[float, float, float]:
@@ -111,7 +110,7 @@ class FreeMotion:
         sized, timed = y.copy(), t * speed
         for slot in (slot for slot in slots if slot >= len(STATE)):
             moved = theta.copy()
-            moved[slot] += DIFFERENCE * scale[slot]
+            moved[slot] += CENTRAL_STEP * scale[slot]
             columns[slot] = (self.trajectory(moved).at(t) - y) / (moved[slot] - theta[slot])
             sized -= LENGTHS[slot] * theta[slot] * columns[slot]
             timed -= theta[slot] * columns[slot]
@@ -145,7 +144,7 @@ class FreeMotion:
             _, y, v, omega, mu, gamma, beta = (float(x) for x in theta)
             equation = Equation.from_laws(omega, gamma_per_s=abs(gamma), beta_per_m_s=abs(beta), mu_m_per_s=abs(mu))
             # A fit evaluates residuals and derivatives at the same point, so the latest trajectories are cached.
-            while len(self._kept) >= KEPT:
+            while len(self._kept) > 2 * len(COEFFICIENTS):
                 self._kept.pop(next(iter(self._kept)))
             spacing = STEP / self.omega
             self._kept[key] = STRANG.run(Problem(equation, y, v), spacing, max(2, math.ceil(self.seconds / spacing)))

@@ -11,20 +11,19 @@ import numpy as np
 from pipeline.bench.instrument import U_CRYSTAL
 from pipeline.motion.fit import Rows, fit
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE
 from pipeline.numerics.quantity import amount
 from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
 ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by rounding
-LEFT = 0.1  # maximum share of the variance that remains in the residual of two modes
 # Minimum ratio of the weaker mode's amplitude to the stronger one's; below it only one oscillation counts.
 WEAKER = 1.0 / 3.0
 # Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
 # distinguished from one that changes.
 BEATS, PERIODS = 0.8, 3.0
-MOST = 100_000  # maximum number of samples; longer records are not fitted
-THIN = 50.0  # maximum mean spacing of the samples, in units of their median spacing
+MOST = 100_000  # maximum number of median spacings; longer records are not fitted
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +74,9 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     tau, span = t - t[0], float(t[-1] - t[0])
     scale = float(np.std(y))
     if (
-        not 32 <= y.size <= MOST
+        y.size < 4 * FEWEST_FOR_CURVE
         or scale <= ROUNDING * float(np.max(np.abs(y)))
-        or not 0.0 < span < THIN * y.size * float(np.median(np.diff(t)))
+        or not 0.0 < span < MOST * float(np.median(np.diff(t)))
     ):
         return None
     values = (y - y.mean()) / scale
@@ -86,7 +85,7 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     start = _linear(tau, values, (first, second))
     every = np.ones(y.size, np.bool_)
     found = fit(Modes(2), Rows(tau, values, every, every), start)
-    if not np.all(np.isfinite(found.covariance)) or not float(found.residual @ found.residual) < LEFT * y.size:
+    if not np.all(np.isfinite(found.covariance)) or not float(found.residual @ found.residual) < NEGLIGIBLE * y.size:
         return None
     places = sorted((1, 5), key=lambda i: -float(np.hypot(*found.values[i : i + 2])))
     omegas = [abs(float(found.values[i + 2])) for i in places]

@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 import math
+import operator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from pipeline.numerics.levels import LIMIT
 from pipeline.track import F8
+
+
+def _both_ways(operation: Callable[[Any, Any], Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Return an operation on an estimate and another number, and that with the two exchanged."""
+
+    def forwards(estimate: Estimate, other: Any) -> Any:
+        return operation(estimate.ufloat, other.ufloat if isinstance(other, Estimate) else other)
+
+    def backwards(estimate: Estimate, other: Any) -> Any:
+        return operation(other, estimate.ufloat)
+
+    return forwards, backwards
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -28,20 +43,18 @@ class Estimate:
     value: float  # in ``unit``
     u: float  # standard uncertainty (coverage factor 1); 0 for a value that is taken as exact
     unit: str = ""  # SI unit as printed, "" for a ratio
-    # The ``uncertainties.UFloat`` that the estimate was calculated from; without one it depends on no other.
-    variable: Any = field(default=None, compare=False)
+    # The ``uncertainties.UFloat`` that the estimate was calculated from; without one it depends on no other. It is not
+    # passed on by ``dataclasses.replace``, whose result is another quantity.
+    variable: Any = field(default=None, compare=False, init=False)
 
-    def __post_init__(self) -> None:
-        # ``dataclasses.replace`` passes the old value's variable on, which would give wrong results.
-        if self.variable is not None and not self._describes(self.variable):
-            object.__setattr__(self, "variable", None)
+    @classmethod
+    def of_variable(cls, x: Any, unit: str, u: float | None = None) -> Estimate:
+        """Return a variable of the ``uncertainties`` package or an exact number, with its u if that is known better."""
+        from uncertainties import nominal_value, std_dev
 
-    def _describes(self, variable: Any) -> bool:
-        value, u = getattr(variable, "nominal_value", variable), getattr(variable, "std_dev", 0.0)
-        return bool(
-            math.isclose(value, self.value, rel_tol=1e-9, abs_tol=1e-9 * abs(self.u))
-            and math.isclose(u, self.u, rel_tol=1e-6, abs_tol=1e-300)
-        )
+        estimate = cls(float(nominal_value(x)), float(std_dev(x)) if u is None else u, unit)
+        object.__setattr__(estimate, "variable", x)
+        return estimate
 
     @property
     def ufloat(self) -> Any:
@@ -65,42 +78,14 @@ class Estimate:
     def __float__(self) -> float:
         return self.value
 
-    def __add__(self, other: Any) -> Any:
-        return self.ufloat + _number(other)
-
-    def __radd__(self, other: Any) -> Any:
-        return other + self.ufloat
-
-    def __sub__(self, other: Any) -> Any:
-        return self.ufloat - _number(other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return other - self.ufloat
-
-    def __mul__(self, other: Any) -> Any:
-        return self.ufloat * _number(other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return other * self.ufloat
-
-    def __truediv__(self, other: Any) -> Any:
-        return self.ufloat / _number(other)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return other / self.ufloat
-
-    def __pow__(self, other: Any) -> Any:
-        return self.ufloat ** _number(other)
-
-    def __rpow__(self, other: Any) -> Any:
-        return other**self.ufloat
+    __add__, __radd__ = _both_ways(operator.add)
+    __sub__, __rsub__ = _both_ways(operator.sub)
+    __mul__, __rmul__ = _both_ways(operator.mul)
+    __truediv__, __rtruediv__ = _both_ways(operator.truediv)
+    __pow__, __rpow__ = _both_ways(operator.pow)
 
     def __neg__(self) -> Any:
         return -self.ufloat
-
-
-LIMIT = 0.95
-"""Probability of an upper limit."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -118,7 +103,7 @@ class UpperLimit(Estimate):
         """Return the estimate unchanged if the record determines it, and as an upper limit otherwise."""
         if not estimate.u > abs(estimate.value):
             return estimate
-        return cls(estimate.value, estimate.u, estimate.unit, estimate.variable)
+        return cls.of_variable(estimate.ufloat, estimate.unit, estimate.u)
 
     @property
     def limit(self) -> float:
@@ -152,10 +137,6 @@ def format_limit(limit: float) -> str:
     if not 1e-4 <= rounded < 1e6:
         return f"{rounded:.1e}"
     return f"{rounded:.{max(0, 1 - math.floor(math.log10(rounded) + 1e-9))}f}"
-
-
-def _number(other: Any) -> Any:
-    return other.ufloat if isinstance(other, Estimate) else other
 
 
 @dataclass(frozen=True, slots=True, eq=False)

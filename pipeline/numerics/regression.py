@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.track import F8
 
-LAGS = 16  # lags computed together; most residuals are uncorrelated beyond these
+DEGREE = 6  # maximum degree of the polynomial that is the smooth curve through a run
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +100,7 @@ def covariance_of(jacobian: F8) -> F8:
     return root @ root.T if independent else unknown
 
 
-def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
+def scatter(t: F8, y: F8, u: F8, *, degree: int = DEGREE) -> Scatter:
     """Measure the scatter of points about a smooth curve that is independent of any damping law.
 
     The excess, added in quadrature, makes the uncertainties agree with the spread of the residuals, which is corrected
@@ -135,7 +135,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = 6) -> Scatter:
     return Scatter(total, excess, kept, correlation_length(residual[kept] / total[kept]))
 
 
-def smooth_curve(t: F8, y: F8, spread: Scatter, *, degree: int = 6) -> tuple[Legendre, float]:
+def smooth_curve(t: F8, y: F8, spread: Scatter, *, degree: int = DEGREE) -> tuple[Legendre, float]:
     """Return a polynomial through points, and the amount by which its BIC is below that of the mean."""
     kept = spread.kept
     values, weight = y[kept], 1.0 / spread.u[kept]
@@ -169,14 +169,11 @@ def correlation_length(residual: F8) -> float:
     if power == 0.0:
         return 1.0
     total, least = 1.0, 2.0 * power / math.sqrt(n)
-    for first in range(1, n // 3, LAGS):
-        stop = min(first + LAGS, n // 3)
-        # Several lags together, padded with zeros beyond the end.
-        ahead = np.concatenate([centred[first:], np.zeros(stop - 1)])
-        for product in np.correlate(ahead, centred, "valid").tolist():
-            if product < least:
-                return total
-            total += 2.0 * product / power
+    for lag in range(1, n // 3):
+        product = float(centred[lag:] @ centred[:-lag])
+        if product < least:
+            break
+        total += 2.0 * product / power
     return total
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.track import F8
 
-MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4)
+MAD_TO_SIGMA = 1.482602218505602  # 1 / Phi^-1(3/4): P. J. Rousseeuw, C. Croux, J. Am. Stat. Assoc. 88 (1993) 1273
 
 
 def median(x: NDArray[np.number[Any]]) -> float:

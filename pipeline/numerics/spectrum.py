@@ -7,7 +7,6 @@ a hundred records (``tests/trials/test_disturbances.py``).
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass
 
@@ -157,10 +156,10 @@ def strongest(blocks: Blocks, left: F8, basis: F8, band: Band) -> Peak | None:
     line = beyond(basis, (rows / np.linalg.norm(rows, axis=1)[:, None]).T)
     if np.linalg.norm(line[:, :2], -2) < 0.2:  # smallest singular value: the model already contains the line
         return None
-    noise = blocks.unweighted(left - line @ np.linalg.lstsq(line, left)[0])
+    noise = blocks.unweighted(left - line @ np.linalg.lstsq(line, left, rcond=None)[0])
     density = spectral_density(blocks, noise, f, band, smooth_density(noise, f * blocks.step))
     # Rows are weighted by their numbers of samples; the density is that of one full block.
-    own = line[:, :2] @ np.linalg.lstsq(line[:, :2], left)[0]
+    own = line[:, :2] @ np.linalg.lstsq(line[:, :2], left, rcond=None)[0]
     evidence = 0.5 * float(own @ own) / (density * blocks.samples)
     return Peak(f, density, evidence, false_alarm(evidence, _trials(inside, float(frequency[1]), blocks)))
 
@@ -202,33 +201,28 @@ def smooth_density(y: F8, turns: float) -> float:
 
     Its mean over all frequencies is the variance, so the density of white noise equals its variance everywhere.
     """
-    coefficients, variance = _autoregression(y, AR_ORDER)
-    waves = (c * cmath.exp(-2j * math.pi * lag * turns) for lag, c in enumerate(coefficients, start=1))
-    return variance / abs(1.0 - sum(waves)) ** 2
+    return float(_density(*_autoregression(y, AR_ORDER), np.asarray(turns)))
 
 
-def _autoregression(y: F8, highest: int) -> tuple[list[float], float]:
-    """Return coefficients (p) and innovation variance of the order with the lowest BIC, by Levinson's recursion."""
+def _autoregression(y: F8, highest: int) -> tuple[F8, float]:
+    """Return coefficients (p,) and innovation variance of the order with the lowest BIC, by the Yule-Walker equations.
+
+    The covariances of an autoregression obey :math:`c_k = \\sum_j a_j c_{|k - j|}`.
+    """
     n = y.size
-    covariances = [float(y[lag:] @ y[: n - lag]) / n for lag in range(min(highest, n - 1) + 1)]
-    coefficients, variance = list[float](), max(covariances[0], 1e-300)
-    best = (math.log(variance), coefficients, variance)
-    for order in range(1, len(covariances)):
-        known = sum(c * covariances[order - 1 - k] for k, c in enumerate(coefficients))
-        reflection = (covariances[order] - known) / variance
-        mirrored = [c - reflection * d for c, d in zip(coefficients, coefficients[::-1], strict=True)]
-        coefficients = [*mirrored, reflection]
-        variance = max(variance * (1.0 - reflection**2), 1e-300)
-        criterion = math.log(variance) + order * math.log(n) / n
-        if criterion < best[0]:
-            best = (criterion, coefficients, variance)
-    return best[1], best[2]
+    covariances = np.array([y[lag:] @ y[: n - lag] for lag in range(min(highest, n - 1) + 1)]) / n
+    found = []
+    for order in range(covariances.size):
+        rows, right = np.arange(order), covariances[1 : order + 1]
+        coefficients = np.linalg.lstsq(covariances[np.abs(np.subtract.outer(rows, rows))], right)[0]
+        variance = max(float(covariances[0] - coefficients @ right), 1e-300)
+        found.append((math.log(variance) + order * math.log(n) / n, coefficients, variance))
+    _, coefficients, variance = min(found, key=lambda each: each[0])
+    return np.asarray(coefficients), variance
 
 
-def _density(coefficients: list[float], variance: float, turns: F8) -> F8:
+def _density(coefficients: F8, variance: float, turns: F8) -> F8:
     """Return the spectral density at frequencies in cycles per block; its mean over all of them is the variance."""
-    real, imaginary = np.ones(turns.size), np.zeros(turns.size)
-    for lag, coefficient in enumerate(coefficients, start=1):
-        real -= coefficient * np.cos(2.0 * math.pi * lag * turns)
-        imaginary += coefficient * np.sin(2.0 * math.pi * lag * turns)
-    return np.asarray(variance / (real**2 + imaginary**2))
+    lags = np.arange(1.0, coefficients.size + 1.0)
+    waves = np.exp(-2j * math.pi * np.multiply.outer(turns, lags)) @ coefficients
+    return np.asarray(variance / np.abs(1.0 - waves) ** 2)

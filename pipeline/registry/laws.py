@@ -17,6 +17,9 @@ LAW_NAMES = (
 )
 """The built-in names in the order in which the laws are tried; :data:`pipeline.damping.laws.LAWS` contains the laws."""
 
+ANY_LAW = "any"
+"""The value in place of a law's name that lets the recording choose, regardless of the scene."""
+
 GROUP = "springmass.laws"
 """The group of the entry points with which other packages add laws."""
 

@@ -1,4 +1,4 @@
-"""The estimates and the inputs of their uncertainty budgets, with labels, symbols and units."""
+"""The estimates, the inputs of their uncertainty budgets, and the effects: their labels, symbols and units."""
 
 from __future__ import annotations
 
@@ -109,9 +109,28 @@ INPUTS: Mapping[str, Input] = {
     "lost_rows": Input("samples that are missing between others"),
     "crest": Input("crests of a swing whose stiffness changes with the amplitude"),
     "model_misfit": Input("what differs from a sinusoid in every period"),
+    "rounding": Input("rounding to steps larger than the noise"),
     "held_samples": Input("distances held by the sensor"),
     "sensor_smoothing": Input("smoothing by the sensor"),
     "implausible_motion": Input("motion that no bob on a spring makes"),
     "implausible_distance": Input("distances that no sensor measures"),
 }
 """All inputs of :mod:`pipeline.results.derive` by name."""
+
+
+EFFECTS: Mapping[str, str] = {
+    "spring_mass": "mass of the spring",
+    "added_mass": "air that the disc carries along",
+    "disc_drag": "drag of the disc",
+    "viscous_drag": "viscous drag",
+    "quadratic_drag": "quadratic drag",
+    "friction": "dry friction",
+    "amplitude_dependent_frequency": "frequency that depends on the amplitude",
+    "rest_drift": "drift of the rest position",
+    "sideways_mode": "sideways mode",
+    "harmonics": "harmonics",
+    "buoyancy": "buoyancy",
+    "speed_of_sound": "speed of sound",
+    "temperature": "air temperature",
+    "clock_rate": "rate of the clock",
+}

@@ -6,12 +6,12 @@ import math
 from functools import cached_property
 from typing import Any
 
-from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import U_DENSITY, U_SOUND, U_VISCOSITY, air_density, air_viscosity, speed_of_sound
+from pipeline.bench.disc import scene_air
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
-from pipeline.results.budget import Inputs, estimate_of, function_of
+from pipeline.results.budget import Inputs, function_of
 
 
 class Ambient:
@@ -56,7 +56,7 @@ class Ambient:
         if not self._sensor and not instrument.sonic:
             return 1.0
         sound = function_of(speed_of_sound, self._temperature, self._pressure, self._humidity)
-        actual = estimate_of(sound, "m/s").value
+        actual = Estimate.of_variable(sound, "m/s").value
         factor = sound / actual * self._inputs.add("speed_of_sound_formula", Estimate(1.0, U_SOUND), "B")
         if instrument.speed_of_sound_m_per_s is not None:
             half = abs(actual / instrument.speed_of_sound_m_per_s - 1.0)

@@ -15,12 +15,9 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, Joint
+from pipeline.numerics.levels import COVERAGE
 
 Kind = Literal["A", "B"]
-
-COVERAGE = 0.9545
-"""Coverage probability of the expanded uncertainty; the coverage factor is 2.00 for many degrees of freedom."""
-MANY = 1e6  # degrees of freedom from which they count as infinite: the coverage factor agrees to five digits
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +50,10 @@ class Budget:
     def dof(self) -> float:
         """Effective degrees of freedom: :math:`\\nu = u^4 / \\sum_i u_i^4/\\nu_i` (Welch-Satterthwaite).
 
-        The formula is from JCGM 100:2008, G.4.1. More than a million degrees of freedom count as infinite.
+        The formula is from JCGM 100:2008, G.4.1.
         """
         below = sum(c.share**2 / c.dof for c in self.contributions)
-        return 1.0 / below if below > 1.0 / MANY else math.inf
+        return 1.0 / below if below > 0.0 else math.inf
 
     @property
     def coverage_factor(self) -> float:
@@ -133,7 +130,7 @@ class Inputs:
         by_input = x.derivatives if isinstance(x, UFloat) else {}
         parts = sorted((of.tag, abs(float(slope) * of.std_dev), float(slope)) for of, slope in by_input.items())
         if not any(error for _, error, _ in parts):
-            return Budget(quantity, estimate_of(x, unit), ())
+            return Budget(quantity, Estimate.of_variable(x, unit), ())
         variances: dict[str, float] = {}
         slopes: dict[str, float] = {}
         for name, error, derivative in parts:
@@ -147,7 +144,7 @@ class Inputs:
                 slope = None if given is None else slopes[name]
                 u, share = math.sqrt(variance), variance / whole
                 lines.append(Contribution(name, self._kinds[name], given, slope, u, share, self._dofs[name]))
-        return Budget(quantity, Estimate(float(x.nominal_value), math.sqrt(whole), unit, x), tuple(lines))
+        return Budget(quantity, Estimate.of_variable(x, unit, math.sqrt(whole)), tuple(lines))
 
     def _register(self, name: str, kind: Kind, dof: float = math.inf) -> None:
         if name in self._kinds:
@@ -155,18 +152,12 @@ class Inputs:
         self._kinds[name], self._dofs[name] = kind, max(dof, 1.0)
 
 
-def estimate_of(x: Any, unit: str) -> Estimate:
-    """Return a variable or an exact number as an estimate with its standard uncertainty."""
-    from uncertainties import nominal_value, std_dev
-
-    return Estimate(float(nominal_value(x)), float(std_dev(x)), unit, x)
-
-
 def joint_of(estimates: Mapping[str, Estimate]) -> Joint:
     """Return estimates with their covariance, from the inputs that they were calculated from.
 
     >>> period = Estimate(0.8, 0.001, "s")
-    >>> print(joint_of({"period": period, "frequency": estimate_of(1 / period, "Hz")}).correlation.round(6).tolist())
+    >>> both = joint_of({"period": period, "frequency": Estimate.of_variable(1 / period, "Hz")})
+    >>> both.correlation.round(6).tolist()
     [[1.0, -1.0], [-1.0, 1.0]]
     """
     each = list(estimates.values())

@@ -5,14 +5,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.bench.scene import Scene
-from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
+from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg, unstated_spring_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.least_squares import central_differences, minimise
+from pipeline.numerics.levels import FALSE_ALARM
 from pipeline.numerics.regression import chi2_quantile
 from pipeline.numerics.threads import one_thread
 from pipeline.results.derive import Derived
@@ -20,9 +22,6 @@ from pipeline.track import F8
 
 NEARER = 0.01  # maximum tension with two runs exchanged, over that without: chance does not reduce it so much
 SOLVED = 0.5  # maximum uncertainty of the spring's mass, over its prior uncertainty, for which the runs determine it
-LARGEST_SPRING = 0.6  # maximum mass of a spring, over the lightest bob: a heavier spring is noticed and weighed
-GAUSS_NEWTON_STEPS = 30
-PROBABILITY = 0.997  # with which runs of one spring agree
 SUSPECTS = 8  # maximum number of runs that are exchanged pair by pair: those farthest from the mean
 
 
@@ -56,7 +55,7 @@ class SpringRun:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Whether runs agree on one spring."""
+    """Whether runs agree on one spring: the fit of one constant and one mass of the spring to all of them."""
 
     names: tuple[str, ...]
     spring_constant: Estimate  # generalised mean, N/m, including shared errors
@@ -64,6 +63,7 @@ class Comparison:
     spring_mass: Estimate
     # Whether the mass of the spring was stated. If it was not, the runs may determine it together with the constant.
     spring_mass_stated: bool
+    solved: bool  # whether the runs determine a mass of the spring that was not stated
     each: tuple[Estimate, ...]  # spring constant of each run, N/m, including shared errors
     own_u: tuple[float, ...]  # part of the standard uncertainty of each run that it does not share with the others, N/m
     # Difference between each run and the mean, over the standard uncertainty of this difference.
@@ -72,15 +72,20 @@ class Comparison:
     # Number of runs less one for the constant, and less one more if they determine the spring's mass; 0 if nothing is
     # tested.
     dof: int
-    # Whether chi-square is below its quantile, and a mass of the spring that the runs determine is plausible.
-    agree: bool
+    # Chi-square over its quantile, or the same of a mass of the spring that the runs determine: at most 1 is agreement.
+    tension: float
     # Largest difference between two runs over its standard uncertainty, in which shared errors cancel.
     largest_deviation: float
     # Names of two runs, if all runs agree, or agree far better, after the masses (or the periods) of these two are
     # exchanged; otherwise empty.
-    exchanged: tuple[str, ...]
-    exchanged_chi2: float | None  # chi-square of the runs after this exchange
-    message: str  # the result in words
+    exchanged: tuple[str, ...] = ()
+    exchanged_chi2: float | None = None  # chi-square of the runs after this exchange
+    message: str = ""  # the result in words
+
+    @property
+    def agree(self) -> bool:
+        """Whether all runs agree on one constant and a plausible mass of the spring."""
+        return self.tension <= 1.0
 
 
 @one_thread
@@ -123,53 +128,17 @@ def compare_springs(
     _check(runs, spring_mass_kg)
     masses = [run.mass_kg for run in runs]
     fit = _fit(runs, masses, spring_mass_kg, mass_correlation)
-    exchanged: tuple[str, ...] = ()
-    best = fit
+    best, exchanged = fit, tuple[str, ...]()
     if not fit.agree:
-        nearest = NEARER * fit.tension
         farthest = sorted(np.argsort(-np.abs(fit.pulls), kind="stable")[:SUSPECTS].tolist())
         for i, j in itertools.combinations(farthest, 2):
             trial = masses.copy()
             trial[i], trial[j] = trial[j], trial[i]
             other = _fit(runs, trial, spring_mass_kg, mass_correlation)
-            if other.tension <= max(nearest, 1.0) and (not exchanged or other.tension < best.tension):
+            if other.tension <= max(NEARER * fit.tension, 1.0) and (not exchanged or other.tension < best.tension):
                 best, exchanged = other, (runs[i].name, runs[j].name)
-    return Comparison(
-        tuple(run.name for run in runs),
-        fit.constant,
-        fit.spring,
-        spring_mass_kg is not None,
-        fit.each,
-        fit.own_u,
-        fit.pulls,
-        fit.chi2,
-        fit.dof,
-        fit.agree,
-        fit.deviation,
-        exchanged,
-        best.chi2 if exchanged else None,
-        _message(runs, fit, exchanged, best),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Fit:
-    """The fit of one constant and one mass of the spring to all runs."""
-
-    constant: Estimate
-    spring: Estimate
-    solved: bool  # whether the runs determine a mass of the spring that was not stated
-    each: tuple[Estimate, ...]
-    own_u: tuple[float, ...]
-    pulls: tuple[float, ...]
-    chi2: float
-    dof: int
-    tension: float  # disagreement of the runs and of the spring's mass, over its limit: at most 1 is agreement
-    deviation: float
-
-    @property
-    def agree(self) -> bool:
-        return self.tension <= 1.0
+    message = _message(fit, exchanged, best)
+    return replace(fit, exchanged=exchanged, exchanged_chi2=best.chi2 if exchanged else None, message=message)
 
 
 def _check(runs: Sequence[SpringRun], spring: Estimate | None) -> None:
@@ -190,7 +159,7 @@ def _fit(
     masses: Sequence[Estimate],
     stated: Estimate | None,
     mass_correlation: float,
-) -> _Fit:
+) -> Comparison:
     loads = np.array([mass.value for mass in masses])
     spring = _known_spring(masses, stated)
     squared = np.array([run.angular_frequency.value**2 for run in runs])
@@ -208,12 +177,12 @@ def _fit(
     dof = len(runs) - (2 if solved else 1)
     if stated is not None and stated.u > 0:
         chi2 += ((line.spring.value - stated.value) / stated.u) ** 2
-    tension = chi2 / chi2_quantile(PROBABILITY, dof) if dof else 0.0
+    tension = chi2 / chi2_quantile(1.0 - FALSE_ALARM, dof) if dof else 0.0
     if solved:
         # The mass of a spring cannot be negative, and a heavy spring would have been weighed.
-        heaviest = LARGEST_SPRING * float(loads.min())
+        heaviest = 2.0 * HEAVIEST_SHARE * float(loads.min())
         away = max(-found.value, found.value - heaviest, 0.0) / max(found.u, 1e-12 * heaviest)
-        tension = max(tension, away**2 / chi2_quantile(PROBABILITY, 1))
+        tension = max(tension, away**2 / chi2_quantile(1.0 - FALSE_ALARM, 1))
     # With a stated spring, each constant is that of the run's own analysis. Without a usable mass it excludes the
     # spring.
     shown = stated or (found if solved and tension <= 1.0 else Estimate(0.0, 0.0, "kg"))
@@ -222,9 +191,11 @@ def _fit(
     variances = np.diag(whole)
     i, j = np.triu_indices(len(runs), 1)
     deviations = np.abs(each[i] - each[j]) / np.sqrt(variances[i] + variances[j] - 2.0 * whole[i, j])
-    return _Fit(
+    return Comparison(
+        tuple(run.name for run in runs),
         constant,
         found,
+        stated is not None,
         solved,
         tuple(Estimate(float(value), math.sqrt(v), "N/m") for value, v in zip(each, variances, strict=True)),
         tuple(map(float, own)),
@@ -248,33 +219,28 @@ class _Line:
 
 
 def _line(squared: F8, loads: F8, covariance: F8, spring: Estimate) -> _Line:
-    """Fit constant and mass of the spring by Gauss-Newton steps, with the prior mass as one observation."""
-    known = np.diag([0.0, spring.u**-2 if spring.u > 0 else 0.0])
-    s, state = spring.value, np.zeros((2, 2))
-    k, slope, x = squared, squared, np.zeros(2)
-    for _ in range(GAUSS_NEWTON_STEPS):
-        step_kg = 1e-4 * float(loads.min())
-        k, above, below = (squared * _oscillating(s + h, loads) for h in (0.0, step_kg, -step_kg))
-        slope = (above - below) / (2.0 * step_kg) if spring.u > 0 else np.zeros_like(k)
-        # k_i(s) + slope (s' - s) = k': linear in the constant k' and the spring's mass s'.
-        design = np.column_stack([np.ones_like(k), -slope])
-        weighted = np.linalg.solve(covariance, design)
-        normal = design.T @ weighted + known
-        if spring.u == 0:
-            normal[1, 1] = 1.0
-        state = np.linalg.inv(normal)
-        right = weighted.T @ (k - slope * s)
-        right[1] += known[1, 1] * spring.value if spring.u > 0 else spring.value
-        x = state @ right
-        moved, s = abs(float(x[1]) - s), float(x[1])
-        if moved <= 1e-9 * float(loads.min()):
-            break
-    of_residual = np.diag(covariance - design @ state @ design.T)
+    """Fit constant and mass of the spring by least squares, with the prior mass as one observation."""
+    factor, prior = np.linalg.cholesky(covariance), np.array([spring.value])
+
+    def constants(spring_kg: F8) -> F8:
+        return squared * _oscillating(spring_kg[0], loads)
+
+    def residuals(theta: F8) -> F8:
+        apart = np.linalg.solve(factor, constants(theta[1:] if theta.size > 1 else prior) - theta[0])
+        return np.append(apart, (theta[1:] - spring.value) / spring.u)
+
+    start = np.append(np.mean(constants(prior)), prior if spring.u > 0 else [])
+    fit = minimise(residuals, start, precision=1e-6)
+    mass = fit.values[1:] if spring.u > 0 else prior
+    slope = central_differences(constants, mass)[:, 0] if spring.u > 0 else np.zeros_like(squared)
+    design = np.column_stack([np.ones_like(squared), -slope])[:, : start.size]
+    u = np.sqrt(np.diag(fit.covariance)).tolist()
+    of_residual = np.diag(covariance - design @ fit.covariance @ design.T)
     return _Line(
-        Estimate(float(x[0]), math.sqrt(state[0, 0]), "N/m"),
-        Estimate(s, math.sqrt(state[1, 1]) if spring.u > 0 else 0.0, "kg"),
+        Estimate(float(fit.values[0]), u[0], "N/m"),
+        Estimate(float(mass[0]), u[1] if spring.u > 0 else 0.0, "kg"),
         slope,
-        k + slope * (x[1] - s) - x[0],
+        constants(mass) - fit.values[0],
         np.sqrt(np.maximum(of_residual, 1e-24 * np.diag(covariance))),
     )
 
@@ -305,17 +271,16 @@ def _covariance(
     return np.diag(own**2) + common, own
 
 
-def _message(runs: Sequence[SpringRun], fit: _Fit, exchanged: tuple[str, ...], best: _Fit) -> str:
-    together = ", ".join(run.name for run in runs)
-    difference = f"{fit.deviation:.1f} standard uncertainties"
+def _message(fit: Comparison, exchanged: tuple[str, ...], best: Comparison) -> str:
+    together, difference = ", ".join(fit.names), f"{fit.largest_deviation:.1f} standard uncertainties"
     if not fit.agree:
         text = f"Not one spring as recorded: {together} differ by {difference}."
     elif fit.dof:
-        text = f"One spring: {together} agree on k = {fit.constant} (largest difference {difference})."
+        text = f"One spring: {together} agree on k = {fit.spring_constant} (largest difference {difference})."
     else:
-        text = f"Two runs determine k = {fit.constant} and the spring's mass without a test: add a third bob."
+        text = f"Two runs determine k = {fit.spring_constant} and the spring's mass without a test: add a third bob."
     if fit.agree and fit.solved:
-        grams = Estimate(1e3 * fit.spring.value, 1e3 * fit.spring.u, "g")
+        grams = Estimate(1e3 * fit.spring_mass.value, 1e3 * fit.spring_mass.u, "g")
         text += f" The spring then weighs {grams}, which the scene does not state."
     if exchanged:
         text += (

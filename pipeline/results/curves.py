@@ -13,13 +13,13 @@ from pipeline.damping.average import Weighted
 from pipeline.damping.law_fit import LawFit
 from pipeline.damping.select import Damping
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import FEWEST_FOR_LINE
 from pipeline.numerics.regression import solve_weighted
 from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
 
 POINTS = 200  # number of points of a drawn curve
 GROUPS = 12  # maximum number of groups of windows whose local slopes are drawn with the curve
-LEAST_IN_GROUP = 4  # minimum number of windows in a group
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +106,7 @@ def _local_drag(damping: Damping, demodulated: Demodulated, factor: float) -> tu
     """Return amplitude, drag coefficient and its scatter for groups of windows, without assuming a law of drag."""
     kept = damping.scatter.kept
     t, amplitude, u = demodulated.t[kept], demodulated.amplitude[kept], damping.scatter.u[kept]
-    groups = min(GROUPS, t.size // LEAST_IN_GROUP)
+    groups = min(GROUPS, t.size // FEWEST_FOR_LINE)
     rows = []
     for part in np.array_split(np.arange(t.size), groups) if groups else []:
         a, middle = amplitude[part], float(np.mean(t[part]))

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import inspect
 import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from pipeline.bench.added_mass import ADDED_MASS_SHAPE
+from pipeline.bench.disc import ADDED_MASS_SHAPE
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.sensor_filter import SensorFilter
 from pipeline.bench.spring import oscillating_mass_kg, unstated_spring_kg
-from pipeline.checks.misfit import Misfit
+from pipeline.checks.residual import Misfit
 from pipeline.damping.average import Weighted, average_over_laws, scaled
 from pipeline.damping.law_fit import LawFit, mean_squared_rate
 from pipeline.damping.laws import Drag, Law, free_power
@@ -24,24 +25,22 @@ from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.damping.select import Damping
 from pipeline.motion.averaged import Fitted, Phase
 from pipeline.numerics.estimate import Estimate, Joint, UpperLimit
+from pipeline.numerics.levels import LIMIT
 from pipeline.numerics.robust import mad_sigma
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.ambient import Ambient
-from pipeline.results.budget import Budget, Inputs, estimate_of, function_of, joint_of
+from pipeline.results.budget import Budget, Inputs, function_of, joint_of
 from pipeline.results.curves import Curve, drag_curve, energy_curve
 from pipeline.results.effects import Effect
 from pipeline.track import F8, UNUSABLE, Quality, Track
 from pipeline.windows.demodulate import Demodulated
 
-# Weight of the nearest law, if no law fits, from which its coefficients are quoted: the others together are within the
-# usual 5 % of a test.
-FAR_AHEAD = 0.95
 U_AIR_TEMPERATURE_K = 0.5  # standard uncertainty of an air temperature stated without one, K
 
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """The results in Table 1; quantities that only curves and comparisons need are calculated on access."""
+    """The results in Table 1, and the factors that curves and comparisons need; None if the scene determines none."""
 
     # Estimates with all known contributions to the uncertainty, including clock and scale.
     estimates: Mapping[str, Estimate]
@@ -52,9 +51,6 @@ class Derived:
     budgets: Mapping[str, Budget]  # contributions of the inputs to every estimate and coefficient
     # The laws over which amplitude and damping rate are averaged.
     laws: tuple[Weighted, ...]
-    # Variables with units, from which the properties below are read; those that the scene does not determine are
-    # missing.
-    parts: Mapping[str, tuple[Any, str]]
     # Name of the law by which the results are stated; empty if they are an average over laws. They count as an average
     # also if the record selects one drag and the results use both, of which it is a special case.
     law: str
@@ -62,15 +58,20 @@ class Derived:
     # Whether the coefficients may be quoted: their law is stated, the only one that the record admits, or if it admits
     # none, far nearer than the others.
     quoted: bool
+    scales: tuple[Any, Any]  # variables: the factors that convert rates and lengths of the record to true s and m
+    effective_mass_kg: Estimate | None  # bob, and the air and the share of the spring that the effects table includes
+    own_mass_kg: Estimate | None  # the same without the spring
+    # Mechanical energy over the squared recorded amplitude, N/m for a length; per kilogram if no mass is known.
+    half_stiffness: Estimate | None
+    # Displacement over the recorded value: 1 for a length, in s for a velocity, in s^2 for an acceleration.
+    displacement: Estimate | None
+    drag_length: Estimate | None  # drag coefficient over :math:`-\\dot A/A^2` of the recorded amplitude
 
     @cached_property
     def of_law(self) -> frozenset[str]:
         """Names of the estimates that depend on the damping law."""
-        return frozenset(
-            name
-            for name in self.estimates
-            if any(c.name in ("damping_law", "choice_of_law") for c in self.budgets[name].contributions)
-        )
+        inputs = {name: {c.name for c in self.budgets[name].contributions} for name in self.estimates}
+        return frozenset(name for name, own in inputs.items() if own & {"damping_law", "choice_of_law"})
 
     def parameters_of(self, fit: LawFit) -> dict[str, Estimate]:
         """Return the parameters of a law by name, in true seconds and metres, with all known contributions.
@@ -85,16 +86,9 @@ class Derived:
             return {"A0": self.estimates["amplitude"], **coefficients}
         joint = scaled(fit).joint
         variables = list(correlated_values(joint.values.tolist(), joint.covariance))
-        found = {
-            name: estimate_of(x, unit)
-            for name, (x, unit) in _in_true_units(fit.law, joint, variables, *self._scales).items()
-        }
-        return {**{name: limited(fit.law, name, x) for name, x in found.items()}, **coefficients}
-
-    @property
-    def _scales(self) -> tuple[Any, Any]:
-        """The factors that convert rates and lengths of the record to true seconds and metres."""
-        return self.parts["rates"][0], self.parts["lengths"][0]
+        found = _in_true_units(fit.law, joint, variables, *self.scales)
+        own = {name: limited(fit.law, name, Estimate.of_variable(*x)) for name, x in found.items()}
+        return {**own, **coefficients}
 
     @cached_property
     def statistical(self) -> Mapping[str, Estimate]:
@@ -106,65 +100,21 @@ class Derived:
         """All estimates and coefficients with their covariance; an estimate replaces a coefficient of the same name."""
         return joint_of({**self.coefficients, **self.estimates})
 
-    @cached_property
-    def effective_mass_kg(self) -> Estimate | None:
-        """Oscillating mass: the bob, and the air and the share of the spring that the effects table includes."""
-        return self._part("mass")
-
-    @cached_property
-    def own_mass_kg(self) -> Estimate | None:
-        """The oscillating mass without the share of the spring."""
-        return self._part("own_mass")
-
-    @cached_property
-    def half_stiffness(self) -> Estimate | None:
-        """Mechanical energy over the square of the recorded amplitude, N/m; per kilogram if no mass is known.
-
-        For velocities and accelerations the unit is that of an energy over the square of theirs. None if the record
-        does not determine the displacement.
-        """
-        return self._part("half_stiffness")
-
-    @cached_property
-    def displacement(self) -> Estimate | None:
-        """Ratio of displacement to recorded value: 1 for a length, in s for a velocity, in s^2 for an acceleration.
-
-        None for other quantities.
-        """
-        return self._part("displacement")
-
-    @cached_property
-    def drag_length(self) -> Estimate | None:
-        """Ratio of the drag coefficient to :math:`-\\dot A/A^2` of the recorded amplitude, in the unit of the record.
-
-        None if the disc, the mass or the air temperature is not stated, or if the record does not determine the
-        displacement.
-        """
-        return self._part("drag_length")
-
     @property
     def amplitude_scale(self) -> float:
         """Factor from amplitudes of the record to those of the motion, before the filter of a sensor."""
-        return estimate_of(self._scales[1], "").value
-
-    def _part(self, name: str) -> Estimate | None:
-        return estimate_of(*self.parts[name]) if name in self.parts else None
+        return Estimate.of_variable(self.scales[1], "").value
 
     def energy_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
-        """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known.
-
-        Return None if the record does not determine the displacement.
-        """
-        unit = "J/kg" if self.effective_mass_kg is None else "J"
+        """Return the mechanical energy against time with its band, in J, or in J/kg if no mass is known."""
         if self.half_stiffness is None:
             return None
+        unit = "J/kg" if self.effective_mass_kg is None else "J"
         return energy_curve(damping, demodulated, self.half_stiffness, self.laws, unit)
 
     def drag_curve(self, damping: Damping, demodulated: Demodulated) -> Curve | None:
-        """Return the drag coefficient against amplitude with its band; None if it is not determined."""
-        if self.drag_length is None:
-            return None
-        return drag_curve(damping, demodulated, self.drag_length, self.laws)
+        """Return the drag coefficient against amplitude with its band."""
+        return None if self.drag_length is None else drag_curve(damping, demodulated, self.drag_length, self.laws)
 
 
 def derive(
@@ -208,24 +158,24 @@ def derive(
     unit = track.unit
     terms, coefficients = _terms(track, fitted, scene, effects, misfits, laws, inputs)
     found: dict[str, tuple[Any, str]] = {}
-    parts: dict[str, tuple[Any, str]] = {}
-    for formula in _FORMULAS:
-        if formula.requires <= terms.keys():
-            x = terms[formula.name] = formula.expression(**{name: terms[name] for name in formula.requires})
-            of_run = found if formula.name in QUANTITIES else parts
-            of_run[formula.name] = x, formula.unit_in(unit)
-    parts |= {name: (terms[name], "") for name in ("rates", "lengths")}
-    budgets = {name: inputs.budget(name, x, unit) for name, (x, unit) in (found | coefficients).items()}
+    for name, formula in _FORMULAS.items():
+        if _NEEDS[name] <= terms.keys():
+            if formula is not None:
+                terms[name] = formula(**{each: terms[each] for each in _NEEDS[name]})
+            found[name] = terms[name], _unit_of(name, unit)
+    parts = {name: Estimate.of_variable(*found.pop(name)) if name in found else None for name in _PARTS}
+    budgets = {name: inputs.budget(name, x, own) for name, (x, own) in (found | coefficients).items()}
     law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == fitted.damping.selected else ""
     return Derived(
         estimates={name: budgets[name].estimate for name in found},
         coefficients={name: limited(laws.shown.law, name, budgets[name].estimate) for name in coefficients},
         budgets=budgets,
         laws=laws.weighted,
-        parts=parts,
         law=law,
         law_of_coefficients=laws.shown.name,
         quoted=laws.quoted,
+        scales=(terms["rates"], terms["lengths"]),
+        **parts,
     )
 
 
@@ -234,86 +184,62 @@ def limited(law: Law, name: str, estimate: Estimate) -> Estimate:
     return estimate if name in ("A0", free_power(law)) else UpperLimit.of(estimate)
 
 
-@dataclass(frozen=True)
-class _Formula:
-    """One row of the table: a quantity and its expression."""
+# The estimates, then what curves and comparisons need, in the order of calculation. A new estimate is a new row: a
+# function whose parameters are terms, from :func:`_terms` or from rows above, or None for a term that is itself a
+# result. If a term is missing, so is the result.
+_FORMULAS: Mapping[str, Callable[..., Any] | None] = {
+    "period": lambda angular_frequency: 2 * math.pi / angular_frequency,
+    "period_small_swings": lambda omega_small: 2 * math.pi / omega_small,
+    "frequency": lambda angular_frequency: angular_frequency / (2 * math.pi),
+    "angular_frequency": None,
+    "amplitude": None,
+    "offset": None,
+    "phase": None,
+    "noise": None,
+    "damping_rate": None,
+    "displacement_amplitude": lambda amplitude, per_length: amplitude * per_length,
+    "angle_amplitude": lambda amplitude, per_angle: amplitude * per_angle,
+    "velocity_rms": lambda angular_frequency, lengths, root_mean_square, per_value: (
+        angular_frequency * lengths * root_mean_square * per_value
+    ),
+    "gravity": lambda omega_rest, length: length * omega_rest**2,
+    "quality_factor": lambda natural, decay: 0.5 * natural**0.5 / decay,
+    "displacement": None,
+    "half_stiffness": lambda angular_frequency, scale, gain, displacement, energy_mass: (
+        0.5 * (angular_frequency * scale / gain * displacement) ** 2 * energy_mass
+    ),
+    "effective_mass_kg": None,
+    "own_mass_kg": None,
+    "spring_constant": lambda natural, sprung_mass: natural * sprung_mass,
+    "keulegan_carpenter_number": lambda displacement_amplitude, diameter: (
+        2 * math.pi * displacement_amplitude / diameter
+    ),
+    "reynolds_number": lambda density, velocity_rms, diameter, viscosity: density * velocity_rms * diameter / viscosity,
+    "reynolds_number_start": lambda density, angular_frequency, displacement_amplitude, diameter, viscosity: (
+        density * angular_frequency * displacement_amplitude / math.sqrt(2.0) * diameter / viscosity
+    ),
+    "drag_length": lambda drag_per_beta, rate, scale, gain: drag_per_beta * rate / scale * gain,
+    "drag_coefficient": lambda drag_per_beta, beta: drag_per_beta * beta,
+}
+_NEEDS = {name: frozenset(inspect.signature(each).parameters if each else (name,)) for name, each in _FORMULAS.items()}
+_PARTS = tuple(name for name in _FORMULAS if name not in QUANTITIES)
 
-    # Name of an estimate in :data:`pipeline.registry.quantities.QUANTITIES`, or of an entry of :attr:`Derived.parts`.
-    name: str
-    # Function whose parameters are the names of the terms that it needs, from :func:`_terms` or from rows above. If a
-    # term is missing, the quantity is left out.
-    expression: Callable[..., Any]
-    # Unit of the quantity for each unit of the record, if it differs from the registry.
-    units: Mapping[str, str] = field(default_factory=dict)
 
-    @cached_property
-    def requires(self) -> frozenset[str]:
-        return frozenset(inspect.signature(self.expression).parameters)
+def _unit_of(name: str, unit: str) -> str:
+    """Return the unit of a result for a record in a unit."""
+    if name == "velocity_rms" and unit.startswith("rad"):
+        return "rad/s"
+    if name in QUANTITIES:
+        return QUANTITIES[name].unit_in(unit)
+    of_length = {
+        "displacement": ("", "s", "s^2"),
+        "half_stiffness": ("N/m", "J s^2/m^2", "J s^4/m^2"),
+        "drag_length": ("m", "m/s", "m/s^2"),
+    }
+    return of_length[name][_LENGTHS.index(unit)] if name in of_length else "kg"
 
-    def unit_in(self, record_unit: str) -> str:
-        return self.units[record_unit] if record_unit in self.units else QUANTITIES[self.name].unit_in(record_unit)
 
-
-_RECORDED = ("m", "m/s", "m/s^2", "rad", "rad/s", "N", "V", "1")
-_KILOGRAMS = dict.fromkeys(_RECORDED, "kg")
-_FORMULAS = (
-    _Formula("period", lambda omega: 2 * math.pi / omega),
-    _Formula("period_small_swings", lambda omega_small: 2 * math.pi / omega_small),
-    _Formula("frequency", lambda omega: omega / (2 * math.pi)),
-    _Formula("angular_frequency", lambda omega: omega),
-    _Formula("amplitude", lambda start: start),
-    _Formula("offset", lambda rest: rest),
-    _Formula("phase", lambda start_phase: start_phase),
-    _Formula("noise", lambda sample_noise: sample_noise),
-    _Formula("damping_rate", lambda lam: lam),
-    _Formula(
-        "displacement_amplitude",
-        lambda start, omega, lam, length_order: start / (omega**2 + lam**2) ** (0.5 * length_order),
-    ),
-    _Formula(
-        "angle_amplitude",
-        lambda start, omega, lam, angle_order: start / (omega**2 + lam**2) ** (0.5 * angle_order),
-    ),
-    _Formula(
-        "velocity_rms",
-        lambda omega, lengths, root_mean_square, per_value: omega * lengths * root_mean_square * per_value,
-        {"rad": "rad/s", "rad/s": "rad/s"},
-    ),
-    _Formula("gravity", lambda omega_rest, length: length * omega_rest**2),
-    _Formula("quality_factor", lambda natural, decay: 0.5 * natural**0.5 / decay),
-    _Formula("displacement", lambda displacement: displacement, {"m": "", "m/s": "s", "m/s^2": "s^2"}),
-    _Formula(
-        "half_stiffness",
-        lambda omega, scale, gain, displacement, energy_mass: (
-            0.5 * (omega * scale / gain * displacement) ** 2 * energy_mass
-        ),
-        {"m": "N/m", "m/s": "J s^2/m^2", "m/s^2": "J s^4/m^2"},
-    ),
-    _Formula("mass", lambda mass: mass, _KILOGRAMS),
-    _Formula("own_mass", lambda own_mass: own_mass, _KILOGRAMS),
-    _Formula("spring_constant", lambda natural, sprung_mass: natural * sprung_mass),
-    _Formula(
-        "keulegan_carpenter_number",
-        lambda displacement_amplitude, diameter: 2 * math.pi * displacement_amplitude / diameter,
-    ),
-    _Formula(
-        "reynolds_number",
-        lambda density, velocity_rms, diameter, viscosity: density * velocity_rms * diameter / viscosity,
-    ),
-    _Formula(
-        "reynolds_number_start",
-        lambda density, omega, displacement_amplitude, diameter, viscosity: (
-            density * omega * displacement_amplitude / math.sqrt(2.0) * diameter / viscosity
-        ),
-    ),
-    _Formula(
-        "drag_length",
-        lambda drag_per_beta, rate, scale, gain: drag_per_beta * rate / scale * gain,
-        {unit: unit for unit in _RECORDED},
-    ),
-    _Formula("drag_coefficient", lambda drag_per_beta, beta: drag_per_beta * beta),
-)
-"""All quantities calculated from terms, in the order of calculation; a new estimate is a new row."""
+_LENGTHS = ("m", "m/s", "m/s^2")  # units in which a displacement, or a derivative of it, is recorded
 
 
 def _terms(
@@ -329,7 +255,12 @@ def _terms(
     demodulated, damping, phase, rest = fitted.demodulated, fitted.damping, fitted.phase, fitted.rest
     instrument, unit = Instrument.of(track), track.unit
     ambient = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
-    amiss = _Amiss(misfits, inputs)
+    amiss = _amiss(misfits, inputs)
+
+    def less_certain(name: str, value: float) -> Any:
+        """Return a factor of mean 1 that adds the uncertainty from the misfits to an estimate of this value."""
+        return 1.0 + amiss[name] / float(value) if value else 1.0
+
     rate = inputs.add("clock_rate", instrument.clock_rate, "B") * (1.0 + amiss["clock"])
     scale = ambient.scale(instrument) if unit == "m" else 1.0
     windows = phase.residual.size
@@ -337,9 +268,9 @@ def _terms(
     free = (windows - 2) / phase.correlation if windows > 2 else demodulated.residual.size - 3.0 * windows
     slope = inputs.add("angular_frequency", phase.angular_frequency, "A", free)
     omega = slope * rate
-    filtered = _Filtered(SensorFilter.of(scene, track.rate_hz), omega, inputs)
-    lengths = scale * amiss.over("amplitude", laws.values[0]) / filtered.gain
-    rates = rate * amiss.over("damping_rate", laws.values[1])
+    gain, delay = _filtered(SensorFilter.of(scene, track.rate_hz), omega, inputs)
+    lengths = scale * less_certain("amplitude", laws.values[0]) / gain
+    rates = rate * less_certain("damping_rate", laws.values[1])
     start = laws.start * lengths * _crest(phase, laws, unit, inputs)
     small = _small_swings(phase, laws, demodulated)
     slow = None if small is None else inputs.add("small_swings", small, "A", free) * rate
@@ -360,8 +291,9 @@ def _terms(
     diameter: Any = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
-    # The order of the time derivative of a length or an angle that was recorded.
-    length_order, angle_order = {"m/s": 1, "m/s^2": 2}.get(unit), {"rad/s": 1}.get(unit)
+    # The amplitude of a length or an angle, whose time derivative of some order was recorded, over that of the record.
+    moving = omega**2 + lam**2
+    per_length, from_rate = {"m/s": moving**-0.5, "m/s^2": 1.0 / moving}.get(unit), {"rad/s": moving**-0.5}.get(unit)
     in_air = ambient.known and diameter is not None and displacement is not None
     drag_per_beta = None
     if in_air and mass is not None:
@@ -371,32 +303,32 @@ def _terms(
     sprung = not unit.startswith("rad") or scene.spring_mass_kg is not None
     quadratic = damping.settled and damping.best.drag_term("beta") is not None
     terms = {
-        "omega": omega,
+        "angular_frequency": omega,
         "omega_small": slow,
         "omega_rest": rest_rate,
         "length": None if length is None or per_angle is None else inputs.add("pendulum_length", length, "B"),
         "natural": natural,
         "rate": rate,
         "scale": scale,
-        "gain": filtered.gain,
+        "gain": gain,
         "lengths": lengths,
         "rates": rates,
-        "start": start,
-        "rest": offset + zero + amiss["offset"],
-        "start_phase": _start_phase(phase, slope, inputs, free) + amiss["phase"] + filtered.delay,
-        "sample_noise": noise,
-        "lam": lam,
+        "amplitude": start,
+        "offset": offset + zero + amiss["offset"],
+        "phase": _start_phase(phase, slope, inputs, free) + amiss["phase"] + delay,
+        "noise": noise,
+        "damping_rate": lam,
         "decay": lam if laws.values[1] > 0 else None,
         "root_mean_square": laws.root_mean_square,
         "displacement": displacement,
         "per_value": displacement if per_angle is None else per_angle,
-        "length_order": length_order,
-        "angle_order": angle_order,
+        "per_length": per_length,
+        "per_angle": from_rate,
         # For a length, the amplitude itself is used, so that it is not stated twice.
         "displacement_amplitude": start if unit == "m" else None,
-        "mass": mass,
+        "effective_mass_kg": mass,
         "energy_mass": 1.0 if mass is None else mass,
-        "own_mass": own,
+        "own_mass_kg": own,
         "sprung_mass": mass if sprung else None,
         "diameter": diameter if displacement is not None else None,
         "density": ambient.density if in_air else None,
@@ -435,45 +367,32 @@ def _crest(phase: Phase, laws: _Laws, unit: str, inputs: Inputs) -> Any:
     return 1.0 + inputs.add("crest", Estimate(third, 0.5 * abs(third), ""), "B")
 
 
-class _Amiss:
-    """The misfits as inputs: a variable of mean zero for each estimate, by name."""
-
-    def __init__(self, misfits: tuple[Misfit, ...], inputs: Inputs) -> None:
-        self.by_name: dict[str, Any] = {}
-        for misfit in misfits:
-            sizes = {
-                "amplitude": misfit.amplitude_m,
-                "offset": misfit.offset_m,
-                "phase": misfit.phase_rad,
-                "damping_rate": misfit.damping_rate,
-                "clock": misfit.clock,
-            }
-            variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()}, "B")
-            for name, variable in variables.items():
-                self.by_name[name] = self.by_name.get(name, 0.0) + variable
-
-    def __getitem__(self, name: str) -> Any:
-        return self.by_name.get(name, 0.0)
-
-    def over(self, name: str, value: float) -> Any:
-        """Return a factor of mean 1 that adds the uncertainty from the misfits to an estimate of this value."""
-        return 1.0 + self[name] / float(value) if value else 1.0
+def _amiss(misfits: tuple[Misfit, ...], inputs: Inputs) -> Mapping[str, Any]:
+    """Return the misfits as inputs: a variable of mean zero for each estimate, by name."""
+    by_name: dict[str, Any] = defaultdict(float)
+    for misfit in misfits:
+        sizes = {
+            "amplitude": misfit.amplitude_m,
+            "offset": misfit.offset_m,
+            "phase": misfit.phase_rad,
+            "damping_rate": misfit.damping_rate,
+            "clock": misfit.clock,
+        }
+        variables = inputs.add_alternatives(misfit.name, {name: size**2 for name, size in sizes.items()}, "B")
+        for name, variable in variables.items():
+            by_name[name] = by_name[name] + variable
+    return by_name
 
 
-class _Filtered:
-    """The effect of the sensor's filter on an oscillation: its gain and its delay, rad."""
-
-    def __init__(self, smoothing: SensorFilter | None, omega: Any, inputs: Inputs) -> None:
-        self.gain: Any = 1.0
-        self.delay: Any = 0.0
-        if smoothing is None:
-            return
-        sizes = [
-            inputs.add(name, size, "B") if size.u > 0.0 else size.value
-            for name, size in (("sensor_mean_samples", smoothing.mean_samples), ("sensor_lag", smoothing.lag_s))
-        ]
-        self.gain = function_of(smoothing.gain, omega, *sizes)
-        self.delay = function_of(smoothing.delay, omega, *sizes)
+def _filtered(smoothing: SensorFilter | None, omega: Any, inputs: Inputs) -> tuple[Any, Any]:
+    """Return the gain of the sensor's filter and the delay of an oscillation by it, rad."""
+    if smoothing is None:
+        return 1.0, 0.0
+    sizes = [
+        inputs.add(name, size, "B") if size.u > 0.0 else size.value
+        for name, size in (("sensor_mean_samples", smoothing.mean_samples), ("sensor_lag", smoothing.lag_s))
+    ]
+    return function_of(smoothing.gain, omega, *sizes), function_of(smoothing.delay, omega, *sizes)
 
 
 class _Laws:
@@ -489,7 +408,7 @@ class _Laws:
             found = [(Weighted(best, 1.0), *_of_law(best, elapsed))]
         self.weighted = tuple(one for one, *_ in found)
         self.stated = self.weighted[0].fit
-        ahead = not damping.admissible and self.weighted[0].weight >= FAR_AHEAD
+        ahead = not damping.admissible and self.weighted[0].weight >= LIMIT
         self.quoted = damping.by_statement or damping.settled or ahead
         self.shown = best if self.quoted else self.stated
         self.squared_rate = mean_squared_rate(best, best.amplitude(elapsed))

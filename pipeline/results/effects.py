@@ -13,21 +13,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bench.added_mass import added_mass_kg, scene_air, scene_air_density
 from pipeline.bench.air import speed_of_sound
-from pipeline.bench.derived_drag import SOURCES, DerivedDrag, disc_rate
+from pipeline.bench.disc import SOURCES, DerivedDrag, added_mass_kg, disc_rate, scene_air, scene_air_density
 from pipeline.bench.instrument import Instrument
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import GRAVITY_M_PER_S2, HEAVIEST_SHARE, oscillating_mass_kg
 from pipeline.damping.laws.drag import amplitudes
 from pipeline.damping.select import Damping
-from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.equation import Problem
 from pipeline.motion.averaged import Fitted, Rest
+from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.quantity import amount
 from pipeline.track import Track
 from pipeline.windows.disturbances import Disturbances
 
-SHARE = 0.1  # size from which the model includes an effect, over the uncertainty that the effect would change
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
 STEEL_KG_PER_M3 = 7850.0
 SOFTER_PER_K = 2.6e-4  # relative decrease of the modulus of spring steel with temperature, 1/K
@@ -54,7 +53,7 @@ def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
         u_k = math.hypot(u_k, scene.bob_mass_kg.u / scene.bob_mass_kg.value)
 
     def counted(name: str, share: float, what: str) -> Effect:
-        included = share > SHARE * u_k
+        included = share > NEGLIGIBLE * u_k
         relation = "more" if included else "less"
         why = f"{what}: {share:.2g} of the bob's mass, {relation} than a tenth of u(k)/k = {u_k:.2g}"
         return Effect(name, share, None, "1", included, why)

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.checks.model import EXCESS
 from pipeline.damping.average import Weighted
 from pipeline.damping.laws.drag import COEFFICIENTS
 from pipeline.motion.averaged import Fitted, Phase
+from pipeline.numerics.levels import MISFIT
 from pipeline.track import F8, UNUSABLE, Quality, Track
 
 
@@ -51,7 +51,7 @@ def kinematics(track: Track, fitted: Fitted, laws: Sequence[Weighted]) -> Smooth
     size, u_size = _averaged(laws, elapsed)
     angle, u_angle = phase.total(t), _u_phase(phase, t)
     solved = fitted.method == "equation"
-    if not solved and (best.rejected or fitted.waveform.rms_m > EXCESS * windows.noise_m):
+    if not solved and (best.rejected or fitted.waveform.rms_m > MISFIT * windows.noise_m):
         at = windows.t
         expected, _ = _averaged(laws, at - phase.t0)
         size = size + np.interp(t, at, windows.amplitude - expected)

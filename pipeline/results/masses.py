@@ -11,12 +11,11 @@ import numpy as np
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import COVERAGE, NEGLIGIBLE, SIGNIFICANT, normal_quantile
 from pipeline.results.compare import SpringRun
 from pipeline.track import F8
 
-LEAST_SPREAD = 1.05  # ratio of the heaviest to the lightest bob; nearer ones give no line
 GRAVITY = Estimate(9.81, 0.015, "m/s^2")  # 9.780 at the equator to 9.832 at the poles, uniformly distributed
-EXPANDED = 2.0  # coverage factor of E_n
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +47,7 @@ def mass_line(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> MassL
     The uncertainty of a mass counts as one of the squared period, by the slope. A common clock changes the slope alone.
     """
     mass = np.array([run.mass_kg.value for run in runs])
-    if len(runs) < 3 or mass.max() < LEAST_SPREAD * mass.min():
+    if len(runs) < 3 or mass.max() < (1.0 + NEGLIGIBLE) * mass.min():
         return None
     omega = np.array([run.angular_frequency.value for run in runs])
     squared = (2.0 * math.pi / omega) ** 2
@@ -94,7 +93,8 @@ class Hooke:
 
     def normalised_error(self, other: Estimate) -> float:
         """Return :math:`E_n = |k_1 - k_2| / \\sqrt{U_1^2 + U_2^2}`: at most 1 if two constants agree."""
-        return abs(self.constant.value - other.value) / (EXPANDED * math.hypot(self.constant.u, other.u))
+        expanded = normal_quantile(COVERAGE) * math.hypot(self.constant.u, other.u)
+        return abs(self.constant.value - other.value) / expanded
 
 
 def hooke(mass_kg: F8, position_m: F8) -> Hooke:
@@ -105,7 +105,7 @@ def hooke(mass_kg: F8, position_m: F8) -> Hooke:
     (middle, slope), *_ = np.linalg.lstsq(design, position_m, rcond=None)
     line = design @ np.array([middle, slope])
     u_slope = math.sqrt(float(np.sum((position_m - line) ** 2)) / (len(mass_kg) - 2) / float(np.sum(design[:, 1] ** 2)))
-    if abs(slope) <= 3.0 * u_slope:
+    if abs(slope) <= SIGNIFICANT * u_slope:
         raise AnalysisError("the positions do not follow the masses; check the columns of the table")
     k = GRAVITY.value / abs(slope)
     return Hooke(

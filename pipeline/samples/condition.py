@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
+from pipeline.numerics.levels import normal_quantile
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8, U8, UNUSABLE, Quality, Track
 
-# Variance of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
-FOURTH_DIFFERENCE_GAIN = np.sqrt(70.0)
-QUARTER_TO_SIGMA = 0.31863936396437514  # 0.25-quantile of |x| for a standard normal x
-TWENTIETH_TO_SIGMA = 0.06270677794321385  # 0.05-quantile
+# Standard deviation of y[i-2] - 4 y[i-1] + 6 y[i] - 4 y[i+1] + y[i+2] for unit white noise: 1 + 16 + 36 + 16 + 1.
+FOURTH_DIFFERENCE_GAIN = math.sqrt(math.comb(8, 4))
 CREST_SIGMAS = 3.5  # distance from a plateau within which noise decides whether a sample is clipped
 BLOCK = 256  # samples over which a local curvature is estimated
 LARGEST = 1e100  # magnitude of a measured value; anything beyond is a missing sample
@@ -28,7 +27,8 @@ SPIKE_SIGMAS = 8.0
 # Least ratio of the number of samples in a plateau to that in the band of equal width beneath it. For an unclipped
 # crest the ratio is 1 / (sqrt 2 - 1) = 2.4.
 CONTRAST = 5.0
-GAP = 3.0  # time between two samples, in sample intervals, above which they are no neighbours
+# Time between two samples, in sample intervals, above which they are no neighbours: that of a filter over five samples.
+GAP = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +155,7 @@ def fourth_difference_noise(y: F8) -> float:
     """
     if y.size < 5:
         return 0.0
-    return float(mad_sigma(np.diff(y, 4)) / FOURTH_DIFFERENCE_GAIN)
+    return mad_sigma(np.diff(y, 4)) / FOURTH_DIFFERENCE_GAIN
 
 
 def _time_flags(t: F8, judged: NDArray[np.bool_]) -> U8:
@@ -182,9 +182,8 @@ def _least_noise(second: F8, rounding: float) -> tuple[float, bool]:
     few, many = size.size // 20, size.size // 4
     ordered = np.partition(size, many)
     ordered[:many].partition(few)  # the rest need not be partitioned again
-    gain = float(FOURTH_DIFFERENCE_GAIN)
-    quarter = float(ordered[many]) / (QUARTER_TO_SIGMA * gain)
-    twentieth = float(ordered[few]) / (TWENTIETH_TO_SIGMA * gain)
+    quarter = float(ordered[many]) / (normal_quantile(0.25) * FOURTH_DIFFERENCE_GAIN)
+    twentieth = float(ordered[few]) / (normal_quantile(0.05) * FOURTH_DIFFERENCE_GAIN)
     flooded = rounding < twentieth < 0.25 * quarter
     return (twentieth if flooded else quarter), flooded
 

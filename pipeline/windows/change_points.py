@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import lru_cache
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_LINE, normal_quantile
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 
 I8 = NDArray[np.int64]
-# Probability that a jump is found anywhere in a smooth series: Bonferroni's bound over all points tested.
-FALSE_ALARM = 1e-3
 # Numbers of points in an interval, in ascending order. Lengths that double lose less than a tenth of the power
 # between two lengths [1]_. Fewer than 8 points leave no degrees of freedom. Over more than 32 periods, drag and drift
 # are no longer cubic.
 LENGTHS = (10, 18, 32)
-UNDISTURBED = 1 / 3  # minimum share of the intervals without a jump; the scatter of these intervals is taken as typical
-# Minimum number of points between an interval's end and a jump within it, so that two bad windows do not count as a
-# jump. It is a quarter of the interval if that is less. At the ends of the series one point is enough.
-APART = 5
+# Minimum share of the intervals without a jump, whose scatter is typical. A jump lies in at most two thirds of the
+# intervals (see `_scatter`), so the probability that a typical interval contains it is zero.
+UNDISTURBED = 1 / 3
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
-    """One jump of a series."""
-
-    index: int  # index of the first point after the jump
-    false_alarm: float  # probability that a smooth series shows a jump as significant anywhere
-
-
-def find_changes(t: F8, y: F8, u: F8) -> tuple[Change, ...]:
-    """Find where a series of several components jumps, in order of time.
+def find_changes(t: F8, y: F8, u: F8) -> list[int]:
+    """Return the first points after the jumps of a series of several components, in order of time.
 
     In an interval of L points each component is a polynomial with a jump at point k,
     :math:`y_j = p(t_j) + h\\,[j \\ge k]`, where p is a cubic, or a parabola in the shortest intervals. A jump in all m
@@ -59,30 +46,25 @@ def find_changes(t: F8, y: F8, u: F8) -> tuple[Change, ...]:
 
     >>> t = np.arange(40.0)
     >>> y = 1e-3 * t + np.where(t < 25.0, 0.0, 1.0) + 0.1 * np.random.default_rng(1).standard_normal(40)
-    >>> (change,) = find_changes(t, y[None], np.full((1, 40), 0.1))
-    >>> change.index
-    25
+    >>> find_changes(t, y[None], np.full((1, 40), 0.1))
+    [25]
     """
     scatter = _scatter(t, y, u)
     trials = sum(length * _starts(t.size, length).size for length in LENGTHS if length <= t.size)
-    found: dict[int, float] = {}
+    found = set[int]()
     parts = [(0, t.size)]
     while parts:
         first, stop = parts.pop()
         for length in LENGTHS:
             if length > stop - first:
                 break
-            change = _strongest(t[first:stop], y[:, first:stop], scatter[length][:, first:stop], length, trials)
-            if change is not None:
-                index = first + change.index
-                found[index] = change.false_alarm
-                parts += [(first, index), (index, stop)]
+            after = _strongest(t[first:stop], y[:, first:stop], scatter[length][:, first:stop], length, trials)
+            if after is not None:
+                found.add(first + after)
+                parts += [(first, first + after), (first + after, stop)]
                 break
     # Two jumps with a single point between them are one jump, whose side of the point is arbitrary.
-    for index in sorted(found):
-        if index + 1 in found:
-            found[index + 1] = min(found.pop(index), found[index + 1])
-    return tuple(Change(index, found[index]) for index in sorted(found))
+    return sorted(index for index in found if index + 1 not in found)
 
 
 def lone_points(y: F8, u: F8, false_alarm: float) -> NDArray[np.bool_]:
@@ -111,39 +93,36 @@ def _starts(size: int, length: int) -> I8:
     return np.unique(np.append(np.arange(0, size - length + 1, length // 4), size - length))
 
 
-def _strongest(t: F8, y: F8, u: F8, length: int, trials: int) -> Change | None:
-    """Return the strongest jump within the intervals of one length, or None if none is significant."""
+def _strongest(t: F8, y: F8, u: F8, length: int, trials: int) -> int | None:
+    """Return the first point after the strongest jump in an interval of one length; None if none is significant."""
+    from scipy.special import fdtrc, fdtri
+
     starts = _starts(t.size, length)
     rows = starts[:, None] + np.arange(length)
     x = t[rows]
-    x = (x - x.mean(axis=1, keepdims=True)) / (0.5 * (x[:, -1:] - x[:, :1]))
-    degree = _degree(length)
+    powers = _powers((x - x.mean(axis=1, keepdims=True)) / (0.5 * (x[:, -1:] - x[:, :1])))
     weight = 1.0 / u[:, rows]  # (m, intervals, length)
-    m, dof = len(y), len(y) * (length - degree - 2)
-    basis = _orthonormal([weight * x**power for power in range(degree + 1)])
-    left = weight * y[:, rows]
-    for column in basis:
-        left = left - np.sum(column * left, axis=2, keepdims=True) * column
+    m, dof = len(y), len(y) * (length - powers.shape[2] - 1)
+    weighted = weight * y[:, rows]
+    basis = np.linalg.qr(weight[..., None] * powers)[0]
+    left = weighted - (basis @ (basis.swapaxes(2, 3) @ weighted[..., None]))[..., 0]
     gain = _gains(weight, basis, left)
     after = np.maximum(np.sum(left**2, axis=(0, 2))[:, None] - gain, 0.0)
-    statistic = np.where(_allowed(starts, length, t.size, APART), gain / m, 0.0) / np.maximum(1.0, after / dof)
-    place = np.argmax(statistic, axis=1)
-    highest = np.max(statistic, axis=1)
-    best: tuple[float, Change] | None = None
-    # No quantile of F is below that of chi-square; few records without a jump need scipy's exact quantile.
-    if m * float(highest.max()) < NormalDist().inv_cdf(0.5 * FALSE_ALARM / trials) ** 2:
+    statistic = np.where(_allowed(starts, length, t.size), gain / m, 0.0) / np.maximum(1.0, after / dof)
+    highest, chance = np.max(statistic, axis=1), FALSE_ALARM / trials
+    # No quantile of F is below that of chi-square.
+    if m * float(highest.max()) < normal_quantile(1.0 - chance) ** 2:
         return None
-    for i in np.flatnonzero(highest > _threshold(m, dof, FALSE_ALARM / trials)).tolist():
-        k = int(place[i])
-        design = np.stack([*(x[i] ** power for power in range(degree + 1)), np.arange(length) >= k], axis=1)
-        reach = _correlation(
-            [_residual(w[:, None] * design, w * v) for w, v in zip(weight[:, i], y[:, rows[i]], strict=True)]
-        )
+    best, found = 0.0, None
+    for i in np.flatnonzero(highest > fdtri(m, dof, 1.0 - chance)).tolist():
+        k = int(np.argmax(statistic[i]))
+        design = np.column_stack([powers[i], np.arange(length) >= k])
+        fits = zip(weight[:, i, :, None] * design, weighted[:, i], strict=True)
+        reach = _correlation(np.array([each - w @ np.linalg.lstsq(w, each, rcond=None)[0] for w, each in fits]))
         corrected = float(highest[i]) / reach
-        chance = trials * _chance(corrected, m, dof / reach)
-        if chance < FALSE_ALARM and (best is None or corrected > best[0]):
-            best = corrected, Change(int(starts[i]) + k, chance)
-    return None if best is None else best[1]
+        if corrected > best and fdtrc(m, dof / reach, corrected) < chance:
+            best, found = corrected, int(starts[i]) + k
+    return found
 
 
 def _scatter(t: F8, y: F8, u: F8) -> dict[int, F8]:
@@ -159,9 +138,9 @@ def _scatter(t: F8, y: F8, u: F8) -> dict[int, F8]:
         if t.size >= 2.5 * length:
             rows = _starts(t.size, length)[:, None] + np.arange(length)
             x = t[rows] - t[rows].mean(axis=1, keepdims=True)
-            powers = (x / np.max(np.abs(x)))[..., None] ** np.arange(_degree(length) + 1)
+            powers = _powers(x / np.max(np.abs(x)))
             fitted = powers @ np.linalg.pinv(powers)
-            free = length - _degree(length) - 1
+            free = length - powers.shape[2]
             left = y[:, rows] - np.einsum("ijk,mik->mij", fitted, y[:, rows])
             noise = np.sum(u[:, rows] ** 2 * (1.0 - np.diagonal(fitted, axis1=1, axis2=2)), axis=2)
             beyond = (np.sum(left**2, axis=2) - noise) / free
@@ -170,65 +149,39 @@ def _scatter(t: F8, y: F8, u: F8) -> dict[int, F8]:
     return found
 
 
-def _degree(length: int) -> int:
-    """Return the degree of the polynomials in intervals of a length."""
-    return 3 if length > 10 else 2
+def _powers(x: F8) -> F8:
+    """Return (intervals, length, degree + 1): powers of the times of intervals, up to cubes in all but short ones."""
+    return np.asarray(x[..., None] ** np.arange(4 if x.shape[1] > LENGTHS[0] else 3))
 
 
-def _orthonormal(columns: list[F8]) -> list[F8]:
-    """Orthonormalise columns (..., length) along their last axis, one after another."""
-    basis: list[F8] = []
-    for column in columns:
-        for _ in range(2):  # twice, to remove rounding errors where weights differ much
-            for before in basis:
-                column = column - np.sum(before * column, axis=-1, keepdims=True) * before
-        basis.append(column / np.linalg.norm(column, axis=-1, keepdims=True))
-    return basis
-
-
-def _gains(weight: F8, basis: list[F8], left: F8) -> F8:
+def _gains(weight: F8, basis: F8, left: F8) -> F8:
     """Return (intervals, length): the amount by which a jump before each point lowers chi-square.
 
     Cumulative sums from the end give the scalar products of each step with the residuals and with the basis.
     """
     total = _from_end(weight**2)
-    own = total - sum(_from_end(weight * column) ** 2 for column in basis)
+    own = total - np.sum(_from_end(weight[..., None] * basis) ** 2, axis=3)
     # A step that the polynomial can represent to rounding is no jump.
     own = np.where(own > 1e-9 * total[:, :, :1], own, np.inf)
     return np.asarray(np.sum(_from_end(weight * left) ** 2 / own, axis=0))
 
 
 def _from_end(values: F8) -> F8:
-    return np.asarray(np.cumsum(values[..., ::-1], axis=-1)[..., ::-1])
+    return np.asarray(np.cumsum(values[:, :, ::-1], axis=2)[:, :, ::-1])
 
 
-def _allowed(starts: I8, length: int, size: int, apart: int) -> NDArray[np.bool_]:
-    """Return (intervals, length): whether to test a jump before a point; one point suffices at the series' ends."""
-    k, apart = np.arange(length), min(apart, length // 4)
+def _allowed(starts: I8, length: int, size: int) -> NDArray[np.bool_]:
+    """Return (intervals, length): whether to test a jump before a point.
+
+    Two bad windows at an interval's end are no jump, unless it is an end of the series.
+    """
+    k, apart = np.arange(length), min(FEWEST_FOR_LINE, length // 4)
     first = np.where(starts == 0, 1, apart)[:, None]
     last = np.where(starts + length == size, length - 1, length - apart)[:, None]
     return np.asarray((k >= first) & (k <= last))
 
 
-def _residual(design: F8, y: F8) -> F8:
-    return np.asarray(y - design @ np.linalg.lstsq(design, y, rcond=None)[0])
-
-
-def _correlation(residuals: list[F8]) -> float:
-    """Return the number of points that count as one, from the correlation of neighbouring residuals."""
-    both = sum(float(each[1:] @ each[:-1]) for each in residuals)
-    rho = both / max(sum(float(each @ each) for each in residuals), 1e-300)
+def _correlation(residual: F8) -> float:
+    """Return the number of points that count as one, from the correlation of neighbouring residuals (m, length)."""
+    rho = float(np.sum(residual[:, 1:] * residual[:, :-1])) / max(float(np.sum(residual**2)), 1e-300)
     return (1.0 + rho) / (1.0 - rho) if rho > 0.0 else 1.0
-
-
-@lru_cache(maxsize=64)
-def _threshold(m: int, dof: float, chance: float) -> float:
-    from scipy.special import fdtri
-
-    return float(fdtri(m, dof, 1.0 - chance))
-
-
-def _chance(statistic: float, m: int, dof: float) -> float:
-    from scipy.special import fdtrc
-
-    return float(fdtrc(m, dof, statistic))

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, OUTLIER, normal_quantile
 from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Conditioned, Cut
 from pipeline.track import F8, Quality
@@ -21,17 +21,10 @@ from pipeline.windows.demodulate import ROUNDING, Demodulated
 from pipeline.windows.sinusoids import Windows, refit, solve
 
 LEVELS = 40  # number of heights tried for the level, from the middle of the swing to its top
-LEAST_SAMPLES = 3  # samples of a crest needed for a median
-FAR_OFF = 5.0  # residual of a false echo in standard deviations: exceeded by one normal deviation in two million
 SHARE_BEYOND = 0.05  # share of a plateau's samples below the level beyond which samples are left out
 SETTLING, ROUNDS = 8, 11  # fits until the cut crests no longer affect the middle of the swing; fits in all
 
 Bools = NDArray[np.bool_]
-FALSE_ALARM = 1e-3  # probability that the crests of an uncut motion in white noise appear to be cut at either end
-# Shortfall that each of three quarters of the crests must have, in standard uncertainties. One in twenty uncut crests
-# has it. Clusters of echoes occur at some crests only.
-EACH = 1.645
-LEAST_CRESTS = 3  # minimum number of crests; echoes may strike fewer in succession
 MIDDLE = 0.5  # fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted
 # Fraction of the amplitude beyond which the crest lies: within 30 degrees of the turning point.
 CREST = math.cos(math.pi / 6.0)
@@ -130,7 +123,7 @@ def _fitted(windows: Windows, basis: F8, inside: Bools, least: float) -> tuple[_
     solution = solve(basis, (inside & usable).astype(np.float64))
     middle = solution.residual[inside & usable & solution.good[:, None]]
     sigma = max(least, mad_sigma(middle)) if middle.size else least
-    refit(basis, solution, (inside & usable & (np.abs(solution.residual) < FAR_OFF * sigma)).astype(np.float64))
+    refit(basis, solution, (inside & usable & (np.abs(solution.residual) < OUTLIER * sigma)).astype(np.float64))
     rest, a, b = solution.coefficients.T
     part = basis[:, :3]
     u = np.sqrt(np.maximum(np.sum(part * (solution.inverse @ part), axis=1), 0.0))
@@ -143,25 +136,25 @@ def _cut_windows(fit: _Fit, sign: float, sigma: float) -> int:
     """Return the number of first windows whose crests are cut; 0 if noise can explain the shortfall."""
     crest = fit.judged & (fit.height(sign) > CREST)
     count = crest.sum(axis=1)
-    rows = np.flatnonzero(count >= LEAST_SAMPLES)
-    if rows.size < LEAST_CRESTS:
+    rows = np.flatnonzero(count >= FEWEST_FOR_MEDIAN)
+    if rows.size < FEWEST_FOR_MEDIAN:
         return 0
     short = _median_of_rows(-sign * fit.residual[rows], crest[rows])
     u_model = np.max(np.where(crest[rows], fit.u[rows], 0.0), axis=1)
     z = short / (sigma * np.sqrt(0.5 * math.pi / count[rows] + u_model**2))
     score = np.cumsum(z) / np.sqrt(np.arange(1, z.size + 1))
-    score[: LEAST_CRESTS - 1] = -math.inf
+    score[: FEWEST_FOR_MEDIAN - 1] = -math.inf
     n = int(np.argmax(score))
-    if score[n] <= -NormalDist().inv_cdf(0.5 * FALSE_ALARM / z.size) or np.quantile(z[: n + 1], 0.25) < EACH:
-        return 0
-    return int(rows[n]) + 1
+    # Three quarters of the crests must have a shortfall that one in twenty uncut ones has: echoes occur at some only.
+    each = np.quantile(z[: n + 1], 0.25) >= normal_quantile(0.9)
+    return int(rows[n]) + 1 if each and score[n] > normal_quantile(1.0 - FALSE_ALARM / z.size) else 0
 
 
 def _end(fit: _Fit, sign: float, sigma: float) -> _End | None:
     """Return the level and the windows of a cut at one end, or None if the motion is not cut there."""
     n = _cut_windows(fit, sign, sigma)
     outer = fit.judged[:n] & (fit.height(sign)[:n] > MIDDLE)
-    if np.count_nonzero(outer) < LEAST_SAMPLES:
+    if np.count_nonzero(outer) < FEWEST_FOR_MEDIAN:
         return None
     height, short = (sign * fit.model[:n])[outer], (-sign * fit.residual[:n])[outer]
     middle = float(np.median(sign * fit.rest[:n] + MIDDLE * fit.amplitude[:n]))

@@ -9,22 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.levels import IMPROBABLE, NEGLIGIBLE
 from pipeline.numerics.quantity import amount, noun
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import GAP, Conditioned
 from pipeline.track import F8
 
 FEW_PERIODS = 4.5  # periods below which the line's negative-frequency image shifts the spectrum's peak
-HOLE = 8.0  # length from which a gap counts as a hole, sample intervals
-LONG = 0.05  # fraction of the record without a usable sample that counts as a hole too
-MOSTLY_HOLES = 0.2  # fraction of holes in the record beyond which straight lines across them would pass for a motion
-SHORTFALL = 0.05  # tolerance of the minimum of one and a half periods, periods
-
 SAMPLES_PER_WINDOW = 12  # minimum number of samples in a window; windows span as many whole periods as this needs
 # Maximum standard uncertainty of a window's phase due to noise, rad. Windows span as many whole periods as this
 # needs, so that phases can be unwrapped at any signal-to-noise ratio.
 U_PHASE = 0.2
 MOST_WINDOWS = 20_000  # maximum number of windows; longer records have longer windows, not more of them
-FALSE_ALARM = 1e-6  # probability that pure white noise is taken for an oscillation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,14 +46,14 @@ def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
     The latter states the reason: nothing moves, no peak exceeds the noise, or the record spans under 1.5 periods.
 
     The spectrum is a Hann-windowed, zero-padded periodogram of the detrended record. Straight lines bridge flagged
-    samples; where holes make up more than a fifth of the record, the mean fills them. The peak is interpolated by a
+    samples; where holes make up more than a tenth of the record, the mean fills them. The peak is interpolated by a
     parabola through the logarithms [1]_. For white noise the ratio of a bin to the mean is exponentially distributed,
     so the largest of n exceeds :math:`\\ln(n/\\alpha)` with probability :math:`\\alpha`. If no line is found,
     the search is repeated without the Hann window, which costs 1.8 dB. Below 4.5 periods the peak is off by up to a
     tenth. There the frequency is the one at which the residual of a sinusoid with an offset is smallest.
 
     The phase of a window of N samples has the standard uncertainty :math:`\\sqrt{2/N}\\,\\sigma/A`. The window spans as
-    many periods as are needed to bring this down to ``u_phase``.
+    many periods as are needed to bring this down to 0.2 rad.
 
     .. [1] M. Gasior, J. L. Gonzalez, "Improving FFT frequency measurement resolution by parabolic and Gaussian
        spectrum interpolation", AIP Conf. Proc. 732 (2004) 276, doi:10.1063/1.1831158.
@@ -72,7 +67,7 @@ def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
         return NoOscillation(
             f"the {noun(track.unit)} stays within {amount(spread, track.unit, '.3g')}: nothing moves in the beam"
         )
-    line = _spectral_line(t, y, track.t, track.rate_hz, FALSE_ALARM)
+    line = _spectral_line(t, y, track.t, track.rate_hz)
     if isinstance(line, NoOscillation):
         return line
     frequency_hz, amplitude_m = line
@@ -80,7 +75,7 @@ def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
     if duration_s * frequency_hz < FEW_PERIODS:
         frequency_hz = _least_left(t, y, frequency_hz)
     count = duration_s * frequency_hz
-    if count < 1.5 - SHORTFALL:
+    if count < 1.5:
         return NoOscillation(f"the recording spans only {count:.2g} periods, and at least 1.5 are needed")
     needed = max(SAMPLES_PER_WINDOW, 2.0 * (conditioned.noise_m / (U_PHASE * max(amplitude_m, 1e-300))) ** 2)
     periods = max(1, math.ceil(needed * frequency_hz / track.rate_hz), math.ceil(count / MOST_WINDOWS))
@@ -88,9 +83,7 @@ def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:
     return Cycles(frequency_hz, count, _bounds(track.t, used, frequency_hz, track.rate_hz, periods), periods)
 
 
-def _spectral_line(
-    t: F8, y: F8, recorded: F8, rate_hz: float, false_alarm: float
-) -> tuple[float, float] | NoOscillation:
+def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, float] | NoOscillation:
     """Return the frequency, Hz, and mean amplitude, m, of the strongest line."""
     n = max(round(float(t[-1] - t[0]) * rate_hz) + 1, 8)
     if n > 50 * t.size:
@@ -99,11 +92,11 @@ def _spectral_line(
     grid = t[0] + ordinal / rate_hz
     # Times that are equally spaced except for rounding need no interpolation.
     regular = t.size == n and float(np.abs(t - grid).max()) <= 1e-9 / rate_hz
-    values = y if regular else _bridged(grid, t, y, recorded, HOLE / rate_hz)
+    values = y if regular else _bridged(grid, t, y, recorded, GAP / rate_hz)
     centred = ordinal - 0.5 * (n - 1)
     values = values - values.sum() / n
     values -= centred * (float(centred @ values) / float(centred @ centred))
-    threshold = math.log(n / false_alarm)
+    threshold = math.log(n / IMPROBABLE)
     # Without the Hann window lines are narrow and may be lost between two bins, so the bins must be closer.
     for taper, finer in ((_hann, 1), (np.ones, 4)):
         window = taper(n)
@@ -127,9 +120,9 @@ def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:
     latest = np.maximum.accumulate(recorded[np.isfinite(recorded)])
     seconds = float(latest[-1] - latest[0])
     # Rows without a usable sample form a hole only where they last longer than the gaps that recur every period.
-    for times, longest in ((latest, hole_s), (np.maximum.accumulate(t), max(hole_s, LONG * seconds))):
+    for times, longest in ((latest, hole_s), (np.maximum.accumulate(t), max(hole_s, NEGLIGIBLE * seconds))):
         step = np.diff(times)
-        if float(step[step > longest].sum()) > MOSTLY_HOLES * seconds:
+        if float(step[step > longest].sum()) > NEGLIGIBLE * seconds:
             before = np.searchsorted(times, grid, side="right") - 1
             values[np.append(step > longest, False)[before]] = y.mean()
     return values

@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import Demodulated, demodulate
 from pipeline.windows.modes import Sideways
 from pipeline.windows.sideways import find_sideways
-
-SHARE = 0.1  # maximum bias of an effect that is not modelled, relative to the uncertainty
-ROUNDS = 2  # maximum number of searches for modes. Each but the first uses the windows fitted without the modes found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,9 +56,9 @@ def separate(
     """
     sideways = find_sideways(conditioned, demodulated) if modes else Sideways((), None)
     leak_m = _leak(sideways)
-    modelled = bool(sideways) and leak_m > SHARE * _u_amplitude(demodulated)
+    modelled = bool(sideways) and leak_m > NEGLIGIBLE * _u_amplitude(demodulated)
     t, taken = conditioned.track.t, np.zeros(len(conditioned.track))
-    for again in range(ROUNDS if modelled else 0):
+    for again in (False, True) if modelled else ():
         if again:
             # Windows fitted without the modes separate false echoes from the main oscillation better.
             sideways = find_sideways(conditioned, demodulated) or sideways

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, ROUNDS
 from pipeline.samples.condition import Conditioned, condition
 from pipeline.samples.stopping import moving_part
 from pipeline.track import Quality
@@ -17,12 +18,10 @@ from pipeline.windows.lost_rows import LostRows, find_lost_rows
 from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part, long_after_stop
 from pipeline.windows.sinusoid import check_sinusoid
 
-MOST_PARTS = 4  # maximum number of times that a freely moving part is sought within the part found before
-LEAST_HALVED = 128  # minimum number of samples of which the later half may show a motion
-# Shares of the samples: if the bob stops before the first, its rest is left out; before the second, only if the whole
-# recording shows no oscillation.
-EARLY, LATE = 0.25, 0.75
-CLEAR = 0.1  # maximum noise over the largest amplitude of a motion that only the later half shows
+# Share of the samples: if the bob stops before it, its rest is left out; if it stops before the end less this share,
+# only if the whole recording shows no oscillation. Its periods are then those measured by `pytest
+# tests/trials/test_stopping.py`; with an eighth, the rest hides some of them.
+EARLY = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,16 +57,19 @@ def free_part(samples: Conditioned) -> FreePart | NoOscillation:
     if isinstance(cycles, NoOscillation):
         # A long time in the hand hides the motion after it, which the later half may show.
         t = samples.track.t[samples.used]
-        if t.size < LEAST_HALVED:
+        if t.size < 2 * FEWEST_FOR_CURVE:
             return cycles
         half_s = float(np.median(t))
         later = Segments(half_s, math.inf, (Span(SpanKind.HANDLED, float(t[0]), half_s),))
         trial = condition(later.flagged(samples.track))
-        trimmed, stopped = _cycles(trial, LATE)
+        trimmed, stopped = _cycles(trial, 1.0 - EARLY)
         if isinstance(trimmed, NoOscillation):
             return cycles
         windows = demodulate(trial, trimmed)
-        if windows.noise_m > CLEAR * float(np.max(windows.amplitude)) or check_sinusoid(trial, windows) is not None:
+        if (
+            windows.noise_m > NEGLIGIBLE * float(np.max(windows.amplitude))
+            or check_sinusoid(trial, windows) is not None
+        ):
             return cycles
         samples, segments = trial, later.within(segments)
         cycles = trimmed
@@ -78,7 +80,7 @@ def free_part(samples: Conditioned) -> FreePart | NoOscillation:
         if isinstance(cycles, NoOscillation):
             return cycles
         windows = demodulate(samples, cycles)
-    for _ in range(MOST_PARTS):
+    for _ in range(ROUNDS):
         outside = find_free_part(samples, windows)
         if outside is None:
             break
@@ -102,7 +104,7 @@ def free_part(samples: Conditioned) -> FreePart | NoOscillation:
 def _cycles(samples: Conditioned, early: float = EARLY) -> tuple[Cycles | NoOscillation, bool]:
     """Return the cycles and whether the bob stops before a share of the samples; if so, those of the moving part."""
     cycles = find_cycles(samples)
-    moving = moving_part(samples, LATE if isinstance(cycles, NoOscillation) else early)
+    moving = moving_part(samples, 1.0 - EARLY if isinstance(cycles, NoOscillation) else early)
     if moving is None or isinstance(trimmed := find_cycles(moving), NoOscillation):
         return cycles, False
     return trimmed, True

@@ -10,26 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import AnalysisError
+from pipeline.numerics.levels import FEWEST_FOR_CURVE, FEWEST_FOR_MEDIAN, NEGLIGIBLE, SIGNIFICANT
 from pipeline.numerics.regression import correlation_length, solve_weighted
-from pipeline.samples.condition import Conditioned
+from pipeline.samples.condition import GAP, Conditioned
 from pipeline.track import F8, Quality
-from pipeline.windows.cycles import HOLE, Cycles, NoOscillation, find_cycles
+from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.windows.demodulate import ROUNDING, demodulate
 from pipeline.windows.segments import Segments, Span, SpanKind
-
-SHORT = 0.05  # length of a gap over that of the part beside it up to which it needs no check
-MOST_PHASE = 0.3  # maximum of three standard uncertainties of the phase predicted across a gap, and of its error, rad
-FEWEST_SAMPLES = 8  # minimum number of samples of a part whose oscillation is sought, as of a whole record
-FEWEST_WINDOWS = 3  # minimum number of windows whose phases show how well they follow a straight line
 
 
 def longest_part(samples: Conditioned) -> Segments | None:
     """Return the longest part without a gap across which turns cannot be counted; None if it is the whole record.
 
     A gap is bridged if it is not longer than the longer of the parts beside it, and if the phase that a straight line
-    through the phases of one part predicts for the middle of the gap is known to within 0.3 rad, at three standard
-    uncertainties, and agrees with that of the other part. A part of too few periods has no phase; there the other part
-    decides alone.
+    through the phases of one part predicts for its middle is known, at three standard uncertainties, to within a tenth
+    of the half turn at which turns are miscounted, and agrees with that of the other part. A part of too few periods
+    has no phase; there the other part decides alone.
     """
     t = samples.track.t[samples.used]
     stretches = _stretches(samples, t)
@@ -49,7 +45,7 @@ def longest_part(samples: Conditioned) -> Segments | None:
 def _oscillation(samples: Conditioned, rows: NDArray[np.bool_]) -> tuple[Conditioned, Cycles] | None:
     """Return the record with all but some samples flagged, and its cycles; None if they show no oscillation."""
     part = replace(samples, flags=samples.flags | np.where(rows, np.uint8(0), np.uint8(Quality.OUTSIDE)))
-    if np.count_nonzero(part.used) < FEWEST_SAMPLES or isinstance(cycles := find_cycles(part), NoOscillation):
+    if np.count_nonzero(part.used) < FEWEST_FOR_CURVE or isinstance(cycles := find_cycles(part), NoOscillation):
         return None
     return part, cycles
 
@@ -62,7 +58,7 @@ def _stretches(samples: Conditioned, t: F8) -> list[tuple[float, float]]:
         return whole
     k = int(np.argmax(steps))
     gap_s, longer_s = float(steps[k]), max(float(t[k] - t[0]), float(t[-1] - t[k + 1]))
-    if gap_s <= max(HOLE / samples.track.rate_hz, SHORT * longer_s):
+    if gap_s <= GAP / samples.track.rate_hz:
         return whole
     if gap_s <= longer_s and _continues(samples, float(t[k]), float(t[k + 1])):
         return whole
@@ -86,7 +82,7 @@ class _Side:
             windows = demodulate(*found)
         except AnalysisError:
             return None
-        if windows.t.size < FEWEST_WINDOWS:
+        if windows.t.size < FEWEST_FOR_MEDIAN:
             return None
         u = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
         middle_s = float(np.mean(windows.t))
@@ -108,4 +104,4 @@ def _continues(samples: Conditioned, last_s: float, next_s: float) -> bool:
         return True
     phases, u = zip(*(side.phase(0.5 * (last_s + next_s)) for side in sides), strict=True)
     apart = math.remainder(phases[-1] - phases[0], 2.0 * math.pi)
-    return bool(max(*u, abs(apart) / 3.0) <= MOST_PHASE / 3.0)
+    return bool(max(SIGNIFICANT * max(u), abs(apart)) <= NEGLIGIBLE * math.pi)

@@ -9,28 +9,24 @@ from __future__ import annotations
 
 import itertools
 import math
+import sys
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, FEWEST_FOR_LINE, NEGLIGIBLE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.samples.stopping import moving_part
 from pipeline.track import F8, Quality, Track
-from pipeline.windows.change_points import FALSE_ALARM, find_changes, lone_points
+from pipeline.windows.change_points import find_changes, lone_points
 from pipeline.windows.demodulate import FINEST, Demodulated
 
-MOST_DECAY = 300.0  # largest exponent of a decay, against overflow
-# Jump of the amplitude, over that of the phase, up to which the phase jumps alone. For one touch in sixteen, at any
-# moment, the ratio is smaller.
-ALONE = 0.1
-LEAST_AFTER = 64  # samples needed after a trigger to leave out the part before it
+LARGEST_EXPONENT = math.log(math.sqrt(sys.float_info.max))
 HANGING = 0.25  # fraction of the range after the trigger within which a bob hangs still before it
-STILL = 0.02  # amplitude over that of the motion after the release, below which a bob hangs still
-NEAR = 5  # number of windows beside a break or still windows from which the motion is extrapolated
-LEAST_WINDOWS = 5  # minimum number of windows in a part that is analysed; a damped oscillation has four parameters
+NEAR = FEWEST_FOR_LINE  # number of windows beside a break or still windows from which the motion is extrapolated
 # Minimum amplitude of a part relative to the largest one. A smaller motion is a remnant after handling and is not
 # analysed.
 SHARE = 0.2
@@ -112,7 +108,7 @@ def before_trigger(conditioned: Conditioned) -> Segments | None:
     if moment_s is None:
         return None
     before, after = conditioned.used & (t < moment_s), conditioned.used & (t >= moment_s)
-    if not before.any() or np.count_nonzero(after) < LEAST_AFTER:
+    if not before.any() or np.count_nonzero(after) < FEWEST_FOR_CURVE:
         return None
     # A bob that is already swinging triggers immediately, so there is no still part to leave out.
     ranges = [float(np.ptp(np.quantile(y[rows], (0.05, 0.95)))) for rows in (before, after)]
@@ -145,7 +141,7 @@ def find_free_part(conditioned: Conditioned, windows: Demodulated) -> Segments |
     frequency are removed first, so that a cubic can follow the remainder. The moment of a touch within its window is
     unknown, so a window on either side of a jump is left out.
     """
-    if windows.t.size < 2 * LEAST_WINDOWS:
+    if windows.t.size < 2 * FEWEST_FOR_LINE:
         return None
     series = _Series.of(windows, FALSE_ALARM)
     moving = series.moving()
@@ -195,7 +191,7 @@ class _Series:
             rate = median(-np.diff(np.log(np.maximum(size, least)))[both] / step)
         turned = windows.amplitude * np.exp(1j * (windows.phase - omega * t))
         phase, u_phase = np.unwrap(np.angle(turned)), u / np.maximum(size, u)
-        steady = np.exp(np.clip(rate * (t - t[0]), -MOST_DECAY, MOST_DECAY))
+        steady = np.exp(np.clip(rate * (t - t[0]), -LARGEST_EXPONENT, LARGEST_EXPONENT))
         return cls(t, np.array([size * steady, phase]), np.array([u * steady, u_phase]), size, far)
 
     @property
@@ -253,7 +249,7 @@ class _Series:
         values, u = self.values[:, first:stop], self.u[:, first:stop]
         rows = np.flatnonzero(~lone_points(values, u, FALSE_ALARM))
         changes = find_changes(self.t[first + rows], values[:, rows], u[:, rows])
-        edges = [first, *(first + int(rows[change.index]) for change in changes), stop]
+        edges = [first, *(first + int(rows[k]) for k in changes), stop]
         return [_Part(a, b, False) for a, b in itertools.pairwise(edges)]
 
 
@@ -267,7 +263,7 @@ def _chosen(series: _Series, parts: list[_Part], conditioned: Conditioned) -> Se
     # In a long decay the amplitude is small for most of the time, so its beginning counts too.
     size = np.array([_size(series.size[part.first : part.stop]) for part in parts])
     length = np.array([stop - first for first, stop in limits])
-    free = ~np.array([part.still for part in parts]) & (length >= LEAST_WINDOWS)
+    free = ~np.array([part.still for part in parts]) & (length >= FEWEST_FOR_LINE)
     if not free.any():
         return None
     free &= size > SHARE * size[free].max()
@@ -311,7 +307,8 @@ def _break(series: _Series, stop: int, start: int) -> Break:
     # Each straight line through five windows is extrapolated from its middle: two windows to its end plus half a pause.
     away = 2.0 + middle - (stop - 1)
     u_ratio = math.sqrt(0.2 + 0.1 * away**2) * math.hypot(series.u[1, stop - 1], series.u[1, start])
-    alone = abs(ratio) < min(max(series.far * u_ratio, ALONE * abs(angle)), abs(angle))
+    # Of touches at any moment, one in sixteen changes the phase ten times as much as the amplitude.
+    alone = abs(ratio) < min(max(series.far * u_ratio, NEGLIGIBLE * abs(angle)), abs(angle))
     if start - stop >= NEAR:
         kind = BreakKind.RESTARTED
     else:
@@ -323,12 +320,12 @@ def _released(series: _Series) -> Segments | None:
     """Return the record from the release on, before which the amplitude was far smaller; a free one only falls."""
     most = int(np.argmax(series.size))
     small = np.flatnonzero(series.size[:most] < SHARE * series.size[most])
-    if not small.size or series.t.size - most < LEAST_WINDOWS:
+    if not small.size or series.t.size - most < FEWEST_FOR_LINE:
         return None
     # The next window may contain the release.
     first = int(small[-1]) + 2
     begin_s, first_s = float(series.t[0]) - 0.5 * series.spacing, float(series.t[first]) - 0.5 * series.spacing
-    kind = SpanKind.AT_REST if np.max(series.size[small]) < STILL * series.size[most] else SpanKind.HANDLED
+    kind = SpanKind.AT_REST if np.max(series.size[small]) < NEGLIGIBLE * series.size[most] else SpanKind.HANDLED
     return Segments(first_s, math.inf, (Span(kind, begin_s, first_s),))
 
 

@@ -107,7 +107,7 @@ class _Search:
     def together(self) -> Iterator[Mode]:
         """Fit the coefficients of all modes together, because each was first fitted without the later ones."""
         ends = np.cumsum([0, *(mode.coefficients.size for mode in self.found)])
-        values = np.linalg.lstsq(self.columns, self.data)[0]
+        values = np.linalg.lstsq(self.columns, self.data, rcond=None)[0]
         envelopes: C16 = values[values.size - 2 * ends[-1] :].view(np.complex128)
         for mode, start, end in zip(self.found, ends[:-1], ends[1:], strict=True):
             refitted = replace(mode, coefficients=envelopes[start:end])

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pipeline.numerics.levels import FEWEST_FOR_CURVE
 from pipeline.numerics.quantity import amount, noun
 from pipeline.samples.condition import Conditioned
 from pipeline.track import UNUSABLE
@@ -16,7 +17,6 @@ MOST_BENT = 0.25  # maximum residual over the amplitude: parabolas leave 0.19, a
 FOLDED = 32  # phase bins per period
 ALIKE = 0.25  # maximum share of the residual's variance by which similar periods may differ
 WANDERING = 0.3  # maximum residual beyond white noise, over the amplitude
-MANY = 8  # number of windows from which a motion with residuals below MOST_BENT is judged by its coherence instead
 
 
 def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
@@ -37,7 +37,7 @@ def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOsci
     excess = math.sqrt(max(left**2 - (1.0 + chance) * noise**2, 0.0))
     if left <= 0.15 * size or (left <= 4.0 * conditioned.noise_m and excess <= WANDERING * size):
         return None
-    if left > MOST_BENT * size or not (demodulated.t.size >= MANY or _repeats(conditioned, demodulated)):
+    if left > MOST_BENT * size or not (demodulated.t.size >= FEWEST_FOR_CURVE or _repeats(conditioned, demodulated)):
         return NoOscillation(
             f"the {noun(unit)} changes, but a sinusoid of {amount(size, unit, '.3g')} leaves "
             f"{amount(left, unit, '.3g')}"

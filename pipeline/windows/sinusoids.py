@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.least_squares import minimise
+from pipeline.numerics.levels import FALSE_ALARM, normal_quantile
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
@@ -17,7 +18,6 @@ from pipeline.track import F8
 # part of a period, so that rest position and amplitude cannot be distinguished.
 LEAST_DETERMINANT = 0.003
 LEAST_SAMPLES = 6
-KNOWN = 3.3  # least amplitude with a meaningful phase, in its standard uncertainties
 # Further degrees of the smooth curves, for a frequency that falls with the amplitude as that of a wide pendulum does.
 # One is taken if the mean squared residual falls below this factor of the lower degree's, which noise leaves at 1, and
 # if the curve follows the phases to within this angle, rad.
@@ -183,7 +183,7 @@ def retune(windows: Windows, solution: Solution, omega: float, *, degree: int = 
         return _retune_short(windows, omega)
     z = solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]
     size = np.abs(z)
-    good = solution.good & (size > KNOWN * _u_amplitude(windows, solution))
+    good = solution.good & (size > normal_quantile(1.0 - FALSE_ALARM) * _u_amplitude(windows, solution))
     if np.count_nonzero(good) < 3:
         good = solution.good
     t, weight = windows.centre[good], np.maximum(size[good], 1e-6 * np.max(size[good]) + windows.tiny)

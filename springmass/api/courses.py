@@ -6,33 +6,17 @@ import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from failure import Error
-from pipeline.registry.quantities import QUANTITIES
-from springmass.api.sources import Analysing, analyse
+from springmass.api.sources import Analysing, AnyScene, analyse
 from springmass.course.rows import NUMBERS, WHOLE, columns_of, read_rows
 from springmass.course.worker import row_of
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
 
-    from springmass.api.sources import AnyScene, AnySource
-
-UNITS = {
-    **{name: x.unit for name, x in QUANTITIES.items() if isinstance(x.unit, str) and x.unit and name != "velocity_rms"},
-    "rate_hz": "Hz",
-    "duration_s": "s",
-    "natural_angular_frequency": "rad/s",
-    "own_mass_kg": "kg",
-    "bob_mass_kg": "kg",
-    "spring_mass_kg": "kg",
-    "disc_diameter_m": "m",
-    "air_temperature_c": "degC",
-    "air_pressure_pa": "Pa",
-}
-"""Units of columns whose unit is the same in every run; for the others it follows from the column ``unit``."""
+    from springmass.api.sources import AnySource
 
 
 def batch(
@@ -84,21 +68,17 @@ def _row(source: Any, *, scene: Any, how: Any) -> dict[str, Any]:
     return row
 
 
-def results(
-    folder: str | os.PathLike[str], *, form: Literal["frame", "dataset"] = "frame"
-) -> pd.DataFrame | xr.Dataset:
+def results(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """Return the table that ``springmass batch`` made, with one row per run.
 
     Parameters
     ----------
     folder : path
         The folder of results.
-    form : {"frame", "dataset"}
-        A :class:`pandas.DataFrame`, or an :class:`xarray.Dataset` with the dimension ``run`` and attributes ``units``.
 
     Returns
     -------
-    pandas.DataFrame or xarray.Dataset
+    pandas.DataFrame
         Columns as in the reference of a course's results: NAME and NAME_u in SI units, NaN where a run has no value.
 
     Raises
@@ -106,19 +86,7 @@ def results(
     springmass.Error
         If the folder contains no course, or its table is damaged.
     """
-    frame = _frame(*read_rows(folder))
-    if form == "frame":
-        return frame
-    for name in WHOLE:  # xarray has no integers that may be missing
-        frame[name] = frame[name].astype("float64")
-    texts = [name for name in frame.columns if name not in NUMBERS and name not in WHOLE]
-    frame[texts] = frame[texts].astype(object).where(frame[texts].notna(), "")
-    data: Any = frame.set_index("run").to_xarray()
-    for name, unit in UNITS.items():
-        data[name].attrs["units"] = unit
-        if f"{name}_u" in data:
-            data[f"{name}_u"].attrs["units"] = unit
-    return data
+    return _frame(*read_rows(folder))
 
 
 def _frame(rows: Sequence[dict[str, Any]], tags: Sequence[str]) -> pd.DataFrame:

@@ -9,9 +9,8 @@ from typing import Any
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
-from acquisition.recordings.identify import inspect
 from springmass.api.sources import load
-from springmass.runs.loading import kind_of
+from springmass.runs.inputs import kind_of
 
 
 class Engine(BackendEntrypoint):
@@ -26,19 +25,6 @@ class Engine(BackendEntrypoint):
         """Return the samples with all that is known about them in the attributes."""
         dropped = [drop_variables] if isinstance(drop_variables, str) else list(drop_variables or ())
         return load(os.fspath(filename_or_obj), **how).dataset().drop_vars(dropped)
-
-    def open_datatree(
-        self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None, **how: Any
-    ) -> xr.DataTree:
-        """Return a tree with a dataset for each channel of a recording."""
-        path = os.fspath(filename_or_obj)
-        names = [survey.channel for survey in inspect(path).surveys] if kind_of(path) == "recording" else [""]
-        if len(names) < 2:
-            return xr.DataTree(self.open_dataset(path, drop_variables=drop_variables, **how))
-        each = {name: {**how, "channel": name, "drop_variables": drop_variables} for name in names}
-        return xr.DataTree.from_dict(
-            {name.replace("/", "_"): self.open_dataset(path, **options) for name, options in each.items()}
-        )
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         """Return whether this is a run file: all else is opened only by name."""

@@ -6,21 +6,19 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from failure import Error
 from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import DynamicsError
+from springmass.api.sources import AnyScene
 from springmass.runs.scenes import scene_from
-from springmass.runs.simulating.simulation import band_of, default_tolerance, demand_stable, prepare, solve
+from springmass.runs.simulating.simulation import band_of, default_tolerance, instability, prepare, solve
 
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike
 
-    from springmass.api.sources import AnyScene
-
-    Step = Callable[[float, float, float, Callable[[float, float], float]], tuple[float, float]]
+Step = Callable[[float, float, float, Callable[[float, float], float]], tuple[float, float]]
 
 
 def simulate(
@@ -73,12 +71,10 @@ def simulate(
     integrator: str | Integrator = method if isinstance(method, str) else _own(method)
     if tolerance is None and method == "auto":
         tolerance = default_tolerance(band)
-    if isinstance(integrator, str):
-        try:
-            demand_stable(ready.problem, integrator, spacing_s if tolerance is None else None, where="scene")
-        except Error as error:  # its remedy is that of the command line
-            what = str(error).partition("; ")[0]
-            raise DynamicsError(f'{what}; give times with a smaller step, a tolerance, or method="strang"') from None
+    named = method if isinstance(method, str) else "auto"
+    wrong, _ = instability(ready.problem, named, spacing_s if tolerance is None else None)
+    if wrong:
+        raise DynamicsError(f'{wrong}; give times with a smaller step, a tolerance, or method="strang"')
     solution = solve(ready.problem, integrator, spacing_s, times.size - 1, tolerance)
     around = np.zeros((4, times.size)) if band is None else band.displacement_at(times)
     of = {"displacement": solution.trajectory.y, "u_displacement": 0.5 * (around[2] - around[1])}

@@ -8,33 +8,29 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, Self, Unpack
+from typing import Any, Protocol, Self, Unpack
 
 import numpy as np
 
-from acquisition.block import Block, concatenate
+from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.decoders.registry import get_family
 from acquisition.live.serial_port import SerialPort
 from acquisition.replay import Replay
-from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
-from springmass.errors import UNREADABLE, USAGE, ProgramError
-from springmass.runs.loading import Loaded, load
+from springmass.api.sources import AnyScene, Reading
+from springmass.errors import UNREADABLE, ProgramError
+from springmass.runs.loading import Loaded, load, to_track
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import made_now, save_run
 from springmass.runs.scenes import scene_from
 from springmass.runs.simulating.bench import bench_position
-from springmass.runs.tracks import to_track
 from springmass.session.finding import name_sensors
 from springmass.session.output import demand_new
 from springmass.session.sensors import Sensor
 from springmass.session.session import Session
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
-
-if TYPE_CHECKING:
-    from springmass.api.sources import AnyScene, Reading
 
 RATE_HZ, BLOCK = 100.0, 16
 SIGMA_M = 8e-5  # noise of a simulated rangefinder if its scene states none
@@ -188,7 +184,7 @@ class _Live:
         self._recorder = self._session.preview(self._path.with_suffix(".wire"))
         if self._recorder is None:
             why = "; ".join(self._session.failures.describe())
-            raise ProgramError(f"{path}: the recording cannot begin ({why}); choose another folder", USAGE)
+            raise ProgramError(f"{path}: the recording cannot begin ({why}); choose another folder")
 
     def __enter__(self) -> Self:
         self._session.listen()

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from types import EllipsisType
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, TypedDict, Unpack
 
+from numpy.typing import ArrayLike
+
 from acquisition.errors import NeedsAnswer
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import Law
@@ -17,9 +19,10 @@ from springmass.runs.outputs import distinct_names
 from springmass.runs.questions import for_python
 from springmass.runs.run import Run
 
+AnyScene: TypeAlias = Scene | str | os.PathLike[str] | Mapping[str, Any]
+
 if TYPE_CHECKING:
     import xarray as xr
-    from numpy.typing import ArrayLike
 
     class Indexed(Protocol):
         """A frame or a series of pandas."""
@@ -31,7 +34,6 @@ if TYPE_CHECKING:
     Path: TypeAlias = str | os.PathLike[str]
     Arrays: TypeAlias = tuple[ArrayLike, ArrayLike] | Mapping[str, ArrayLike] | xr.Dataset | xr.DataArray | Indexed
     AnySource: TypeAlias = Path | Run | Arrays
-    AnyScene: TypeAlias = Scene | Path | Mapping[str, Any]
 
 
 class Reading(TypedDict, total=False):

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pipeline.errors import AnalysisError
+from springmass.api.sources import AnyScene
 from springmass.runs.options import How
 from springmass.runs.run import Run
 from springmass.runs.scenes import scene_from
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from springmass.api.sources import AnyScene
 
 FEWEST = 32  # samples before the first analysis
 GROWTH = 1.1  # the next analysis waits for so many times as many samples, so a second of data costs the same throughout

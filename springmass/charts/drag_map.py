@@ -8,7 +8,7 @@ import numpy as np
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis, Oscillation
-from pipeline.bench.derived_drag import STEADY_DISC_DRAG, disc_drag_coefficient
+from pipeline.bench.disc import STEADY_DISC_DRAG, disc_drag_coefficient
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, line_of
 

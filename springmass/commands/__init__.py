@@ -7,12 +7,12 @@ of `springmass.errors`. Free to change: what one command prints. A new command i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Group, Parameter
 
 from springmass import __version__
-from springmass.errors import OK, USAGE, ProgramError, adopt
+from springmass.errors import OK, ProgramError, adopt
 from springmass.layout import STDIN
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ FURTHER = {
     "formats": "List the formats of recordings, or identify that of a file.",
     "simulate": "Solve the equation of motion of a scene.",
     "trade": "Measure what accuracy costs on this machine, in two tables.",
-    "firmware": "Wire, flash and set the 100 Hz rangefinder.",
+    "firmware": "Wire and set the 100 Hz rangefinder; how to flash it.",
     "doctor": "Check this installation.",
 }
 COMMANDS = (*FIRST, *FURTHER)
@@ -94,7 +94,7 @@ def _begin(
 ) -> int:
     adopt(quiet, verbose)
     if not words:
-        raise ProgramError("no command; try springmass demo or springmass --help", USAGE)
+        raise ProgramError("no command; try springmass demo or springmass --help")
     end = words.index("--") if "--" in words else len(words)
     named = [STDIN if word == "-" else word for word in words[:end]]
     return int(app([*named, *words[end:]], exit_on_error=False, print_error=False) or OK)
@@ -112,20 +112,3 @@ def _completion(
 def call(words: Sequence[str]) -> int:
     """Call a command and return its exit code; ``CycloptsError`` if the words are not a valid command line."""
     return int(app.meta(list(words), exit_on_error=False, print_error=False, result_action="return_value") or OK)
-
-
-def without_reading(words: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Return a command line without the options for reading a recording, and these options as a dictionary.
-
-    >>> without_reading(["analyse", "run.csv", "--unit", "rad", "--json"])
-    (['analyse', 'run.csv', '--json'], {'unit': 'rad'})
-    """
-    from springmass.commands.options import only_reading
-    from springmass.runs.options import READ
-
-    reading = App(default_parameter=app.default_parameter, help_flags=(), version_flags=())
-    reading.default(only_reading)
-    words = list(words)
-    end = words.index("--") if "--" in words else len(words)
-    _, bound, others, _ = reading.parse_known_args(words[:end])
-    return others + words[end:], bound.arguments.get("read", READ).given()

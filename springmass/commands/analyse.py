@@ -1,35 +1,23 @@
 """``springmass analyse``: from recordings to Table 1, findings and a report.
 
 Several inputs are analysed one after the other: twenty records of two minutes take 1.4 s, and a second process would
-take longer to begin (``benchmarks/many.py``).
+take longer to begin (``benchmarks/many.py``). Their samples are in memory together; ``springmass batch`` is for more.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from pipeline.numerics.estimate import Estimate
-from springmass.commands.options import (
-    FURTHER,
-    BenchOptions,
-    Figures,
-    File,
-    Json,
-    Scenes,
-    Strict,
-    argument,
-    flag,
-    option,
-    output,
-)
+from springmass.commands.options import FURTHER, BenchOptions, Figures, File, Json, Scenes, Strict
 from springmass.errors import (
     OK,
     REJECTED,
@@ -43,34 +31,18 @@ from springmass.errors import (
     tell,
 )
 from springmass.layout import STDIN
-from springmass.runs.about import remember_scene
-from springmass.runs.analysing import Failed, Task, analyse_all, law_line
+from springmass.parameters import argument, flag, option, output
 from springmass.runs.inputs import files_of
 from springmass.runs.json_results import rejected
 from springmass.runs.options import How
-from springmass.runs.outputs import distinct_names, make_folder, results_name
-from springmass.runs.questions import for_command
-from springmass.runs.run import Run
+from springmass.runs.outputs import distinct_names, in_a_name, make_folder
+from springmass.runs.questions import for_command, option_words
+from springmass.runs.run import Failed, Run, Task, analyse_all, law_lines
 from springmass.runs.scenes import read_scenes
 from storage.errors import WriteFailed
 
-if TYPE_CHECKING:
-    from springmass.runs.rows import TableKey
-
 TOGETHER = "together.results"
-MOST_TOGETHER = 20  # inputs in one report: their samples are in memory together; batch is for more
 LONGEST_INPUTS = 48  # maximum length of input names repeated in a suggested command
-
-
-@dataclass(frozen=True, slots=True)
-class _Done:
-    """What is printed at the end of one of several runs."""
-
-    name: str
-    result: Mapping[str, Any] = field(default_factory=dict)
-    table: Mapping[TableKey, Estimate] = field(default_factory=dict)
-    numbers: Mapping[str, Estimate] = field(default_factory=dict)
-    law: str = ""
 
 
 @Parameter(name="*")
@@ -79,13 +51,8 @@ class AnalyseOptions:
     """The options of ``springmass analyse``."""
 
     scene: Scenes = ()
-    save_scene: Annotated[bool, flag("note the stated scene next to the recording, for later commands"), FURTHER] = (
-        False
-    )
     method: Annotated[
-        Literal["classic"] | None,
-        option("NAME", "also apply the lab report's classic method, for comparison"),
-        FURTHER,
+        Literal["classic"] | None, option("NAME", "also apply the lab report's classic method, for comparison"), FURTHER
     ] = None
     output: Annotated[File | None, output("DIR", "output folder (default: here; with --json: none)")] = None
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
@@ -111,7 +78,7 @@ def analyse(
     inputs = [str(each) for each in recordings]
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
-        raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself", USAGE)
+        raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself")
     scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
     found, folders = files_of(inputs)
     for line in folders:
@@ -119,16 +86,13 @@ def analyse(
     alone = len(found) == 1
     names = [""] if alone else distinct_names(["stdin" if one.path == STDIN else one.path for one in found])
     how = replace(how, method=options.method)
+    hows = [how if one.velocity is None else replace(how, velocity=one.velocity) for one in found]
     tasks = [
-        Task(
-            one.path, name, scenes[one.of], how if one.velocity is None else replace(how, velocity=one.velocity), values
-        )
-        for one, name in zip(found, names, strict=True)
+        Task(one.path, name, scenes[one.of], its, values) for one, name, its in zip(found, names, hows, strict=True)
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
-    files = [options.scene[one.of if len(options.scene) > 1 else 0] if options.scene else None for one in found]
     if not alone:
-        return _several(tasks, files, inputs, options, out)
+        return _several(tasks, inputs, options, out)
     (run,) = analyse_all(tasks)
     if isinstance(run, Failed):
         if run.question is not None and inputs == [found[0].path]:
@@ -137,51 +101,41 @@ def analyse(
     if options.json:
         print(json.dumps(run.result, allow_nan=False), flush=True)
     else:
-        if line := law_line(run, files[0]):
-            print(line)
         _print_text(run, options)
-    if options.save_scene:
-        _save_scene(run)
-    written = OK if out is None else _write(out / results_name(run), [run], options)
+    written = OK if out is None else _write(out / _results_name(run), [run], options)
     return max(_judged(run, options), written)
 
 
-def _several(
-    tasks: Sequence[Task],
-    files: Sequence[File | None],
-    inputs: Sequence[str],
-    options: AnalyseOptions,
-    out: Path | None,
-) -> int:
-    """Analyse many inputs: one Table 1, one file of numbers and, if they are few, one report."""
-    from springmass.runs.rows import every_number, table_estimates
+def _results_name(run: Run) -> str:
+    """Return the name of the folder for a run's report.
+
+    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the channel that was chosen
+    follows, because each has its own results.
+    """
+    path, channel = run.loaded.path, run.how.channel
+    name = "stdin" if str(path) == STDIN else path.stem if run.loaded.format in ("run", "wire") else path.name
+    safe = "" if channel is None else re.sub(r"[^A-Za-z0-9.+-]+", "_", channel).strip("._")[:60]
+    return in_a_name(f"{name}.{safe}" if safe else name, ".results")
+
+
+def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:
+    """Analyse many inputs: one Table 1 and one report."""
     from springmass.terminal.progress import counted
 
-    done: list[_Done] = []
     runs: list[Run] = []
     codes: list[int] = []
-    analysed = counted(analyse_all(tasks), len(tasks), "runs", quiet=manner()[0])
-    for run, file in zip(analysed, files, strict=True):
+    for run in counted(analyse_all(tasks), len(tasks), "runs", quiet=manner()[0]):
         if isinstance(run, Failed):
             codes.append(_failed(run))
             continue
         if options.json:
             print(json.dumps(run.result, allow_nan=False), flush=True)
-        if options.save_scene:
-            _save_scene(run)
         codes.append(_judged(run, options))
-        table, numbers = table_estimates(run.analysis), every_number(run.analysis)
-        done.append(_Done(run.name, run.result, table, numbers, law_line(run, file)))
-        if len(tasks) <= MOST_TOGETHER:
-            runs.append(run)
-    if done and not options.json:
-        _print_together(done, options)
-    written = OK
-    if runs and out is not None:
-        written = _write(out / TOGETHER, runs, options)
-    elif done and out is not None:
-        written = _written(lambda: f"written: {_write_numbers(out / TOGETHER, done)}", out)
-    if len(done) > 1:
+        runs.append(run)
+    if runs and not options.json:
+        _print_together(runs, options)
+    written = _write(out / TOGETHER, runs, options) if runs and out is not None else OK
+    if len(runs) > 1:
         named = shlex.join(inputs)
         suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
@@ -194,10 +148,8 @@ def _failed(failed: Failed) -> int:
     task, message = failed.task, failed.message
     if failed.question is not None:
         path = f"./{task.path}" if task.path.startswith("-") else task.path
-        velocity = () if task.how.velocity is None else ("--velocity", str(task.how.velocity))
-        given = {name: value for name, value in task.how.given().items() if name != "velocity"}
-        words = ["springmass", "analyse", path, *velocity]
-        message = str(failed.question.with_remedy(for_command(failed.question.question, words, given)))
+        words = ["springmass", "analyse", path, *option_words(task.how.given())]
+        message = str(failed.question.with_remedy(for_command(failed.question.question, words)))
     complain(message)
     return failed.code
 
@@ -214,18 +166,6 @@ def _judged(run: Run, options: AnalyseOptions) -> int:
     return OK
 
 
-def _save_scene(run: Run) -> None:
-    """Note the scene next to the recording; if that is impossible, print a message and continue."""
-    if run.loaded.path == Path(STDIN):
-        tell("--save-scene notes a scene next to a file; standard input has none, save the recording first")
-        return
-    try:
-        if noted := remember_scene(run.loaded.path, run.loaded.scene, run.scene):
-            tell(f"scene saved for this recording: {noted}")
-    except WriteFailed as error:
-        complain(error)
-
-
 def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.advice import trust_text
@@ -237,7 +177,7 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     from springmass.typeset import typeset
 
     style = style_of(sys.stdout, si=options.si)
-    print(text_table([run.name], [run.analysis], style))
+    print(*law_lines([run]), text_table([run.name], [run.analysis], style), sep="\n")
     if run.classic is not None:
         print(f"{classic_text(run.classic)}\n")
     if options.full and (budget := budget_text(run.analysis)):
@@ -248,48 +188,28 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     print(findings_text(run.result["findings"], typeset if style.unicode else str, full=options.full))
 
 
-def _print_together(done: Sequence[_Done], options: AnalyseOptions) -> None:
+def _print_together(runs: Sequence[Run], options: AnalyseOptions) -> None:
     from springmass.terminal.printing import shared_findings_text
     from springmass.terminal.style import style_of
     from springmass.terminal.table1 import text_table
     from springmass.typeset import typeset
 
-    for line in dict.fromkeys(one.law for one in done if one.law):
-        print(line)
     style = style_of(sys.stdout, si=options.si)
-    print(text_table([one.name for one in done], [one.table for one in done], style))
-    findings = {one.name: one.result["findings"] for one in done}
+    table = text_table([run.name for run in runs], [run.analysis for run in runs], style)
+    print(*law_lines(runs), table, sep="\n")
+    findings = {run.name: run.result["findings"] for run in runs}
     print(shared_findings_text(findings, typeset if style.unicode else str))
 
 
 def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> int:
+    """Write the report, and return an exit code: a folder that takes none costs one line, and not the result."""
     from springmass.report.write import write_report
 
     template = options.template if len(runs) == 1 else None
-    return _written(
-        lambda: f"report: {write_report(folder, runs, figures=options.figures, template=template)}", folder.parent
-    )
-
-
-def _written(write: Callable[[], str], folder: Path) -> int:
-    """Write files, and return an exit code: a folder that takes none costs one line, and not the result."""
     try:
-        make_folder(folder)
-        tell(write())
+        make_folder(folder.parent)
+        tell(f"report: {write_report(folder, runs, figures=options.figures, template=template)}")
     except (ProgramError, WriteFailed) as error:
         complain(f"{error}; --no-report writes no files")
         return USAGE
     return OK
-
-
-def _write_numbers(folder: Path, done: Sequence[_Done]) -> Path:
-    """Write the numbers of all runs: results.csv for a table, results.json for programs."""
-    from springmass.runs.rows import results_csv
-    from storage.atomic import write_whole
-    from storage.folder import whole_folder
-
-    text = json.dumps([one.result for one in done], indent=2, allow_nan=False, ensure_ascii=False)
-    with whole_folder(folder, {"results.csv", "results.json"}, "results.csv") as part:
-        write_whole(part / "results.json", f"{text}\n".encode("utf-8", "backslashreplace"))
-        write_whole(part / "results.csv", results_csv([one.name for one in done], [one.numbers for one in done]))
-    return folder / "results.csv"

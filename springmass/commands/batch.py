@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import sys
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
-from springmass.commands.options import File, argument, flag, option, output, refuse
+from springmass.commands.options import File, refuse
 from springmass.course.page import GROUPS, PAGE
-from springmass.course.plan import plan
+from springmass.course.plan import plan, template
 from springmass.course.rows import CSV, FAILED
 from springmass.course.running import run_course
-from springmass.course.runs_csv import template
 from springmass.course.store import DATABASE, opened
-from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE, ProgramError, complain, manner, suggest, tell
+from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
+from springmass.parameters import Count, WholeNumber, argument, flag, option, output
 from springmass.runs.options import How
 from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
-from springmass.terminal.progress import TaskProgress
-from springmass.values import Count, WholeNumber
 
 
 @Parameter(name="*")
@@ -45,9 +41,7 @@ class BatchOptions:
 
 
 def batch(
-    *recordings: Annotated[
-        File, argument("INPUT", "recordings, folders (with subfolders), patterns, or @FILE (a list)")
-    ],
+    *recordings: Annotated[File, argument("INPUT", "recordings, folders (with subfolders), or patterns")],
     options: BatchOptions = BatchOptions(),
     how: How = How(),
 ) -> int:
@@ -55,19 +49,18 @@ def batch(
     refuse("batch", how, "velocity")
     inputs = [str(each) for each in recordings]
     if not inputs and options.runs is None:
-        raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them", USAGE)
+        raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them")
     if options.template:
         table = template([job.path for job in plan(inputs).jobs])
         # A file gets the paths unchanged, because they are read back from it.
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK
     if options.output is None:
-        raise ProgramError("batch needs a folder for the results; name it with -o DIR", USAGE)
+        raise ProgramError("batch needs a folder for the results; name it with -o DIR")
     if options.dask is not None and options.jobs:
-        raise ProgramError("--dask brings its workers, got --jobs too; leave out --jobs", USAGE)
-    quiet = manner()[0]
+        raise ProgramError("--dask brings its workers, got --jobs too; leave out --jobs")
     folder = make_folder(options.output)
-    with contextlib.ExitStack() as shown, opened(folder) as store:
+    with opened(folder) as store:
         course = plan(
             inputs,
             runs_csv=None if options.runs is None else str(options.runs),
@@ -78,30 +71,8 @@ def batch(
         )
         for line in course.notes:
             tell(line)
-        runs = shown.enter_context(TaskProgress("runs", lines=True, quiet=quiet))
-        reports: list[TaskProgress] = []
-
-        def analysed(rows: Sequence[Mapping[str, Any]], done: int, total: int) -> None:
-            for row in rows:
-                if row["status"] in FAILED:
-                    complain(row["error"])
-            runs.update(done, total)
-
-        def reported(done: int, total: int) -> None:
-            if not reports:  # the bar for reports replaces that for runs
-                shown.pop_all().close()
-                reports.append(shown.enter_context(TaskProgress("reports", lines=True, quiet=quiet)))
-            reports[0].update(done, total)
-
         rows, made, unwritten = run_course(
-            course,
-            store,
-            folder,
-            jobs=options.jobs,
-            dask=options.dask,
-            reports=options.reports,
-            progress=analysed,
-            reported=reported,
+            course, store, folder, jobs=options.jobs, dask=options.dask, reports=options.reports
         )
     for line in unwritten:
         complain(line)

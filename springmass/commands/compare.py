@@ -8,33 +8,21 @@ import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from acquisition.errors import visible
-from springmass.commands.options import (
-    Figures,
-    File,
-    Json,
-    Scenes,
-    Strict,
-    argument,
-    option,
-    output,
-    refuse,
-)
+from springmass.commands.options import Figures, File, Json, Scenes, Strict, refuse
 from springmass.course.rows import COURSE, is_course, read_rows
-from springmass.errors import OK, REJECTED, USAGE, ProgramError, complain, suggest, tell
-from springmass.runs.analysing import Task, analysed, law_line
+from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
+from springmass.parameters import Share, argument, option, output
 from springmass.runs.comparing import Compared, beside, compare_runs, comparison_json
 from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
 from springmass.runs.options import How
 from springmass.runs.outputs import distinct_names, make_folder, now_utc
-from springmass.runs.run import Run
+from springmass.runs.run import Run, Task, analysed, law_lines
 from springmass.runs.scenes import read_scenes
-from springmass.values import Share
 
 if TYPE_CHECKING:
     from springmass.course.benches import CourseComparison
@@ -74,9 +62,7 @@ def compare(
     if all(is_course(path) for path in inputs):
         return _run_courses(inputs, options)
     if len(inputs) < 2:
-        raise ProgramError(
-            f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one", USAGE
-        )
+        raise ProgramError(f"compare needs two runs at least, got {len(inputs)}; springmass analyse takes a single one")
     # Scenes are read first, so that their errors are found before an hour of recordings is read.
     scenes = read_scenes(options.scene, len(inputs))
     out = None if options.output is None else make_folder(options.output)
@@ -90,11 +76,6 @@ def compare(
     if options.json:
         print(json.dumps(result, allow_nan=False), flush=True)
     else:
-        every: list[str | Path | None] = [*options.scene] or [None]
-        files = every if len(every) == len(runs) else every * len(runs)
-        lines = [law_line(run, file) for run, file in zip(runs, files, strict=True)]
-        for line in dict.fromkeys(line for line in lines if line):
-            print(line)
         _print_text(compared, runs)
     if out is not None:
         from springmass.report.write import write_report
@@ -117,7 +98,7 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
 
     if options.output is not None or options.scene or options.reported is not None or options.hooke is not None:
         raise ProgramError(
-            "-o, --scene, --reported and --hooke go with single runs; a course has its page and its scenes", USAGE
+            "-o, --scene, --reported and --hooke go with single runs; a course has its page and its scenes"
         )
     rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
     found = compare_rows(rows)
@@ -140,7 +121,8 @@ def _print_text(compared: Compared, runs: list[Run]) -> None:
     from springmass.terminal.printing import comparison_text, findings_text, reported_text, wrapped
     from springmass.terminal.style import style_of
 
-    print(comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout)))
+    text = comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout))
+    print(*law_lines(runs), text, sep="\n")
     for message in (*beside(compared), *(joint.message for joint in compared.joint)):
         print(f"\n{wrapped(message)}")
     if compared.reported:

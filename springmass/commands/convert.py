@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path, PurePath
 from typing import Annotated
 
-from acquisition.recordings.recording import Original
 from acquisition.recordings.writers import WRITERS
-from springmass.commands.options import PART, File, Overwrite, argument, option, output, refuse
-from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, suggest, tell
+from springmass.commands.options import PART, File, Overwrite, refuse
+from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
+from springmass.parameters import argument, option, output
 from springmass.runs.loading import Loaded, load
 from springmass.runs.options import ReadOptions
-from springmass.runs.outputs import save_run
+from springmass.runs.outputs import numbered, save_run
 from springmass.runs.scenes import read_scene
 from storage.atomic import write_whole
 
@@ -35,9 +35,9 @@ def convert(
     """Convert one input."""
     refuse("convert", read, *PART)
     if output is not None and target is not None:
-        raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once", USAGE)
+        raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once")
     if (output := target or output) is None:
-        raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form", USAGE)
+        raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form")
     stated = None if scene is None else read_scene(scene).to_mapping()
     loaded = load(recording, read)
     out = Path(output)
@@ -67,14 +67,12 @@ def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
     if writer is None:
         raise ProgramError(
             f"{out}: the suffix says what to write, one of {', '.join((*RUN_SUFFIXES, *WRITERS))}; "
-            f"got {out.suffix or 'no suffix'}",
-            USAGE,
+            f"got {out.suffix or 'no suffix'}"
         )
     if loaded.samples.quantity != "length":
         raise ProgramError(
             f"{out}: this form holds a length in m, got {loaded.samples.quantity} in {loaded.samples.unit}; "
-            f"write a run file, one of {', '.join(RUN_SUFFIXES)}",
-            USAGE,
+            f"write a run file, one of {', '.join(RUN_SUFFIXES)}"
         )
     start_time = str(loaded.provenance.get("start_time", ""))
     written = writer(str(loaded.path), loaded.samples, loaded.info, loaded.title, start_time)
@@ -97,35 +95,24 @@ def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:
     """Check before the work, so that of a pair either both files are written or none."""
     for target in () if overwrite else targets:
         if target.exists():
-            raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite", USAGE)
+            raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite")
 
 
 def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:
     if not loaded.originals:
         raise ProgramError(f"{loaded.path}: no original file travels inside this run; nothing to give back", UNREADABLE)
     if out.is_dir():
-        targets = [out / name for name in _names_apart(loaded.originals)]
+        # Names are external input, so only their last part is used for the path.
+        inside = [PurePath(each.name) for each in loaded.originals]
+        stems = numbered([each.stem for each in inside])
+        targets = [out / f"{stem}{each.suffix}" for stem, each in zip(stems, inside, strict=True)]
     elif len(loaded.originals) == 1:
         targets = [out]
     else:
         names = ", ".join(o.name for o in loaded.originals)
-        raise ProgramError(
-            f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder", USAGE
-        )
+        raise ProgramError(f"{out}: {len(loaded.originals)} originals travel inside ({names}); name an existing folder")
     _demand_free(targets, overwrite)
     return [
         write_whole(target, original.data, overwrite=overwrite)
         for target, original in zip(targets, loaded.originals, strict=True)
     ]
-
-
-def _names_apart(originals: Sequence[Original]) -> list[str]:
-    """Name the originals of a pair; if both have the same name, in separate folders, number the second."""
-    names: list[str] = []
-    for original in originals:
-        # Names are external input, so only their last part is used for the path.
-        path, count = PurePath(original.name), 1
-        while (name := path.name if count == 1 else f"{path.stem}-{count}{path.suffix}") in names:
-            count += 1
-        names.append(name)
-    return names

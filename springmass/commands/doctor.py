@@ -82,8 +82,7 @@ def _round_trip() -> Check:
     """Write a run file and read it back: HDF5, its filters and the temporary folder in one."""
     import numpy as np
 
-    from acquisition.block import Block
-    from acquisition.source import SourceInfo
+    from acquisition.block import Block, SourceInfo
     from storage.errors import StorageError
     from storage.run_file.reading import open_run
     from storage.run_file.writing import write_run

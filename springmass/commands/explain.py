@@ -9,8 +9,9 @@ from typing import Annotated
 
 from pipeline.findings.finding import Kind, kinds, usual_advice, word
 from pipeline.registry.found import Found
-from springmass.commands.options import Json, argument
-from springmass.errors import OK, USAGE, ProgramError
+from springmass.commands.options import Json
+from springmass.errors import OK, ProgramError
+from springmass.parameters import argument
 from springmass.terminal.printing import wrapped
 
 COLUMNS = 80
@@ -29,7 +30,7 @@ def explain(
         if code not in known:
             near = get_close_matches(code, known, n=1)
             hint = f"did you mean {near[0]}?" if near else "springmass explain lists all codes"
-            raise ProgramError(f"there is no finding {code!r}; {hint}", USAGE)
+            raise ProgramError(f"there is no finding {code!r}; {hint}")
     if as_json:
         print(json.dumps([_fields(code, known[code]) for code in codes or known]))
     elif codes:

@@ -1,11 +1,9 @@
-"""``springmass firmware``: wiring, flashing and settings of the rangefinder that this project builds."""
+"""``springmass firmware``: wiring and settings of the rangefinder that this project builds, and how to flash it."""
 
 from __future__ import annotations
 
 import contextlib
 import shlex
-import shutil
-import subprocess
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -17,15 +15,13 @@ from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.errors import visible
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
-from springmass.commands.options import flag, option
-from springmass.errors import OK, SENSOR, USAGE, ProgramError, suggest, tell
+from springmass.errors import OK, SENSOR, ProgramError, suggest
+from springmass.parameters import Whole, option
 from springmass.session.sensors import outdated, settings_of
-from springmass.values import Whole
 
 ANSWER_S = 5.0
 """Longest time until a board answers: opening the port restarts it, and its bootloader waits for two seconds."""
 ASK_EVERY_S = 0.5
-FLASH_S = 120.0
 
 
 def _gate(_: Any, tokens: Sequence[Token]) -> tuple[int, int]:
@@ -49,68 +45,35 @@ Gate = Annotated[
 def firmware(
     *,
     port: Annotated[str | None, option("P", "port of the board")] = None,
-    flash: Annotated[bool, flag("write the firmware that comes with this program")] = False,
     rate: Annotated[Whole | None, option("R", "pings per second, 10 to 125; the board stores the setting")] = None,
     gate: Gate = None,
     spread: Annotated[Whole | None, option("US", "largest random delay of a ping, 0 to 2000 us")] = None,
     name: Annotated[str | None, option("NAME", "name of the board: at most 12 letters, digits, . _ or -")] = None,
 ) -> int:
-    """Show the wiring and how to flash; with a port, show the board's settings, change them, or flash it."""
+    """Show the wiring and how to flash; with a port, show the board's settings, or change them."""
     settings = (("R", rate), ("G", None if gate is None else f"{gate[0]},{gate[1]}"), ("J", spread), ("N", name))
     commands = [f"{letter}{value}" for letter, value in settings if value is not None]
     if port is None:
-        if flash or commands:
-            raise ProgramError("--port must name the board's port; `springmass ports` lists them", USAGE)
-        _show()
+        if commands:
+            raise ProgramError("--port must name the board's port; `springmass ports` lists them")
+        print(WIRING)
+        _show_flashing("PORT")
         return OK
-    if flash:
-        _flash(port)
     identity = _converse(port, commands)
     print(visible(f"{port}: {identity}{settings_of(identity)}"))
     if outdated(identity):
-        print(visible(f"{VERSION} comes with this program; `springmass firmware --port {port} --flash` updates it"))
+        _show_flashing(port)
     else:
         suggest(f"springmass record --port {shlex.quote(port)} --page")
     return OK
 
 
-def _show() -> None:
-    print(WIRING)
+def _show_flashing(port: str) -> None:
     print(f"firmware {VERSION}: {HEX}")
-    print("`springmass firmware --port PORT --flash` writes it, which runs one of these:")
+    print("avrdude (Debian: apt install avrdude, macOS: brew install avrdude) writes it by the bootloader:")
     for baud, boards in zip(BAUDS, ("Uno, Nano", "Nano with the old bootloader"), strict=True):
-        print(f"  {shlex.join(avrdude_arguments('PORT', baud))}    # {boards}")
-
-
-def _flash(port: str) -> None:
-    """Write the firmware at the speed that the bootloader of the board accepts."""
-    if shutil.which("avrdude") is None:
-        raise ProgramError(
-            f"avrdude is needed to write {HEX}, and was not found; install it (Debian: apt install avrdude, macOS: "
-            "brew install avrdude), or open firmware/springmass_rangefinder in the Arduino IDE and press Upload",
-            SENSOR,
-        )
-    with contextlib.closing(SerialPort(port, FAMILY.baud)):
-        pass  # reports a port that is absent, busy or without permission in one line
-    reason = ""
-    for baud in BAUDS:
-        command = avrdude_arguments(port, baud)
-        tell(shlex.join(command))
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=FLASH_S)
-        except subprocess.TimeoutExpired:
-            reason = f"no end after {FLASH_S:g} s"
-            continue
-        if done.returncode == 0:
-            tell("written and verified")
-            return
-        reason = next((line.strip() for line in done.stderr.splitlines() if "error" in line.lower()), "")
-    raise ProgramError(
-        f"{port}: no bootloader answered at {' or '.join(map(str, BAUDS))} baud "
-        f"({reason or 'avrdude gave no reason'}); "
-        "is it an Uno or a Nano, and nothing else using the port?",
-        SENSOR,
-    )
+        print(f"  {shlex.join(avrdude_arguments(port, baud))}    # {boards}")
+    print("or open firmware/springmass_rangefinder in the Arduino IDE, and press Upload")
 
 
 def _converse(address: str, commands: list[str]) -> Identity:
@@ -141,8 +104,9 @@ def _ask(port: SerialPort, decoder: LineProtocolDecoder, clock: SystemClock, end
     heard = 0
     while decoder.status.identity is None:
         if clock.now_ns() > end_ns:
-            what = "readings, but not what it is; flash it with --flash" if heard else "nothing; is it the right port?"
-            raise ProgramError(f"{port.name}: the device was asked what it is and said {what}", SENSOR)
+            what = "readings, but not what it is" if heard else "nothing"
+            wrong = f"{port.name}: the device was asked what it is and said {what}"
+            raise ProgramError(f"{wrong}; is it the right port? `springmass firmware` shows how to flash it", SENSOR)
         port.write(FAMILY.identify)
         until_ns = clock.now_ns() + int(ASK_EVERY_S * 1e9)
         while decoder.status.identity is None and clock.now_ns() < until_ns:

@@ -10,36 +10,16 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
+from springmass.parameters import LawName, Positive, TcpPort, argument, flag, option
 from springmass.runs.options import ReadOptions
 from springmass.runs.questions import option_of
-from springmass.values import LawName, Positive, TcpPort
 
 File = str | Path
 """The name of a file; a shell completes it."""
 THE_PAGE = Group("The page", sort_key=4)
 FURTHER = Parameter(group=Group("Further options", sort_key=4))
 """Marks an option that few people use, which the help shows below the others."""
-
-
-def argument(name: str, words: str, *, required: bool | None = None) -> Parameter:
-    """Return the declaration of a positional argument."""
-    return Parameter(name=name, metavar=name, help=words, required=required)
-
-
-def option(metavar: str, words: str, *names: str) -> Parameter:
-    """Return the declaration of an option that takes a value."""
-    return Parameter(name=names, metavar=metavar, help=words)
-
-
-def output(metavar: str, words: str) -> Parameter:
-    """Return the declaration of the option that names the output."""
-    return option(metavar, words, "-o", "--output")
-
-
-def flag(words: str) -> Parameter:
-    """Return the declaration of an option without a value."""
-    return Parameter(help=words)
 
 
 def converted(metavar: str, words: str, convert: Callable[[str], Any]) -> Parameter:
@@ -124,10 +104,7 @@ class BenchOptions:
     mass_kg: Annotated[
         Any,
         Parameter(
-            metavar="M",
-            help="all that hangs on the spring, kg: 0.2007+/-0.0001",
-            converter=_measured,
-            n_tokens=1,
+            metavar="M", help="all that hangs on the spring, kg: 0.2007+/-0.0001", converter=_measured, n_tokens=1
         ),
     ] = None
     set: Annotated[
@@ -151,9 +128,7 @@ class PageOptions:
         Positive | None, option("U", "target uncertainty of the period, us (default: 40 ppm of the period)")
     ] = None
     lan: Annotated[bool, flag("let other devices on the local network view the page")] = False
-    law: Annotated[
-        LawName | None, option("NAME", "damping law, if known: linear, quadratic ...; any: choose from the data")
-    ] = None
+    law: LawName = None
 
 
 PART = ("from_s", "to_s", "clock_ppm")
@@ -163,8 +138,4 @@ PART = ("from_s", "to_s", "clock_ppm")
 def refuse(command: str, read: ReadOptions, *names: str) -> None:
     """Refuse options of reading that mean nothing to a command."""
     if given := [option_of(name) for name in read.given() if name in names]:
-        raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out", USAGE)
-
-
-def only_reading(*, read: ReadOptions = ReadOptions()) -> None:
-    """Declare a command that has the options of reading alone, by which they are parted from the others of a line."""
+        raise ProgramError(f"{', '.join(given)}: {command} has no use for it; leave it out")

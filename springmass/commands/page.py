@@ -10,12 +10,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from springmass.commands.options import PART, PageOptions, Recording, flag, refuse
-from springmass.errors import OK, USAGE, ProgramError, manner, tell
+from springmass.commands.options import PART, PageOptions, Recording, refuse
+from springmass.errors import OK, ProgramError, manner, tell
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
 from springmass.page.web.server import address_in_network, code_for_terminal, serve
-from springmass.runs.loading import kind_of, load
+from springmass.parameters import flag
+from springmass.runs.inputs import kind_of
+from springmass.runs.loading import load
 from springmass.runs.options import ReadOptions
 from springmass.stops import STOPS
 
@@ -69,7 +71,7 @@ def page(
         tell("the page is closed")
     except OSError as error:
         reason = error.strerror or str(error)
-        raise ProgramError(f"--page-port {page.page_port}: {reason}; name another, or 0 for any", USAGE) from error
+        raise ProgramError(f"--page-port {page.page_port}: {reason}; name another, or 0 for any") from error
     finally:
         state.close()
     return OK

@@ -9,8 +9,9 @@ from typing import Annotated, Any
 from acquisition.decoders.registry import families
 from acquisition.errors import visible
 from acquisition.live.serial_port import list_ports
-from springmass.commands.options import Json, flag, option
+from springmass.commands.options import Json
 from springmass.errors import OK, suggest
+from springmass.parameters import flag, option
 from springmass.session.finding import listen
 from springmass.terminal.printing import wrapped
 

@@ -8,7 +8,7 @@ import queue
 import shlex
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,14 +21,16 @@ from acquisition.decoders.registry import get_family
 from acquisition.errors import CalibrationError
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
 from acquisition.live.serial_port import SerialPort
-from pipeline.bench.added_mass import scene_air
 from pipeline.bench.air import speed_of_sound
+from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
-from springmass.commands.options import File, PageOptions, converted, flag, option, output
-from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, USAGE, ProgramError
+from springmass.commands.options import File, PageOptions, converted
+from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
+from springmass.parameters import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
 from springmass.runs.outputs import made_now
+from springmass.runs.questions import option_words
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.bench import EXAMPLE, REST_M, Release, bench_position
 from springmass.session.finding import name_sensors
@@ -42,9 +44,8 @@ from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
 from springmass.terminal.recording import ProgressLine
 from springmass.terminal.style import style_of, watched
-from springmass.values import PartsPerMillion, Positive, ReadingsPerSecond, Whole
-from storage.disk import check_disk
 from storage.errors import WriteFailed, one_line
+from storage.recorder import check_disk
 from storage.recovery.recover import recover
 from storage.recovery.report import RecoverReport
 from storage.run_file.reading import open_run
@@ -86,8 +87,7 @@ class RecordOptions:
         None
     )
     option: Annotated[
-        tuple[tuple[str, Any], ...],
-        converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option),
+        tuple[tuple[str, Any], ...], converted("NAME=VALUE", "option of the decoder; may be repeated", _decoder_option)
     ] = ()
     still: Annotated[Positive | None, option("S", "first measure rest position and noise for S seconds")] = None
     ruler: Annotated[
@@ -109,7 +109,7 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         what = Path(options.scene).name.removesuffix(".toml").removesuffix(".scene")
     out = default_name(options.title or what, datetime.now()) if options.output is None else Path(options.output)
     if out.suffix.lower() != ".h5":
-        raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5", USAGE)
+        raise ProgramError(f"{out}: a recording becomes a run file, whose name ends in .h5")
     _demand_sense(options, page_options)
     _fill_standard_streams()
     if not options.simulate:
@@ -138,10 +138,17 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         beside.callback(console.close)
         page = None
         try:
-            page = beside.enter_context(_page(page_options, log, session, console)) if options.page else None
+            if options.page:
+                given = option_words({each.name: getattr(page_options, each.name) for each in fields(page_options)})
+                process = PageProcess(given, log, queue.SimpleQueue(), STOPS, session.failures, console.line)
+                page = beside.enter_context(process)
             ended = _Bench(session, options, log, console, release, page).record()
             session.stop()
-            for line in _failed(ended, session):
+            failed, status = session.failures.describe(), ended.status
+            if status.error:
+                failed.append(f"springmass: {status.error}")
+                failed.append(f"springmass: {status.dropped_records} records that came later were not kept")
+            for line in failed:
                 console.line(line)
             code, run_file, sentences = _built(ended, out, session)
             for line in sentences:
@@ -165,15 +172,6 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
             return INTERRUPTED
         finally:
             session.stop()
-
-
-def _failed(ended: Ended, session: Session) -> list[str]:
-    """Return what went wrong during the recording."""
-    lines, status = session.failures.describe(), ended.status
-    if status.error:
-        lines.append(f"springmass: {status.error}")
-        lines.append(f"springmass: {status.dropped_records} records that came later were not kept")
-    return lines
 
 
 def _built(ended: Ended, out: Path, session: Session) -> tuple[int, Path | None, list[str]]:
@@ -251,19 +249,9 @@ def _demand_sense(options: RecordOptions, page: PageOptions) -> None:
         ("--law", page.law is not None, "--page", options.page),
     ):
         if given and not there:
-            raise ProgramError(f"{name} does nothing without {needed}; name both or neither", USAGE)
+            raise ProgramError(f"{name} does nothing without {needed}; name both or neither")
     if options.simulate and options.port:
-        raise ProgramError("--simulate takes no --port; leave one of them out", USAGE)
-
-
-def _page(options: PageOptions, log: Path, session: Session, console: Console) -> PageProcess:
-    """Return the page that runs during the recording."""
-    given = ["--page-port", str(options.page_port)]
-    given += [] if options.want_us is None else ["--want-us", str(options.want_us)]
-    given += ["--lan"] if options.lan else []
-    given += [] if options.law is None else ["--law", options.law]
-    given += ["--no-browser"] if options.no_browser else []
-    return PageProcess(given, log, queue.SimpleQueue(), session.stops, session.failures, console.line)
+        raise ProgramError("--simulate takes no --port; leave one of them out")
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,12 +267,17 @@ class _Bench:
 
     def record(self) -> Ended:
         """Run the session, with a page from before its beginning to its end."""
+        options = self.options
         self.session.listen(self.console.line)
         operator = None if self.page is None else Operator(self.session, self.page, self.log)
         try:
             if operator is not None:
                 operator.begin()
-            ended = self._recorded(self._limits(), operator)
+            rest = None if options.still is None else self._rest(options.still)
+            trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
+            if not options.ready:
+                self._release(trigger)
+            ended = self._recorded(RunLimits(options.seconds, trigger, rest), operator)
         finally:
             if operator is not None:
                 operator.end()
@@ -293,15 +286,6 @@ class _Bench:
             if ended.by is not EndReason.PAGE:
                 self.page.ended()
         return ended
-
-    def _limits(self) -> RunLimits:
-        """Measure the rest position if requested, and return when the run begins and ends."""
-        options = self.options
-        rest = None if options.still is None else self._rest(options.still)
-        trigger = None if options.trigger is None else Trigger(options.trigger, options.pre or 2.0)
-        if not options.ready:
-            self._release(trigger)
-        return RunLimits(options.seconds, trigger, rest)
 
     def _release(self, trigger: Trigger | None) -> None:
         self.release.after(0.0 if trigger is None else trigger.keep_s + 0.5)
@@ -371,8 +355,7 @@ class _Bench:
         if sys.stdin is None or not sys.stdin.readline():
             raise ProgramError(
                 "several --ruler distances are measured one after the other, each begun with Enter, and the standard "
-                "input is closed; name one --ruler, or run this at a terminal",
-                USAGE,
+                "input is closed; name one --ruler, or run this at a terminal"
             )
 
 
@@ -390,7 +373,7 @@ def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> I
             yield [sensor]
         return
     if len(names) not in (1, len(options.port)):
-        raise ProgramError("--sensor must be named once for all ports, or once for each in their order", USAGE)
+        raise ProgramError("--sensor must be named once for all ports, or once for each in their order")
     families = [get_family(name) for name in (names * len(options.port) if len(names) == 1 else names)]
     sensors: list[Sensor] = []
     try:
@@ -414,14 +397,14 @@ def _simulated(
     release: Release,
 ) -> Iterator[Sensor]:
     if os.name == "nt":
-        raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port", USAGE)
+        raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port")
     from acquisition.simulated.pseudo_terminal import VirtualPort
     from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 
     family = get_family(name)
     if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
-        raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that", USAGE)
+        raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that")
     waits = options.still is not None or options.ready
     where = "the example bench" if options.scene is None else str(options.scene)
     seconds = options.seconds or UNLIMITED_S
@@ -451,4 +434,4 @@ def _calibration(options: RecordOptions, scene: Scene | None) -> Calibration:
     try:
         return Calibration(speed_of_sound_m_per_s=speed)
     except CalibrationError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(str(error)) from error

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 from acquisition.errors import CalibrationError
-from springmass.commands.options import File, Overwrite, argument, option, output
-from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.commands.options import File, Overwrite
+from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.parameters import Positive, argument, option, output
 from springmass.runs.outputs import made_now
 from springmass.stops import STOPS
-from springmass.values import Positive
 from storage.recovery.recover import recover as build
 
 
@@ -36,7 +36,7 @@ def recover(
             provenance=made_now(),
         )
     except CalibrationError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(str(error)) from error
     for line in report.describe():
         tell(line)
     suggest(f"springmass analyse {shlex.quote(str(report.main.path))}")

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Annotated
 
 from acquisition.errors import visible
-from springmass.commands.options import File, argument, converted, option
-from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.commands.options import File, converted
+from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.parameters import argument, option
 
 TEMPLATE = """\
 # What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
@@ -74,13 +75,12 @@ def scene(
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from pipeline.bench.scene import Scene
-    from springmass.runs.about import about_of, write_about
-    from springmass.runs.scenes import ask_about, read_scene, stated_keys
+    from springmass.runs.scenes import about_of, ask_about, read_scene, stated_keys, write_about
 
     noted = scene is not None or note or mark
     if check is not None:
         if recording is not None or noted:
-            raise ProgramError("--check looks at a scene file alone; leave the rest out", USAGE)
+            raise ProgramError("--check looks at a scene file alone; leave the rest out")
         checked = read_scene(check)
         ask_about(checked, check)
         print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
@@ -91,15 +91,15 @@ def scene(
         return OK
     if recording is None:
         if noted:
-            raise ProgramError("--scene, --note and --mark belong to a recording; name it", USAGE)
+            raise ProgramError("--scene, --note and --mark belong to a recording; name it")
         print(TEMPLATE, end="")
         suggest("springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
-        raise ProgramError(f"{recording}: nothing to save; give --scene, --note or --mark S=TEXT", USAGE)
+        raise ProgramError(f"{recording}: nothing to save; give --scene, --note or --mark S=TEXT")
     path = Path(recording)
     if not path.is_file():
-        raise ProgramError(f"{path}: expected a recording, got none; check the name", USAGE)
+        raise ProgramError(f"{path}: expected a recording, got none; check the name")
     given = None if scene is None else read_scene(scene)
     written = write_about(about_of(path).with_more(given, note, mark))
     tell(f"{written}: used from now on with {path.name}")

@@ -10,14 +10,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
-
 from acquisition.errors import visible
 from pipeline.dynamics.band import Band
+from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
-from springmass.commands.options import Figures, File, Json, Overwrite, flag, option, output
-from springmass.errors import OK, USAGE, ProgramError, suggest, tell
+from springmass.commands.options import Figures, File, Json, Overwrite
+from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.runs.json_results import picked
 from springmass.runs.options import How, ReadOptions
 from springmass.runs.run import Run
@@ -28,18 +28,16 @@ from springmass.runs.simulating.simulation import (
     band_of,
     count_of,
     default_tolerance,
-    demand_stable,
     growths,
+    instability,
     prediction,
     prepare,
     simulated,
     summary,
 )
 from springmass.terminal.printing import wrapped
-from springmass.values import Finite, Positive, Whole
 
 GROWTH = ("method", "predicted", "measured", "fails_above_s")
-FAR_BELOW = 1e-3  # of the band; a smaller tolerance gives no benefit
 
 
 def simulate(
@@ -73,10 +71,10 @@ def simulate(
 ) -> int:
     """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
     if scene is None and against is None:
-        raise ProgramError("simulate needs --scene S.toml, or --against RUN with a scene of its own", USAGE)
+        raise ProgramError("simulate needs --scene S.toml, or --against RUN with a scene of its own")
     where, say = str(against if scene is None else scene), sys.stderr if as_json else sys.stdout
     if output is not None and Path(output).exists() and not overwrite:
-        raise ProgramError(f"{visible(str(output))}: exists; take another name, or --overwrite", USAGE)
+        raise ProgramError(f"{visible(str(output))}: exists; take another name, or --overwrite")
     stated, analysis, longest_s = None if scene is None else read_scene(scene), None, seconds or 10.0
     if scene is not None and stated is not None:
         ask_about(stated, scene)
@@ -94,13 +92,17 @@ def simulate(
         tell(f"from {against}: {', '.join(ready.from_run)}")
     band, of_band = band_of(ready, longest_s)
     wanted = default_tolerance(band) if tolerance is None and method == "auto" else tolerance
-    if not force:
-        demand_stable(ready.problem, method, dt if tolerance is None else None, where=where)
+    wrong, limit = instability(ready.problem, method, dt if tolerance is None else None)
+    if wrong and not force:
+        smaller = f"take --dt {limit} or less, " if limit else "take "
+        other = "auto" if method == STRANG.name else "strang"
+        other += "" if math.isfinite(STRANG.stable_step(ready.problem)) else ", which has no limit"
+        raise ProgramError(f"{where}: {wrong}; {smaller}--method {other}, or --force to run it all the same")
     effects = simulated_effects(ready.stated, ready.problem, dt * count, ready.drag)
     try:
         simulation = simulated(ready.problem, method, dt, count, wanted, check=check)
     except DynamicsError as error:
-        raise ProgramError(f"{where}: {error}", USAGE) from error
+        raise ProgramError(f"{where}: {error}") from error
     print(wrapped(f"band             {of_band}", " " * 17), file=sys.stderr)
     print(_before(_tolerance(wanted, band, given=tolerance is not None), effects), file=say)
     print(_after(simulation, count), file=say)
@@ -140,21 +142,12 @@ def simulate(
 
 
 def _tolerance(tolerance: float | None, band: Band | None, *, given: bool) -> str:
-    """Say where the tolerance comes from, or that it is far below the band."""
+    """Say what the tolerance is, and where it comes from."""
     if tolerance is None:
         return ""
     words = f"tolerance        {tolerance:g} of the amplitude"
-    if not given:
-        of_band = "" if band is None else f"a hundredth of the band, {band.relative_u:.1g} of the amplitude"
-        return f"{words}: {of_band or 'the default'}"
-    if band is not None and 0.0 < tolerance < FAR_BELOW * band.relative_u:
-        turns = dict(zip(band.quantities, np.abs(band.of_log[:, -1].imag).tolist(), strict=True))
-        name = max(turns, key=lambda each: turns[each])
-        words += (
-            f", far below the band: u({name}) alone is {turns[name]:.1g} rad after {band.t[-1]:.3g} s; "
-            f"{default_tolerance(band):.0e} is enough here"
-        )
-    return words
+    of_band = "the default" if band is None else f"a hundredth of the band, {band.relative_u:.1g} of the amplitude"
+    return words if given else f"{words}: {of_band}"
 
 
 def _before(tolerance: str, effects: Sequence[Effect]) -> str:

@@ -8,14 +8,14 @@ from typing import Annotated, Any
 
 from pipeline.analysis import Oscillation
 from springmass import __version__
-from springmass.commands.options import File, Json, argument, option
-from springmass.errors import OK, UNREADABLE, USAGE, ProgramError, manner
+from springmass.commands.options import File, Json
+from springmass.errors import OK, UNREADABLE, ProgramError, manner
+from springmass.parameters import Count, Positive, argument, option
 from springmass.runs.options import How
 from springmass.runs.run import Run
 from springmass.runs.scenes import read_scene
 from springmass.terminal.progress import counted
 from springmass.trade import KINDS, QUANTITIES, Motion, measure_integrators, measure_tiers, motion_of, motion_of_problem
-from springmass.values import Count, Positive
 
 
 def trade(
@@ -46,8 +46,7 @@ def trade(
     if not motion.seconds * motion.frequency_hz >= 2.0 or not motion.theta[0] > 0.0:
         raise ProgramError(
             f"expected a motion of two periods, got {motion.seconds:g} s at {motion.frequency_hz:.3g} Hz from "
-            f"{motion.theta[0]:g} m; take more --seconds, or state a start in the scene",
-            USAGE,
+            f"{motion.theta[0]:g} m; take more --seconds, or state a start in the scene"
         )
     kinds = counted(measure_tiers(motion, seeds), len(KINDS), "kinds of records", quiet=manner()[0])
     tiers = [row for rows in kinds for row in rows]

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import signal
+import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from multiprocessing import active_children, get_context, parent_process
 from typing import Any, TypeVar
 
-from springmass.errors import SOME_FAILED, USAGE, ProgramError
-from springmass.runs.processes import cores, pool
+from springmass.errors import SOME_FAILED, ProgramError, adopt, manner
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -61,13 +72,13 @@ def _dask(address: str) -> Iterator[Workers]:
     try:
         from distributed import Client, KilledWorker
     except ImportError as error:
-        raise ProgramError("--dask needs dask.distributed; pip install 'springmass[dask]'", USAGE) from error
+        raise ProgramError("--dask needs dask.distributed; pip install 'springmass[dask]'") from error
     connect: Any = Client
     try:
         client = connect(address, set_as_default=False, timeout=20)
     except (OSError, ValueError, TimeoutError) as error:
         reason = " ".join(str(error).split())
-        raise ProgramError(f"{address}: no dask scheduler answers ({reason}); start dask scheduler", USAGE) from error
+        raise ProgramError(f"{address}: no dask scheduler answers ({reason}); start dask scheduler") from error
 
     @contextlib.contextmanager
     def start() -> Iterator[Executor]:
@@ -130,3 +141,42 @@ def _until_one_dies(
             for future in running:
                 future.cancel()
     return lost
+
+
+def cores() -> int:
+    """Return the number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextlib.contextmanager
+def pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of new processes that share this one's output settings, leave Ctrl-C to it and end with it.
+
+    After an error or Ctrl-C they are terminated, because a task may take minutes.
+    """
+    others = set(active_children())
+    # New processes are spawned, because a fork of a process with linear-algebra threads may hang.
+    with ProcessPoolExecutor(processes, get_context("spawn"), _begin, manner()) as executor:
+        try:
+            yield executor
+        except BaseException:
+            for process in set(active_children()) - others:
+                process.terminate()
+            raise
+
+
+def _begin(quiet: bool, verbose: bool) -> None:
+    """Leave Ctrl-C to the parent process, and end with it.
+
+    A pool's process would otherwise wait forever if its parent is killed.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    adopt(quiet, verbose)
+    parent = parent_process()
+    if parent is not None:
+
+        def follow() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=follow, daemon=True).start()

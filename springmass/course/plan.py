@@ -1,31 +1,36 @@
-"""Turn inputs into jobs: find the runs and the known values of each, and what its row depends on."""
+"""Turn inputs, and the table of runs with the known values of each, into jobs; and what a row depends on."""
 
 from __future__ import annotations
 
+import csv
 import functools
 import glob
 import hashlib
+import io
 import json
 import os
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from acquisition.recordings.base import dialect_folder
-from acquisition.regular_file import open_regular, open_regular_text, read_regular
+from acquisition.recordings.identify import dialect_folder
+from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
-from pipeline.errors import SceneError
-from springmass.course.runs_csv import ANSWERS, POSITION, Values, join, read_table
-from springmass.errors import UNREADABLE, USAGE, ProgramError
+from pipeline.registry.laws import ANY_LAW, law_names
+from springmass.course.rows import RESERVED
+from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
-from springmass.runs.about import about_path
-from springmass.runs.analysing import Task
 from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.options import HOW, How
 from springmass.runs.outputs import numbered
-from springmass.runs.scenes import read_scene
+from springmass.runs.run import Task
+from springmass.runs.scenes import about_path, read_scene
+from springmass.runs.tables import Row, read_rows
 
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
 _CODE = (".py", ".toml", ".j2", ".css", ".js")
@@ -92,9 +97,9 @@ def plan(
 ) -> Plan:
     """Find the runs of a course and the known values of each.
 
-    Inputs are files, folders with all their contents, patterns, and lists: ``@FILE`` names a file with one path per
-    line; without inputs, the files that the table of runs names. Scene and options are for all runs, and the table
-    takes precedence. ``known`` are paths that an earlier pass identified as recordings, ``output`` is left out.
+    Inputs are files, folders with all their contents, and patterns; without inputs, the files that the table of runs
+    names. Scene and options are for all runs, and the table takes precedence. ``known`` are paths that an earlier pass
+    identified as recordings, ``output`` is left out.
     """
     table = None if runs_csv is None else read_table(runs_csv)
     out = {os.path.abspath(path) for path in (output, runs_csv) if path is not None}
@@ -128,9 +133,7 @@ def plan(
 def _expanded(inputs: Sequence[str]) -> list[str]:
     texts: list[str] = []
     for text in inputs:
-        if text.startswith("@") and not os.path.exists(text):
-            texts += _listed(Path(text[1:]))
-        elif any(mark in text for mark in "*?[") and not os.path.exists(text):
+        if any(mark in text for mark in "*?[") and not os.path.exists(text):
             matched = sorted(glob.glob(text, recursive=True))
             if not matched:
                 raise ProgramError(f"{text}: no file matches this pattern", UNREADABLE)
@@ -138,15 +141,6 @@ def _expanded(inputs: Sequence[str]) -> list[str]:
         else:
             texts.append(text)
     return texts
-
-
-def _listed(path: Path) -> list[str]:
-    try:
-        with open_regular_text(path, "utf-8-sig") as file:
-            lines = file.read().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProgramError(f"{path}: expected a list of paths, one a line ({error})", USAGE) from error
-    return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
 
 
 def _scene(values: Values, shared: Scene | None, where: str) -> Scene | None:
@@ -158,10 +152,7 @@ def _scene(values: Values, shared: Scene | None, where: str) -> Scene | None:
     for name in PLACES.keys() & values.keys():
         (table, key), (value, u) = PLACES[name], values[name]
         tables.setdefault(table, {})[key] = {"value": value, "u": u} if u else value
-    try:
-        return Scene.from_mapping(tables, where=where) if tables else None
-    except SceneError as error:
-        raise ProgramError(str(error), USAGE) from error
+    return Scene.from_mapping(tables, where=where) if tables else None
 
 
 def names_of(jobs: Sequence[Job]) -> list[str]:
@@ -196,3 +187,143 @@ def digest_of(path: str) -> str:
 
 def _digest(value: object) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
+
+
+NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
+LAW = "law"
+ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", LAW, *NUMBERS)
+POSITION = "sensor_position"
+_U = tuple(f"{name}_u" for name in PLACES)
+KNOWN = ("path", "scene", POSITION, *ANSWERS, *PLACES, *_U)
+TEMPLATE = (
+    "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
+    "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
+)  # fmt: skip
+Values = Mapping[str, Any]
+_UNIT = re.compile(r"_(kg|g|m|mm|cm|s|hz|c|pa|n_per_m|per_s)(_u)?$")
+_TAG = re.compile(r"[a-z][a-z0-9_]*")
+
+
+@dataclass(frozen=True, slots=True)
+class RunsTable:
+    """A table of runs: its file, the columns that are tags, and for each row line, path or pattern, and values.
+
+    Values are by column, those of a quantity with its standard uncertainty.
+    """
+
+    path: Path
+    tags: tuple[str, ...]
+    rows: tuple[tuple[int, str, Values], ...]
+
+    def files(self) -> list[str]:
+        """Return the files named without a pattern; relative paths start from the table's folder."""
+        named = [os.path.join(self.path.parent, text) for _, text, _ in self.rows if not self.is_pattern(text)]
+        return list(dict.fromkeys(named))
+
+    def is_pattern(self, text: str) -> bool:
+        """Return whether a row's path is a pattern rather than the name of a file such as ``run [1].txt``."""
+        return any(mark in text for mark in "*?[") and not os.path.exists(self.whole(text))
+
+    def whole(self, text: str) -> str:
+        """Return the absolute path or pattern of a row."""
+        return os.path.abspath(os.path.join(self.path.parent, text))
+
+
+def template(paths: Sequence[str]) -> str:
+    """Return a ``runs.csv`` to fill in, with one row per path."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(TEMPLATE)
+    writer.writerows([path, *[""] * (len(TEMPLATE) - 1)] for path in paths)
+    return out.getvalue()
+
+
+def read_table(path: str | Path) -> RunsTable:
+    """Read a table of runs; errors name row, column and value."""
+    path = Path(path)
+    names, rows = read_rows(path, "table of runs")
+    tags = _tags(path, names)
+    for row in rows:
+        if "path" not in row.cells:
+            raise ProgramError(f"{row.where}: the path of the run is missing; fill it in")
+    return RunsTable(path, tags, tuple((row.line, row.cells["path"], _values(path.parent, row)) for row in rows))
+
+
+def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the tags among the column names; refuse unknown or repeated columns."""
+    if "path" not in names:
+        raise ProgramError(f"{path}: no column path, got {', '.join(names)}; see batch --template")
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ProgramError(f"{path}: the column {twice[0]} is there twice; leave one out")
+    tags = tuple(name for name in names if name not in KNOWN)
+    for name in tags:
+        near = get_close_matches(name, KNOWN, n=1, cutoff=0.85)
+        if near or _UNIT.search(name):
+            hint = f"did you mean {near[0]}?" if near else f"allowed with a unit are {', '.join(PLACES)}"
+            raise ProgramError(f"{path}: unknown column {name!r}; {hint}")
+        if name in RESERVED:
+            raise ProgramError(f"{path}: {name!r} is a column of the results; rename the column")
+        if not _TAG.fullmatch(name):
+            raise ProgramError(f"{path}: a tag has lower-case letters, digits and _, got {name!r}; rename it")
+    return tags
+
+
+def _values(folder: Path, row: Row) -> Values:
+    texts = row.cells
+    values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
+    values |= {name: row.number(name) for name in NUMBERS if name in texts}
+    values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
+    for name in PLACES:
+        if name in texts:
+            values[name] = (row.number(name), row.number(f"{name}_u") if f"{name}_u" in texts else 0.0)
+        elif f"{name}_u" in texts:
+            raise ProgramError(f"{row.where}: {name}_u is there without {name}; fill in both")
+    if (law := texts.get(LAW)) not in (None, ANY_LAW, *law_names()):
+        laws = ", ".join((*law_names(), ANY_LAW))
+        raise ProgramError(f"{row.where}: {LAW} must be one of {laws}, got {law!r}")
+    return values
+
+
+def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[InputFile, int, Values]], list[str]]:
+    """Return each file with line and values from the table; a note for each row without file and file without row.
+
+    A file has one run for each row that names its path with a different ``run`` or ``channel``. A row with a path
+    takes precedence over a row with a pattern; other rows that contradict each other are refused.
+    """
+    exact: dict[str, list[tuple[int, Values]]] = {}
+    patterns: list[tuple[int, str, Values]] = []
+    for line, text, values in table.rows:
+        if table.is_pattern(text):
+            patterns.append((line, text if "/" not in text else table.whole(text), values))
+        else:
+            exact.setdefault(table.whole(text), []).append((line, values))
+    used: set[int] = set()
+    joined: list[tuple[InputFile, int, Values]] = []
+    notes = []
+    for file in files:
+        path, first = os.path.abspath(file.path), 0
+        base: Values = {}
+        for line, text, values in patterns:
+            # A pattern without a slash is compared only with the file name.
+            if not fnmatchcase(path if "/" in text else os.path.basename(path), text):
+                continue
+            if clash := sorted(x for x in base.keys() & values.keys() if base[x] != values[x]):
+                wrong = f"lines {first} and {line} both match {file.path} and differ in {clash[0]}"
+                raise ProgramError(f"{table.path}: {wrong}; narrow one of the patterns")
+            base, first = {**base, **values}, first or line
+            used.add(line)
+        lines: dict[tuple[Any, Any], int] = {}
+        for line, values in exact.get(path, []):
+            which = (values.get("run"), values.get("channel"))
+            if which in lines:
+                wrong = f"lines {lines[which]} and {line} both name {file.path}"
+                raise ProgramError(f"{table.path}: {wrong}; leave one out, or give each another run or channel")
+            lines[which] = line
+            joined.append((file, line, {**base, **values}))
+        used |= set(lines.values())
+        if not lines:
+            joined.append((file, first, base))
+        if not lines and not first:
+            notes.append(f"{table.path}: no row belongs to {file.path}")
+    unused = [f"line {line}: {text}" for line, text, _ in table.rows if line not in used]
+    return joined, [*(f"{table.path}, {row}: no file of the inputs belongs to this row" for row in unused), *notes]

@@ -12,7 +12,7 @@ from typing import Any
 from acquisition.regular_file import open_regular_text
 from pipeline.bench.scene import PLACES
 from pipeline.registry.quantities import QUANTITIES
-from springmass.errors import UNREADABLE, USAGE, ProgramError
+from springmass.errors import UNREADABLE, ProgramError
 from springmass.typeset import cell
 from storage.atomic import whole_file, writing
 
@@ -75,7 +75,7 @@ def is_course(folder: str | os.PathLike[str]) -> bool:
 def read_rows(folder: str | os.PathLike[str]) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Return the rows of ``results.csv`` by column, and the course's own columns; an empty cell is None."""
     if not is_course(folder):
-        raise ProgramError(f"{folder}: expected a folder that springmass batch made; name that of its -o", USAGE)
+        raise ProgramError(f"{folder}: expected a folder that springmass batch made; name that of its -o")
     path = os.path.join(folder, CSV)
     try:
         with open_regular_text(path, "utf-8", newline="") as file:

@@ -6,7 +6,7 @@ import hashlib
 import heapq
 import re
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,12 @@ from springmass.course.benches import compare_rows
 from springmass.course.executors import outcomes, workers
 from springmass.course.page import line_of, mark, write_groups, write_page
 from springmass.course.plan import Job, Plan, code_sha256, names_of
-from springmass.course.rows import COURSE, write_rows
+from springmass.course.rows import COURSE, FAILED, write_rows
 from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError, complain, manner
 from springmass.report.html import SHARED, report_script
+from springmass.terminal.progress import TaskProgress
 from storage.atomic import write_whole, writing
 
 GROWTH = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
@@ -28,20 +29,11 @@ Row = dict[str, Any]
 
 
 def run_course(
-    course: Plan,
-    store: Store,
-    folder: Path,
-    *,
-    jobs: int | None,
-    dask: str | None,
-    reports: int,
-    progress: Callable[[Sequence[Row], int, int], None],
-    reported: Callable[[int, int], None],
+    course: Plan, store: Store, folder: Path, *, jobs: int | None, dask: str | None, reports: int
 ) -> tuple[list[Row], int, list[str]]:
     """Analyse the new and changed runs of a course, and write table, page and reports of all runs.
 
-    ``progress`` is called with the rows just made, their number so far and their final number, ``reported`` with the
-    numbers of finished and of all reports. Return all rows, how many were made, and a line for each unwritten report.
+    Runs that fail are reported as they do. Return all rows, how many were made, and a line for each unwritten report.
     """
     made_of = {job.key: job.made_of() for job in course.jobs}
     stored = store.made_of()
@@ -51,18 +43,22 @@ def run_course(
             shutil.rmtree(page.parent)
     done = made_of.keys() - {job.key for job in todo}
     made, written = 0, len(done)
-    for rows in _analysed(todo, jobs, dask):
-        # A run during which a worker died is tried again by the next pass.
-        store.add((job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows)
-        done |= {job.key for job, _ in rows}
-        made += len(rows)
-        if len(done) >= GROWTH * written:
-            write_rows(folder, _table(course, store, done), course.tags)
-            written = len(done)
-        progress([row for _, row in rows], made, len(todo))
+    with TaskProgress("runs", len(todo), lines=True, quiet=manner()[0]) as shown:
+        for rows in _analysed(todo, jobs, dask):
+            # A run during which a worker died is tried again by the next pass.
+            store.add((job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows)
+            done |= {job.key for job, _ in rows}
+            made += len(rows)
+            if len(done) >= GROWTH * written:
+                write_rows(folder, _table(course, store, done), course.tags)
+                written = len(done)
+            for _, row in rows:
+                if row["status"] in FAILED:
+                    complain(row["error"])
+            shown.update(made)
     table = _table(course, store, done)
     write_rows(folder, table, course.tags)
-    return table, made, _write_pages(course, folder, table, reports, jobs, reported)
+    return table, made, _write_pages(course, folder, table, reports, jobs)
 
 
 def _table(course: Plan, store: Store, done: set[str]) -> list[Row]:
@@ -84,18 +80,11 @@ def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterat
             rows = [(job, row or blank_row(job, "ended", f"{job.path}: {_DIED}")) for job, row in done]
             if any(row["code_sha256"] != code_sha256() for _, row in rows):
                 wrong = "a worker has another version of springmass or of its libraries; install the same everywhere"
-                raise ProgramError(f"{dask}: {wrong}", USAGE)
+                raise ProgramError(f"{dask}: {wrong}")
             yield rows
 
 
-def _write_pages(
-    course: Plan,
-    folder: Path,
-    table: Sequence[Row],
-    reports: int,
-    jobs: int | None,
-    reported: Callable[[int, int], None],
-) -> list[str]:
+def _write_pages(course: Plan, folder: Path, table: Sequence[Row], reports: int, jobs: int | None) -> list[str]:
     """Write what to tell the groups, missing reports of the worst runs, and the page; return what cannot be written."""
     write_whole(folder / SHARED, report_script())
     lines = [line_of(row, course.tags) for row in table]
@@ -110,11 +99,12 @@ def _write_pages(
     tasks = [(name, job, page.parent) for name, job, page in named if not page.exists()]
     unwritten: list[str] = []
     finished = 0
-    with workers(len(tasks), jobs) as by:
+    progress = TaskProgress("reports", len(tasks), lines=True, quiet=manner()[0])
+    with workers(len(tasks), jobs) as by, progress as shown:
         for written in outcomes(write_report_of, tasks, by):
             unwritten += [f"{job.path}: {_DIED}" if why is None else why for (_, job, _), why in written if why != ""]
             finished += len(written)
-            reported(finished, len(tasks))
+            shown.update(finished)
     for line in lines:
         line["link"] = line["link"] if (folder / line["link"]).exists() else ""
     write_page(folder, table, lines, course.tags)

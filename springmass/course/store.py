@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from springmass.errors import UNREADABLE, USAGE, ProgramError, tell
+from springmass.errors import UNREADABLE, ProgramError, tell
 from storage.atomic import writing
 from storage.errors import WriteFailed
 
@@ -70,7 +70,7 @@ class Store:
         except sqlite3.Error as error:
             if error.sqlite_errorname == "SQLITE_BUSY":
                 wrong = f"{self._path.parent}: in use by another process; wait for its end"
-                raise ProgramError(wrong, USAGE) from error
+                raise ProgramError(wrong) from error
             if error.sqlite_errorname in ("SQLITE_NOTADB", "SQLITE_CORRUPT", "SQLITE_ERROR"):
                 remedy = "remove it, and batch analyses all runs again"
                 raise ProgramError(f"{self._path}: damaged ({error}); {remedy}", UNREADABLE) from error
@@ -91,7 +91,7 @@ def opened(folder: Path) -> Iterator[Store]:
         except BlockingIOError as error:
             file.seek(0)
             holder = file.read(200).decode("utf-8", "replace") or "another process"
-            raise ProgramError(f"{folder}: in use by {holder}; wait for its end", USAGE) from error
+            raise ProgramError(f"{folder}: in use by {holder}; wait for its end") from error
         except OSError:
             tell(f"{folder}: this disk has no locks; let only one batch at a time write there")
         with writing(path):

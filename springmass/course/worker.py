@@ -22,9 +22,8 @@ from springmass.course.rows import ESTIMATES
 from springmass.errors import internal_error, quietly
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.html import SHARED
-from springmass.runs.analysing import Failed, analyse_all
 from springmass.runs.questions import for_course
-from springmass.runs.run import Run
+from springmass.runs.run import Failed, Run, analyse_all
 from storage.errors import WriteFailed
 
 LARGEST = 1e100

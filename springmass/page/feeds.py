@@ -16,9 +16,9 @@ from springmass.report.recorded import event_words
 from springmass.runs.loading import Loaded
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
-from storage.wire_log.parts import Part
 from storage.wire_log.records import Kind, Record, event_content
 from storage.wire_log.scanning import read_log
+from storage.wire_log.survey import Part
 from storage.wire_log.wire_samples import LogDecoder, chain_of
 
 AT_ONCE = 10_000

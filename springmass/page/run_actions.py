@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from springmass.runs.about import about_of, write_about
+from springmass.runs.scenes import about_of, write_about
 
 ASIDE = "discarded"
 """Folder next to the runs for discarded runs."""

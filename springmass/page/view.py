@@ -12,12 +12,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import Block
+from acquisition.block import Block, ClockKind, SourceInfo
 from acquisition.recordings.recording import Trap
-from acquisition.source import ClockKind, SourceInfo
 from pipeline.track import Track
 from springmass.runs.json_results import plain
-from springmass.runs.tracks import to_track
+from springmass.runs.loading import to_track
 from storage.wire_log.wire_samples import Origin
 
 VERSION = 2  # of the messages

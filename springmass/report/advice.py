@@ -12,6 +12,7 @@ from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.quantity import Unit
 from pipeline.registry.quantities import INPUTS, QUANTITIES
+from springmass.runs.estimates import exponents_of
 from springmass.runs.rows import table_estimates, table_rows
 from springmass.typeset import typeset
 
@@ -99,7 +100,15 @@ def sentence(text: str) -> str:
 Grade = Literal["sound", "uncertain", "do not quote"]
 UNCERTAIN = 0.05  # u over the value from which fewer than two digits are certain
 MEANINGLESS = 0.5  # u over the value from which zero is within two standard uncertainties
-_WITH_AIR = ("reynolds_number", "reynolds_number_start", "keulegan_carpenter_number", "drag_coefficient")
+_PARTS = frozenset({"times", "frequency", "distances", "scene"})
+_NOT_BY_UNIT = {
+    "spring_constant": {"scene"},
+    "reynolds_number": _PARTS,
+    "reynolds_number_start": _PARTS,
+    "keulegan_carpenter_number": {"distances", "scene"},
+    "drag_coefficient": {"distances", "scene"},
+}
+"""What a quantity is computed of beside what its unit shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,15 +126,16 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
     """Return the trust in every quantity of Table 1 by its name; empty if nothing oscillates.
 
     A number is uncertain if it depends on an assumption that a warning names, or if fewer than two of its digits are
-    certain. It is not to be quoted if an error concerns it, if zero is within two standard uncertainties, or if the
-    recording contradicts the law that was stated for it. The worst of these decides; every reason is kept.
+    certain, or common to all amplitudes of which it is the average. It is not to be quoted if an error concerns it, if
+    zero is within two standard uncertainties, or if the recording contradicts the law that was stated for it. The worst
+    of these decides; every reason is kept.
     """
     motion = analysis.motion
     if not isinstance(motion, Oscillation):
         return {}
     found = {}
     for key, x in table_estimates(analysis).items():
-        reasons = [*_assumed(analysis, key.name, x), *_sized(motion, key.name, x)]
+        reasons = [*_assumed(motion, analysis, key.name), *_sized(motion, key.name, x)]
         if motion.damping.best.rejected:
             if QUANTITIES[key.name].by_law and motion.damping.by_statement:
                 reasons.append(Trust("do not quote", "the recording contradicts the stated law"))
@@ -136,21 +146,24 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
     return found
 
 
-def _assumed(analysis: Analysis, name: str, x: Estimate) -> Iterator[Trust]:
-    """Yield the errors and the unchecked assumptions on which a quantity depends."""
+def _assumed(motion: Oscillation, analysis: Analysis, name: str) -> Iterator[Trust]:
+    """Yield the errors, the unchecked assumptions and the averages on which a quantity depends."""
+    parts = _made_of(name)
+    if any(each.name == "angular_frequency" for each in motion.derived.budgets[name].contributions):
+        parts.add("frequency")
     for finding in analysis.findings:
-        harm = harm_of(finding.code, finding.severity)
-        if harm in (Harm.UNUSABLE, Harm.SCALE) and _concerns(kinds()[finding.code].symptom, name, x.unit):
+        harm, concerned = harm_of(finding.code, finding.severity), _PARTS & {*kinds()[finding.code].about}
+        averaged = abs(finding.values.get("relative_shift", 0.0)) > UNCERTAIN
+        if (averaged or harm in (Harm.UNUSABLE, Harm.SCALE)) and (not concerned or concerned & parts):
             yield Trust("do not quote" if harm is Harm.UNUSABLE else "uncertain", finding.code)
 
 
-def _concerns(symptom: str, name: str, unit: str) -> bool:
-    """Return whether a quantity depends on what findings of a symptom are about."""
-    if symptom == "Times":
-        return any(letter in unit for letter in "sz") or unit == "N/m" or name in _WITH_AIR[:2]
-    if symptom == "Distances":
-        return isinstance(QUANTITIES[name].unit, Unit) or unit.startswith("m") or name in _WITH_AIR
-    return symptom in ("Motion", "Recording") or (symptom == "Scene" and name in ("spring_constant", *_WITH_AIR))
+def _made_of(name: str) -> set[str]:
+    """Return what a quantity is computed of: times, distances, the scene."""
+    unit = QUANTITIES[name].unit
+    powers = (0.0, 1.0, unit.second) if isinstance(unit, Unit) else exponents_of(unit) or ()
+    parts = {part for part, power in zip(("masses", "distances", "times"), powers, strict=False) if power}
+    return {*parts, *_NOT_BY_UNIT.get(name, ())}
 
 
 def _sized(motion: Oscillation, name: str, x: Estimate) -> Iterator[Trust]:

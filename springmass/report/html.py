@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from acquisition.errors import visible
 from pipeline.analyse import Oscillation
 from pipeline.numerics.estimate import Estimate
-from pipeline.registry.effects import EFFECTS
-from pipeline.registry.quantities import INPUTS
+from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
 from springmass.charts.chart import Chart, to_json
 from springmass.layout import static_file
@@ -22,9 +21,9 @@ from springmass.report.budgets import budgets_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
 from springmass.runs.comparing import Compared, beside
-from springmass.runs.laws import laws_across, laws_of
 from springmass.runs.rows import table_rows
 from springmass.runs.run import Run
+from springmass.runs.showing import laws_across, laws_of
 from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset
 
 if TYPE_CHECKING:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
-from acquisition.source import SourceInfo
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory, effective_mass_kg
 from pipeline.dynamics.band import LEVELS, Band
@@ -49,8 +48,7 @@ def write_folder(
     from springmass.charts.draw import save
     from springmass.report.html import Figures, drawn_by_script, template
     from springmass.runs.simulating import charts as charted
-    from storage.atomic import write_whole
-    from storage.folder import whole_folder
+    from storage.atomic import whole_folder, write_whole
 
     name = Path(where).name.removesuffix(".toml").removesuffix(".scene")
     target = make_folder(out) / in_a_name(name, ".simulated")

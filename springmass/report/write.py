@@ -24,8 +24,7 @@ from springmass.runs.frames import smoothed_or_why
 from springmass.runs.json_results import plain
 from springmass.runs.rows import results_csv
 from springmass.runs.run import Run
-from storage.atomic import write_whole
-from storage.folder import whole_folder
+from storage.atomic import whole_folder, write_whole
 
 PAGE = "report.html"
 LAB_REPORT = "lab-report.tex"

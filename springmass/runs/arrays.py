@@ -10,16 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.recordings import units
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.headings import heading_of, is_time
-from acquisition.source import SourceInfo
 from pipeline.errors import TrackError
 from pipeline.track import F8, Track
-from springmass.runs.loading import Loaded, kind_of, load
+from springmass.runs.inputs import kind_of
+from springmass.runs.loading import Loaded, load, to_track
 from springmass.runs.options import ReadOptions
-from springmass.runs.tracks import to_track
 
 EXPECTED = "a path, a run, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
 ABOUT = "springmass"

@@ -17,12 +17,12 @@ from pipeline.registry.found import Found
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.derive import limited
 from pipeline.results.masses import Hooke, MassLine, mass_line
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.runs.frames import comparison_frame
-from springmass.runs.hooke import read_hooke
 from springmass.runs.json_results import SCHEMA, parameters_json, picked, plain
 from springmass.runs.reported import Reported, judge, read_reported
 from springmass.runs.run import Run
+from springmass.runs.tables import read_hooke
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,16 +78,14 @@ def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
     if missing:
         raise ProgramError(
             f"compare needs the mass of every run's bob; no [bob] mass_kg for {', '.join(missing)}: "
-            "give --scene FILE, one for all runs or one for each in their order",
-            USAGE,
+            "give --scene FILE, one for all runs or one for each in their order"
         )
     first, *others = scenes
     for name, scene in others:
         if scene.spring_mass_kg != first[1].spring_mass_kg:
             raise ProgramError(
                 f"compare takes runs of one spring; [spring] mass_kg is {first[1].spring_mass_kg or 'not given'} for "
-                f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}: state the same in both scenes",
-                USAGE,
+                f"{first[0]} and {scene.spring_mass_kg or 'not given'} for {name}: state the same in both scenes"
             )
 
 
@@ -110,9 +108,7 @@ def compare_runs(
         for (name, motion), run in zip(motions, runs, strict=True)
     ]
     comparison = compare_springs(
-        springs,
-        spring_mass_kg=runs[0].scene.spring_mass_kg,
-        mass_correlation=mass_correlation,
+        springs, spring_mass_kg=runs[0].scene.spring_mass_kg, mass_correlation=mass_correlation
     )
     joint = tuple(
         join([(name, m.damping, float(m.demodulated.t[-1]) - m.damping.t0) for name, m in group])
@@ -150,7 +146,7 @@ def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[s
     derived = [_moving(run).derived for run in runs]
     each = zip(found.names, derived, found.each, found.own_u, found.pulls, strict=True)
     numbers = ("chi2", "dof", "largest_deviation", "exchanged", "exchanged_chi2", "message")
-    content = {
+    content: dict[str, Any] = {
         "schema": SCHEMA,
         "comparison": {
             "agree": found.agree,
@@ -178,20 +174,14 @@ def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[s
             for joint in compared.joint
         ],
         "findings": compared.findings,
-        **(
-            {"mass_line": picked(compared.line, ("constant", "effective_mass", "chi2", "dof"))}
-            if compared.line is not None
-            else {}
-        ),
-        **(
-            {"hooke": {"constant": compared.hooke.constant, "normalised_error": compared.normalised_error}}
-            if compared.hooke
-            else {}
-        ),
-        **({"reported": compared.reported} if compared.reported else {}),
-        "runs": [run.result for run in runs],
-        "provenance": provenance,
     }
+    if compared.line is not None:
+        content["mass_line"] = picked(compared.line, ("constant", "effective_mass", "chi2", "dof"))
+    if compared.hooke is not None:
+        content["hooke"] = {"constant": compared.hooke.constant, "normalised_error": compared.normalised_error}
+    if compared.reported:
+        content["reported"] = compared.reported
+    content |= {"runs": [run.result for run in runs], "provenance": provenance}
     return {key: plain(value) for key, value in content.items()}
 
 
@@ -225,5 +215,5 @@ def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Fin
 
 def _law(fit: JointFit) -> dict[str, Any]:
     keys = ("reduced_chi2", "dof", "bic", "excess_chi2", "excess_dof", "rejection")
-    coefficients = {name: limited(fit.law, name, x) for name, x in fit.coefficients.estimates().items()}
+    coefficients = {name: limited(fit.law, name, x) for name, x in fit.coefficients.items()}
     return {"parameters": parameters_json(coefficients), **picked(fit, keys)}

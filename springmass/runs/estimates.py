@@ -31,7 +31,7 @@ _WRITTEN = (
 Exponents = tuple[float, ...]
 
 
-def _exponents(unit: str) -> Exponents | None:
+def exponents_of(unit: str) -> Exponents | None:
     """Return the exponents of a unit such as ``1/(m s)``; None for one that is not made of known ones."""
     above, _, below = unit.partition("/")
     total = [0.0] * 5
@@ -47,7 +47,7 @@ def _exponents(unit: str) -> Exponents | None:
     return tuple(total)
 
 
-_NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := _exponents(unit)) is not None}
+_NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := exponents_of(unit)) is not None}
 _NAMES[(0.0,) * 5] = ""
 
 
@@ -144,50 +144,36 @@ def _unit_of(other: Any) -> str | None:
     return getattr(other, "unit", "")
 
 
-def _product(sign: int) -> Callable[[Any, Any], str | None]:
-    def unit(left: Any, right: Any) -> str | None:
-        units = [None if one is None else _exponents(one) for one in (_unit_of(left), _unit_of(right))]
-        if units[0] is None or units[1] is None:
-            return None
-        return _NAMES.get(tuple(a + sign * b for a, b in zip(units[0], units[1], strict=True)))
-
-    return unit
-
-
-def _power(left: Any, right: Any) -> str | None:
-    exponents = None if (unit := _unit_of(left)) is None else _exponents(unit)
-    if exponents is None or isinstance(right, UFloat):
-        return "" if unit == "" and _unit_of(right) == "" else None
-    return _NAMES.get(tuple(one * float(right) for one in exponents))
-
-
-def _dimensionless(_: Any) -> str:
-    return ""
+def _unit(name: str, left: Any, right: Any) -> str | None:
+    """Return the unit of a sum, a product or a power; None if it is none of those that results have."""
+    units = _unit_of(left), _unit_of(right)
+    if name in ("add", "sub"):
+        return units[0] if units[0] == units[1] else None
+    if name == "pow" and isinstance(right, UFloat):
+        return "" if units == ("", "") else None
+    one, other = (None if unit is None else exponents_of(unit) for unit in units)
+    if one is None or other is None:
+        return None
+    if name == "pow":
+        return _NAMES.get(tuple(power * float(right) for power in one))
+    sign = 1 if name == "mul" else -1
+    return _NAMES.get(tuple(a + sign * b for a, b in zip(one, other, strict=True)))
 
 
-def _same(left: Any, right: Any) -> str | None:
-    return _unit_of(left) if _unit_of(left) == _unit_of(right) else None
-
-
-_UNITS: dict[str, Callable[[Any, Any], str | None]] = {
-    "add": _same, "sub": _same, "mul": _product(1), "truediv": _product(-1), "pow": _power,
-}  # fmt: skip
-
-
-def _operator(name: str, of_units: Callable[[Any, Any], str | None], reflected: bool) -> Callable[[Any, Any], Any]:
+def _operator(name: str, reflected: bool) -> Callable[[Any, Any], Any]:
     method = getattr(UFloat, f"__{'r' * reflected}{name}__")
 
     def operate(self: Value, other: Any) -> Any:
         found = method(self, other)
         left, right = (other, self) if reflected else (self, other)
-        return Value(found, of_units(left, right)) if isinstance(found, UFloat) else found
+        return Value(found, _unit(name, left, right)) if isinstance(found, UFloat) else found
 
     return operate
 
 
-for _name, _of_units in _UNITS.items():
+for _name in ("add", "sub", "mul", "truediv", "pow"):
     for _reflected in (False, True):
-        setattr(Value, f"__{'r' * _reflected}{_name}__", _operator(_name, _of_units, _reflected))
+        setattr(Value, f"__{'r' * _reflected}{_name}__", _operator(_name, _reflected))
 
 
 def _unary(function: Callable[[Any], Any], unit: Callable[[Any], str | None]) -> Callable[[Value], Any]:
@@ -199,9 +185,9 @@ def _unary(function: Callable[[Any], Any], unit: Callable[[Any], str | None]) ->
 
 for _name in ("__neg__", "__pos__"):
     setattr(Value, _name, _unary(getattr(UFloat, _name), _unit_of))
-Value.sqrt = _unary(umath.sqrt, lambda x: _power(x, 0.5))
+Value.sqrt = _unary(umath.sqrt, lambda x: _unit("pow", x, 0.5))
 # numpy calls the method of this name of an object; the result is a number without unit.
 _OTHERWISE_IN_UMATH = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 _SAME = ["exp", "expm1", "log", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "degrees", "radians"]
 for _name in (*_SAME, *_OTHERWISE_IN_UMATH):
-    setattr(Value, _name, _unary(getattr(umath, _OTHERWISE_IN_UMATH.get(_name, _name)), _dimensionless))
+    setattr(Value, _name, _unary(getattr(umath, _OTHERWISE_IN_UMATH.get(_name, _name)), lambda _: ""))

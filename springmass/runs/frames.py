@@ -14,12 +14,12 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import Unit
-from pipeline.results.budget import Budget
 from pipeline.results.compare import Comparison
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import Quality
 from springmass.runs.arrays import ABOUT, about_json
 from springmass.runs.estimates import Value
+from springmass.runs.json_results import picked
 from springmass.runs.loading import Loaded
 
 if TYPE_CHECKING:
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from springmass.runs.run import Run
+
+
+EXPANDED = ("dof", "coverage_factor", "expanded")
 
 
 def estimates_frame(run: Run, *, correlations: bool = False) -> pd.DataFrame:
@@ -41,20 +44,15 @@ def estimates_frame(run: Run, *, correlations: bool = False) -> pd.DataFrame:
         row = by_name.get(name)
         words = {"quantity": row.quantity, "symbol": row.symbol} if row else {"quantity": name.replace("_", " ")}
         budget = None if derived is None else derived.budgets.get(name)
-        rows.append({"symbol": "", **words, "value": x.value, "u": x.u, "unit": x.unit, **_expanded(budget)})
-    columns = ["quantity", "symbol", "value", "u", "unit", "dof", "coverage_factor", "expanded"]
+        expanded = {} if budget is None else picked(budget, EXPANDED)
+        rows.append({"symbol": "", **words, "value": x.value, "u": x.u, "unit": x.unit, **expanded})
+    columns = ["quantity", "symbol", "value", "u", "unit", *EXPANDED]
     frame = pd.DataFrame(rows, index=pd.Index(list(run), name="name"), columns=columns)
     if correlations and derived is not None:
         names, matrix = derived.joint.names, derived.joint.correlation
         beside = pd.DataFrame(matrix, index=names, columns=[f"r({name})" for name in names])
         frame = frame.join(beside[[f"r({name})" for name in frame.index]])
     return frame
-
-
-def _expanded(budget: Budget | None) -> dict[str, float]:
-    if budget is None:
-        return {"dof": math.nan, "coverage_factor": math.nan, "expanded": math.nan}
-    return {"dof": budget.dof, "coverage_factor": budget.coverage_factor, "expanded": budget.expanded}
 
 
 def comparison_frame(found: Comparison, periods: Mapping[str, Value]) -> pd.DataFrame:
@@ -67,8 +65,7 @@ def comparison_frame(found: Comparison, periods: Mapping[str, Value]) -> pd.Data
         for name, k, own, pull in zip(found.names, found.each, found.own_u, found.pulls, strict=True)
     ]
     mean = found.spring_constant if found.agree else Estimate(math.nan, math.nan, "N/m")
-    none = {"period": math.nan, "u_period": math.nan, "u_own": math.nan, "pull": math.nan}
-    rows.append(none | {"spring_constant": mean.value, "u": mean.u, "agree": found.agree})
+    rows.append({"spring_constant": mean.value, "u": mean.u, "agree": found.agree})  # the others are NaN
     columns = ["period", "u_period", "spring_constant", "u", "u_own", "pull", "agree"]
     return pd.DataFrame(rows, index=pd.Index([*found.names, "together"], name="run"), columns=columns)
 

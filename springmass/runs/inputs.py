@@ -1,34 +1,26 @@
-"""Find the files that an input names: the file itself, or the recordings in a folder."""
+"""Find the files that an input names: the file itself, or the recordings in a folder; tell what a file is."""
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.recordings.identify import sniff
+from acquisition.regular_file import open_regular
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.runs.loading import kind_of
+from storage.run_file.layout import MAGIC
+from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
 NAMED = 5  # maximum number of files that a message names
-_LATER_LOG = re.compile(r"\.\d{3,}\.wire$")
 
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
-    """One file to analyse.
-
-    Parameters
-    ----------
-    path : str
-    velocity : str or None
-        The velocity file next to it in its folder.
-    of : int
-        Index of the input that named the file.
-    """
+    """One file to analyse, the velocity file next to it, and the index of the input that named it."""
 
     path: str
     velocity: str | None = None
@@ -41,8 +33,7 @@ def files_of(
     """Return the files that the inputs name, and messages about the files in folders that are not recordings.
 
     ``known`` absolute paths count as recordings without being opened; ``but`` are files and subfolders to leave out.
-    In a folder, ``X_velocity.txt`` belongs to ``X_position.txt``, and a log belongs to the run file or the first log of
-    the same name.
+    In a folder, ``X_velocity.txt`` belongs to ``X_position.txt``, and a log belongs to the run file of the same name.
     """
     found: list[InputFile] = []
     messages: list[str] = []
@@ -97,18 +88,15 @@ def _in_folder(
         raise ProgramError(f"{folder}: cannot read the folder ({error.strerror}); name another", UNREADABLE) from error
     names = {path.name for path in files}
     pairs = {path.name: name for path in files if (name := _velocity_of(path)) in names}
-    parts = set(_parts(files)) | set(pairs.values())
+    made = {path.name for path in files if path.suffix == ".wire" and f"{path.stem}.h5" in names}
+    parts = made.union(pairs.values())
     taken = [
-        path
-        for path in files
-        if path.name not in parts and ((known and os.path.abspath(path) in known) or _is_recording(path))
+        path for path in files if path.name not in parts and (os.path.abspath(path) in known or is_recording(path))
     ]
     kept = {path.name for path in taken} | parts
+    paired = [(path, folder / pairs[path.name] if path.name in pairs else None) for path in taken]
     return (
-        [
-            InputFile(str(path), str(folder / pairs[path.name]) if path.name in pairs else None, number)
-            for path in taken
-        ],
+        [InputFile(str(path), None if velocity is None else str(velocity), number) for path, velocity in paired],
         [path.name for path in files if path.name not in kept],
     )
 
@@ -118,17 +106,19 @@ def _velocity_of(path: Path) -> str | None:
     return None if stem == path.stem else f"{stem}_velocity{path.suffix}"
 
 
-def _parts(files: Sequence[Path]) -> Iterator[str]:
-    """Yield the names of logs from which a run file was made, and of logs that continue a long log."""
-    names = {path.name for path in files}
-    for path in files:
-        later = _LATER_LOG.search(path.name)
-        first = f"{path.name[: later.start()]}.wire" if later else ""
-        if first in names or (path.suffix == ".wire" and f"{path.stem}.h5" in names):
-            yield path.name
+def kind_of(path: str | os.PathLike[str]) -> Literal["run", "wire", "recording"]:
+    """Return whether a file is a run file, a wire log or a recording, by its first bytes."""
+    try:
+        with open_regular(path) as file:
+            head = file.read(len(MAGIC))
+    except (OSError, ValueError):
+        return "recording"  # the format registry reports the problem
+    if head == MAGIC:
+        return "run"
+    return "wire" if head.startswith(WIRE_MAGIC) else "recording"
 
 
-def _is_recording(path: Path) -> bool:
+def is_recording(path: Path) -> bool:
     """Return whether a file is a run file, a log, or recognised by a family.
 
     A file that cannot be opened counts as a recording; the error is reported when it is read.
@@ -137,8 +127,6 @@ def _is_recording(path: Path) -> bool:
         return True
     try:
         sniff(path)
-        return True
-    except UnknownFormat:
-        return False
-    except AcquisitionError:
-        return True
+    except AcquisitionError as error:
+        return not isinstance(error, UnknownFormat)
+    return True

@@ -17,7 +17,6 @@ from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.registry.found import Found
 from pipeline.results.budget import Contribution
 from pipeline.results.classic import Classic
-from pipeline.results.derive import Derived
 from springmass import __version__
 from springmass.runs.loading import Loaded
 
@@ -48,7 +47,7 @@ def result_of(
         "schema": SCHEMA,
         "input": input_of(loaded),
         "recorded": _recorded(loaded),
-        "quality": _quality(loaded, analysis),
+        "quality": {**analysis.quality, "malformed_rows": loaded.malformed_rows},
         "estimates": estimates,
         "budget": _budgets(analysis) if classic is None else {},
         "correlations": _correlations(analysis, wanted=classic is None),
@@ -113,19 +112,13 @@ def _sentence(clause: str) -> str:
     return (clause[0].upper() + clause[1:] if first.isalpha() else clause) + end
 
 
-def _quality(loaded: Loaded, analysis: Analysis) -> dict[str, int]:
-    quality = analysis.quality
-    used = quality.pop("used")
-    return {**quality, "malformed_rows": loaded.malformed_rows, "used": used}
-
-
 def _budgets(analysis: Analysis) -> dict[str, Any]:
     if not isinstance(analysis.motion, Oscillation):
         return {}
     return {
         name: {
             **plain(budget.estimate),
-            **plain({"dof": budget.dof, "coverage_factor": budget.coverage_factor, "expanded": budget.expanded}),
+            **plain(picked(budget, ("dof", "coverage_factor", "expanded"))),
             "inputs": [_contribution(c) for c in budget.contributions],
         }
         for name, budget in analysis.motion.derived.budgets.items()
@@ -147,18 +140,10 @@ def _correlations(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
 
 def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
     if not wanted or not isinstance(analysis.motion, Oscillation):
-        return {
-            "selected": None,
-            "admissible": [],
-            "stated": None,
-            "law": None,
-            "weights": {},
-            "of_law": [],
-            "coefficients": {},
-            "laws": {},
-        }
+        nothing: dict[str, Any] = {"selected": None, "admissible": [], "stated": None, "law": None}
+        return nothing | {"weights": {}, "of_law": [], "coefficients": {}, "laws": {}}
     damping, derived = analysis.motion.damping, analysis.motion.derived
-    keys = ("reduced_chi2", "dof", "bic", "rejected")
+    keys, coefficients = ("reduced_chi2", "dof", "bic", "rejected"), parameters_json(derived.coefficients)
     laws = {
         name: {"parameters": parameters_json(derived.parameters_of(fit)), **picked(fit, keys)}
         for name, fit in damping.fits.items()
@@ -169,14 +154,9 @@ def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
         "law": derived.law or None,
         "weights": {one.fit.name: one.weight for one in derived.laws},
         "of_law": sorted(derived.of_law),
-        "coefficients": _coefficients(derived),
+        "coefficients": {name: {**x, "law": derived.law_of_coefficients} for name, x in coefficients.items()},
         "laws": laws,
     }
-
-
-def _coefficients(derived: Derived) -> dict[str, Any]:
-    law = derived.law_of_coefficients
-    return {name: {**x, "law": law} for name, x in parameters_json(derived.coefficients).items()}
 
 
 def parameters_json(estimates: Mapping[str, Estimate]) -> dict[str, dict[str, Any]]:

@@ -4,35 +4,34 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import shutil
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
+from acquisition.decoders.family import RESONATOR_PPM
 from acquisition.errors import NeedsAnswer
+from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
+from acquisition.live.clock_fit import fit_clock
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
-from acquisition.source import SourceInfo
 from pipeline.track import Track
-from springmass.errors import UNREADABLE, USAGE, ProgramError, complain, detail, tell
+from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
 from springmass.layout import STDIN, part
-from springmass.runs.about import about_of
+from springmass.runs.inputs import kind_of
 from springmass.runs.options import READ, ReadOptions
-from springmass.runs.tracks import to_track
+from springmass.runs.scenes import about_of
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
-from storage.run_file.layout import MAGIC
 from storage.run_file.reading import CHECKED, open_run
-from storage.wire_log.records import MAGIC as WIRE_MAGIC
 
 UNVERIFIED = "unverified"
 NAMED = 5  # maximum number of differences that a message names
@@ -148,23 +147,11 @@ def sample_data() -> Path:
     raise ProgramError(f"{folder}: the bundled recordings are missing; install springmass again", UNREADABLE)
 
 
-def kind_of(path: str | os.PathLike[str]) -> Literal["run", "wire", "recording"]:
-    """Return whether a file is a run file, a wire log or a recording, by its first bytes."""
-    try:
-        with open_regular(path) as file:
-            head = file.read(len(MAGIC))
-    except (OSError, ValueError):
-        return "recording"  # the format registry reports the problem
-    if head == MAGIC:
-        return "run"
-    return "wire" if head.startswith(WIRE_MAGIC) else "recording"
-
-
 def _refuse(path: Path, what: str, options: ReadOptions, allowed: Sequence[str]) -> None:
     """Refuse options that describe a file which already states everything itself."""
     given = [name for name in options.given() if name in _OF_FILES and name not in allowed]
     if given:
-        raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out", USAGE)
+        raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out")
 
 
 def _from_recording(path: Path, recording: Recording) -> Loaded:
@@ -204,15 +191,15 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
             path,
             "run",
             run.info,
-            run.channel,
-            run.title,
+            run.header.channel,
+            run.header.title,
             samples,
-            to_track(samples, run.info, recorded_format=run.format, provenance=run.provenance),
+            to_track(samples, run.info, recorded_format=run.header.format, provenance=run.provenance),
             traps,
-            run.malformed_rows,
-            run.scene,
+            run.header.malformed_rows,
+            run.header.scene,
             run.provenance,
-            run.format,
+            run.header.format,
             sha256,
             kept=None,
         )
@@ -268,7 +255,7 @@ def cut(track: Track, from_s: float | None, to_s: float | None, *, where: object
     if not len(part) and (from_s, to_s) != (None, None):
         times = track.t[np.isfinite(track.t)]
         span = f"spans {times.min():g} to {times.max():g} s" if times.size else "holds no sample"
-        raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s; the record {span}", USAGE)
+        raise ProgramError(f"{where}: no sample lies between {low:g} and {high:g} s; the record {span}")
     return part
 
 
@@ -279,3 +266,72 @@ def between(track: Track, low_s: float, high_s: float) -> Track:
     keep = (track.t >= low_s) & (track.t <= high_s)
     velocity = None if track.velocity is None else track.velocity[keep]
     return replace(track, t=track.t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)
+
+
+MOTION_SENSOR = "motion-sensor"  # family that assumes a fixed speed of sound
+LINE_PROTOCOL = "line-protocol"  # family that sends echo times
+COMPARED = {"rate_error_ppm", "u_rate_error_ppm", "span_s", "held_readings", "longest_stall_s"}  # of two clocks
+
+
+def to_track(
+    samples: Block, info: SourceInfo, *, recorded_format: str = "", provenance: Mapping[str, Any] | None = None
+) -> Track:
+    """Return samples as a track for the pipeline.
+
+    The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
+    """
+    stated = provenance or {}
+    moments = [event["t_s"] for event in stated.get("events", ()) if event.get("kind") == "trigger"]
+    return Track(
+        t=samples.t,
+        y=samples.distance,
+        flags=samples.flags,
+        rate_hz=info.rate_hz,
+        sigma_m=info.sigma_m,
+        quantum_m=info.quantum_m,
+        stated_error_m=info.stated_error_m,
+        clock=info.clock,
+        kind=info.kind,
+        velocity=samples.velocity,
+        quantity=samples.quantity,
+        unit=samples.unit,
+        trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
+        **_clock_comparison(samples, info, stated),
+        **_scale(recorded_format, stated.get("sensor") or {}),
+    )
+
+
+def _clock_comparison(samples: Block, info: SourceInfo, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the device clock's rate relative to the host's, if both timestamps exist, and its largest rate error."""
+    noted = provenance.get("decoding", {}).get("clock", {})
+    if info.clock != "device":
+        return {}
+    if noted.keys() >= COMPARED:
+        comparison = noted  # by the pings, whose times are in no sample; files of earlier versions may lack it
+    elif samples.host_ns is not None and (samples.host_ns >= 0).all():
+        comparison = fit_clock(samples.t, samples.host_ns).to_mapping()
+    else:
+        return {}
+    clock = {
+        "clock_limit": 1e-6 * noted.get("limit_ppm", RESONATOR_PPM),
+        "held_samples": comparison["held_readings"],
+        "longest_stall_s": comparison["longest_stall_s"],
+    }
+    if comparison["rate_error_ppm"] is None or comparison["u_rate_error_ppm"] is None:
+        return clock
+    rate, u_rate = comparison["rate_error_ppm"] * 1e-6, comparison["u_rate_error_ppm"] * 1e-6
+    return {**clock, "rate_error": rate, "u_rate_error": u_rate, "compared_s": comparison["span_s"]}
+
+
+def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
+    """Return how distances were calculated: the speed of sound, if it is known, and the calibration's uncertainties."""
+    if recorded_format == MOTION_SENSOR:
+        return {"speed_of_sound_m_per_s": SPEED_OF_SOUND_M_PER_S}
+    if not sensor:
+        return {}
+    calibration = Calibration.from_mapping(sensor.get("calibration", {}))
+    known = {"sonic": True, "u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
+    # Families that send distances instead of echo times have applied an unknown speed of sound.
+    if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
+        known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
+    return known

@@ -12,8 +12,9 @@ from cyclopts import Group, Parameter
 
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
-from pipeline.options import ANY_LAW, Options, options_for
-from springmass.values import Finite, LawName, PartsPerMillion, Positive
+from pipeline.options import Options, options_for
+from pipeline.registry.laws import ANY_LAW
+from springmass.parameters import Finite, LawName, PartsPerMillion, Positive, flag, option
 
 HOW_READ = Group("How the recording is read", sort_key=2)
 
@@ -21,58 +22,30 @@ HOW_READ = Group("How the recording is read", sort_key=2)
 @Parameter(name="*", group=HOW_READ)
 @dataclass(frozen=True, kw_only=True)
 class ReadOptions:
-    """What the user states about a recording beyond its name.
+    """What the user states about a recording beyond its name: what the file leaves out or open, and the part to use."""
 
-    Parameters
-    ----------
-    velocity : path or None
-        The velocity file that belongs to a position file; the two are joined by time.
-    channel, rate_hz, unit, run, time, time_unit : optional
-        What the file leaves out or leaves open. Of a wire log of several sensors ``channel`` names one, by its number
-        or its port.
-    delimiter, decimal : str or None
-        Separator of the cells and decimal mark of a text, which are found out unless they are stated.
-    from_s, to_s : float or None
-        Use samples of these seconds only; the others stay in the file.
-    unverified : bool
-        Whether a run file with a checksum mismatch is read. What differs is written to stderr, and a trap of the code
-        "unverified" goes into everything that is made of the run.
-    clock_ppm : float or None
-        Largest rate error of the sensor's clock, ppm; None: what the run file or the sensor's family states.
-    """
-
-    velocity: Annotated[
-        str | Path | None, Parameter(metavar="FILE", help="velocity file that belongs to the position file")
-    ] = None
+    velocity: Annotated[str | Path | None, option("FILE", "velocity file that belongs to the position file")] = None
     channel: Annotated[
-        str | None, Parameter(metavar="NAME", help="channel to use if there are several; for a wire log, the sensor")
+        str | None, option("NAME", "channel to use if there are several; for a wire log, the sensor")
     ] = None
-    run: Annotated[str | None, Parameter(metavar="NAME", help="run to use if there are several: name or number")] = None
-    rate_hz: Annotated[
-        Positive | None, Parameter(metavar="R", help="samples per second if the file does not state them")
-    ] = None
-    unit: Annotated[
-        str | None, Parameter(metavar="U", help="unit of the channel if the file does not state it: m, cm, rad, V ...")
-    ] = None
-    time: Annotated[
-        str | None, Parameter(metavar="NAME", help="column with the times if the file does not state it")
-    ] = None
-    time_unit: Annotated[
-        str | None, Parameter(metavar="U", help="unit of the times if the file does not state it: s, ms, us, min, h, d")
-    ] = None
-    delimiter: Annotated[
-        str | None,
-        Parameter(metavar="C", help="separator of a text's cells, else found out: comma, tab, space, ';' ..."),
-    ] = None
-    decimal: Annotated[str | None, Parameter(metavar="C", help="decimal mark of a text, else found out: . or ,")] = None
-    unverified: Annotated[bool, Parameter(help="read a run file despite a checksum mismatch")] = False
-    from_s: Annotated[Finite | None, Parameter(name="--from", metavar="S", help="use samples from this time on, s")] = (
+    run: Annotated[str | None, option("NAME", "run to use if there are several: name or number")] = None
+    rate_hz: Annotated[Positive | None, option("R", "samples per second if the file does not state them")] = None
+    unit: Annotated[str | None, option("U", "unit of the channel if the file does not state it: m, cm, rad, V ...")] = (
         None
     )
-    to_s: Annotated[Finite | None, Parameter(name="--to", metavar="S", help="use samples up to this time, s")] = None
+    time: Annotated[str | None, option("NAME", "column with the times if the file does not state it")] = None
+    time_unit: Annotated[
+        str | None, option("U", "unit of the times if the file does not state it: s, ms, us, min, h, d")
+    ] = None
+    delimiter: Annotated[
+        str | None, option("C", "separator of a text's cells, else found out: comma, tab, space, ';' ...")
+    ] = None
+    decimal: Annotated[str | None, option("C", "decimal mark of a text, else found out: . or ,")] = None
+    unverified: Annotated[bool, flag("read a run file despite a checksum mismatch")] = False
+    from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
+    to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
     clock_ppm: Annotated[
-        PartsPerMillion | None,
-        Parameter(metavar="PPM", help="largest rate error of the sensor's clock (default: that of its family)"),
+        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
     ] = None
 
     def given(self) -> dict[str, Any]:
@@ -92,7 +65,7 @@ READ = ReadOptions()
 """No option given: only the file's own statements are used."""
 
 Accuracy = Literal["fast", "standard", "best"]
-_OPTIONS = Group("Options", sort_key=1)
+_OPTIONS = Parameter(group=Group("Options", sort_key=1))
 
 
 @Parameter(name="*", group=HOW_READ)
@@ -105,17 +78,9 @@ class How(ReadOptions):
     """
 
     accuracy: Annotated[
-        Accuracy,
-        Parameter(metavar="TIER", group=_OPTIONS, help="how much time to spend on accuracy (default: standard)"),
+        Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)"), _OPTIONS
     ] = "standard"
-    law: Annotated[
-        LawName | None,
-        Parameter(
-            metavar="NAME",
-            group=_OPTIONS,
-            help="damping law, if known: linear, quadratic ...; any: choose from the data",
-        ),
-    ] = None
+    law: Annotated[LawName, _OPTIONS] = None
     laws: Annotated[Sequence[str | Law | EllipsisType] | None, Parameter(parse=False)] = None
     method: Annotated[Literal["classic"] | None, Parameter(parse=False)] = None
 

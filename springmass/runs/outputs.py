@@ -4,31 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from acquisition.block import Block
 from springmass import __version__
-from springmass.errors import USAGE, ProgramError
-from springmass.layout import STDIN
+from springmass.errors import ProgramError
 from springmass.runs.loading import Loaded
 from storage.run_file.writing import write_run
-
-if TYPE_CHECKING:
-    from springmass.runs.run import Run
 
 LONGEST_NAME = 255
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:
-    """Return a name for each input: its file name without the suffix, with repeated names numbered.
-
-    >>> distinct_names(["a/bob.txt", "b/bob.txt", "disc.h5"])
-    ['bob', 'bob-2', 'disc']
-    """
+    """Return a name for each input: its file name without the suffix, with repeated names numbered."""
     return numbered([Path(path).stem for path in paths])
 
 
@@ -46,34 +37,12 @@ def numbered(stems: Sequence[str]) -> list[str]:
 
 
 def in_a_name(name: str, suffix: str) -> str:
-    """Return a name with a suffix added, with the name cut if both exceed the 255 bytes that a file name may have.
-
-    >>> in_a_name("bob", ".results")
-    'bob.results'
-    >>> len(in_a_name("b" * 255, ".results"))
-    255
-    """
+    """Return a name with a suffix added, with the name cut if both exceed the 255 bytes that a file name may have."""
     whole = os.fsencode(name)
     if len(whole) + len(suffix) <= LONGEST_NAME:
         return name + suffix
     digest = hashlib.sha256(whole).hexdigest()[:8]  # keeps names distinct that are identical up to the cut
     return f"{whole[: LONGEST_NAME - len(suffix) - 9].decode(errors='ignore')}-{digest}{suffix}"
-
-
-def results_name(run: Run) -> str:
-    """Return the name of the folder for a run's report.
-
-    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the channel that was chosen
-    follows, because each has its own results.
-    """
-    path, channel = run.loaded.path, run.how.channel
-    name = "stdin" if str(path) == STDIN else path.stem if run.loaded.format in ("run", "wire") else path.name
-    return in_a_name(f"{name}.{safe_name(channel)}" if channel else name, ".results")
-
-
-def safe_name(text: str) -> str:
-    """Return a text of foreign origin as a part of a file's name."""
-    return re.sub(r"[^A-Za-z0-9.+-]+", "_", text).strip("._")[:60]
 
 
 def make_folder(path: str | Path) -> Path:
@@ -83,7 +52,7 @@ def make_folder(path: str | Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ProgramError(
-            f"{folder}: cannot make the folder for results ({error.strerror}); name another with -o", USAGE
+            f"{folder}: cannot make the folder for results ({error.strerror}); name another with -o"
         ) from error
     return folder
 

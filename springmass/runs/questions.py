@@ -25,12 +25,8 @@ def quoted(word: str) -> str:
     return shlex.quote(word) if re.search(r'["$`\\!]', word) else f'"{word}"'
 
 
-def as_options(answers: Mapping[str, object]) -> str:
-    """Return keyword arguments of :func:`springmass.load` as command-line options.
-
-    >>> as_options({"channel": "column 2", "rate_hz": 50.0, "unverified": False, "unit": None})
-    '--channel "column 2" --rate-hz 50'
-    """
+def option_words(answers: Mapping[str, object]) -> list[str]:
+    """Return keyword arguments of :func:`springmass.load` as the words of a command line."""
     words = []
     for name, value in answers.items():
         if value is True:
@@ -38,33 +34,28 @@ def as_options(answers: Mapping[str, object]) -> str:
         elif _is_given(value):
             text = f"{value:.15g}" if isinstance(value, float) else str(value)
             # A value may begin with a minus sign only if it is joined to its option by an equals sign.
-            words.append(f"{option_of(name)}{'=' if text.startswith('-') else ' '}{quoted(text)}")
-    return " ".join(words)
+            words += [f"{option_of(name)}={text}"] if text.startswith("-") else [option_of(name), text]
+    return words
+
+
+def as_options(answers: Mapping[str, object]) -> str:
+    """Return keyword arguments of :func:`springmass.load` as command-line options."""
+    return " ".join(map(quoted, option_words(answers)))
 
 
 def as_arguments(answers: Mapping[str, object]) -> str:
-    """Return keyword arguments of :func:`springmass.load` as Python source text.
-
-    >>> as_arguments({"channel": "column 2", "rate_hz": 50.0})
-    'channel="column 2", rate_hz=50.0'
-    """
+    """Return keyword arguments of :func:`springmass.load` as Python source text."""
     return ", ".join(f"{name}={_literal(value)}" for name, value in answers.items() if _is_given(value))
 
 
-def for_command(question: Question, words: Sequence[str], given: Mapping[str, object]) -> str:
-    """Return the command line that answers a question.
-
-    >>> from acquisition.recordings.questions import Missing, MissingItem
-    >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
-    >>> for_command(question, ["springmass", "convert", "run.csv", "run.h5"], {"channel": "theta"})
-    'springmass convert run.csv run.h5 --channel theta --unit rad'
-    """
-    kept = as_options(_without(given, question))
-    if "--" in words:
-        # Options follow, so ``./`` is put before a file name that begins with a minus sign.
-        at = list(words).index("--")
-        words = [*words[:at], *(f"./{word}" if word.startswith("-") else word for word in words[at + 1 :])]
-    return " ".join(each for each in (*map(quoted, words), kept, as_options(question.examples)) if each)
+def for_command(question: Question, words: Sequence[str]) -> str:
+    """Return a command line with the answers to a question in place of those that it has."""
+    end = words.index("--") if "--" in words else len(words)
+    answered, kept = {option_of(name) for name in question.missing}, list[str]()
+    for before, word in zip(("", *words), words[:end], strict=False):
+        if before not in answered and word.partition("=")[0] not in answered:
+            kept.append(word)
+    return " ".join(map(quoted, [*kept, *option_words(question.examples), *words[end:]]))
 
 
 def for_course(question: Question) -> str:
@@ -74,20 +65,10 @@ def for_course(question: Question) -> str:
 
 
 def for_python(question: Question, function: str, given: Mapping[str, object]) -> str:
-    """Return the Python call that answers a question.
-
-    >>> from acquisition.recordings.questions import Missing, MissingItem
-    >>> question = Question("run.csv", (MissingItem(Missing.UNIT, ("m", "rad"), "rad", of="theta"),))
-    >>> for_python(question, "springmass.load", {"channel": "theta"})
-    'springmass.load("run.csv", channel="theta", unit="rad")'
-    """
-    kept = as_arguments(_without(given, question))
-    examples = as_arguments(question.examples)
-    return f"{function}({', '.join(each for each in (_literal(question.path), kept, examples) if each)})"
-
-
-def _without(given: Mapping[str, object], question: Question) -> dict[str, object]:
-    return {name: value for name, value in given.items() if name not in question.missing}
+    """Return the Python call that answers a question."""
+    kept = {name: value for name, value in given.items() if name not in question.missing}
+    words = (_literal(question.path), as_arguments(kept), as_arguments(question.examples))
+    return f"{function}({', '.join(filter(None, words))})"
 
 
 def _is_given(value: object) -> bool:

@@ -7,7 +7,6 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
-from pathlib import Path
 
 import numpy as np
 
@@ -18,9 +17,9 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.registry.found import Found
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.classic import CYCLES, READING_S, STATED_ERROR_M
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from springmass.runs.run import Run
-from springmass.runs.table_lines import table_lines
+from springmass.runs.tables import Row, read_rows
 
 COLUMNS = ("run", "name", "value", "u", "unit")
 APART = 4.0  # differences beyond so many standard uncertainties are no chance
@@ -55,34 +54,27 @@ class Reported:
 
 def read_reported(path: str | os.PathLike[str], runs: Sequence[Run]) -> list[Reported]:
     """Read a table with the columns run, name, value, u, unit; errors name the line and what to write."""
-    table = [(line, [cell.strip() for cell in cells], comma) for line, cells, comma in table_lines(Path(path), "table")]
-    head = [name.lower() for name in table[0][1]] if table else []
+    head, rows = read_rows(path, "table")
     if not {"run", "name", "value"} <= set(head):
-        raise ProgramError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {', '.join(head)}", USAGE)
-    rows = []
-    for line, cells, comma in table[1:]:
-        text = dict.fromkeys(COLUMNS, "") | dict(zip(head, cells, strict=False))
-        if any(cells):
-            rows.append(_row(f"{path}, line {line}", text, runs, decimal_comma=comma))
-    return rows
+        raise ProgramError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {', '.join(head)}")
+    return [_row(row, runs) for row in rows]
 
 
-def _row(where: str, text: Mapping[str, str], runs: Sequence[Run], *, decimal_comma: bool) -> Reported:
-    numbers = {}
+def _row(row: Row, runs: Sequence[Run]) -> Reported:
+    where, text, numbers = row.where, dict.fromkeys(COLUMNS, "") | dict(row.cells), {}
     for column, empty in (("value", "nan"), ("u", "0")):
-        given = text[column].replace(",", ".") if decimal_comma else text[column]
         try:
-            numbers[column] = Decimal(given or empty)
+            number = Decimal(row.plain(column) or empty)
         except InvalidOperation:
-            numbers[column] = Decimal("nan")
-        number = numbers[column]
+            number = Decimal("nan")
         if not (number.is_finite() and abs(number.adjusted()) < 100) or (column == "u" and number < 0):
-            raise ProgramError(f"{where}: {column} must be a number such as 14.0 or 1e-3, got {text[column]!r}", USAGE)
+            raise ProgramError(f"{where}: {column} must be a number such as 14.0 or 1e-3, got {text[column]!r}")
+        numbers[column] = number
     names = [run.name for run in runs]
     begun = [name for name in names if name.lower().startswith(text["run"].lower())]
     of = [text["run"]] if text["run"] in names else begun
     if len(of) != 1:
-        raise ProgramError(f"{where}: {text['run']!r} must be one of {', '.join(names)}, or its beginning", USAGE)
+        raise ProgramError(f"{where}: {text['run']!r} must be one of {', '.join(names)}, or its beginning")
     name, unit = _NAMES.get(text["name"], text["name"]), text["unit"]
     (recorded,) = (run.loaded.track.unit for run in runs if run.name == of[0])
     si = QUANTITIES[name].unit_in(recorded) if name in QUANTITIES else unit
@@ -90,7 +82,7 @@ def _row(where: str, text: Mapping[str, str], runs: Sequence[Run], *, decimal_co
     if unit and unit != si and unit not in _SAME.get(si, ()):
         measure = time_unit(unit) if si == "s" else measure_of(unit)
         if measure is None or measure.si != si:
-            raise ProgramError(f"{where}: {unit!r} is no unit of {_word(name)}; give {si or 'none'}", USAGE)
+            raise ProgramError(f"{where}: {unit!r} is no unit of {_word(name)}; give {si or 'none'}")
         factor = float(10.0**measure.power * measure.factor)
     rounding = 0.5 * 10.0 ** float(numbers["value"].as_tuple().exponent)
     printed = " ".join(filter(None, [text["value"], text["u"] and f"+- {text['u']}", unit]))
@@ -100,23 +92,23 @@ def _row(where: str, text: Mapping[str, str], runs: Sequence[Run], *, decimal_co
 
 def judge(rows: Sequence[Reported], runs: Sequence[Run]) -> tuple[tuple[Reported, ...], tuple[Finding, ...]]:
     """Return each row with its verdict, and a finding for each mistake, the most severe first."""
-    benches = {run.name: _Bench(run) for run in runs}
+    by_name = {run.name: run for run in runs}
     judged: list[Reported] = []
     found: list[Found] = []
     exchanged: dict[str, list[str]] = {}
     for row in rows:
-        bench = benches[row.run]
-        others = {name: other for name, other in benches.items() if name != row.run}
-        expected = bench.expected(row.name)
+        run = by_name[row.run]
+        others = {name: other for name, other in by_name.items() if name != row.run}
+        expected = _expected(run, row.name)
         if not expected:
             judged.append(row)
             continue
-        verdict, wrong, scale = _value(row, bench, others)
+        verdict, wrong, scale = _value(row, run, others)
         if verdict in others:
-            pair = " and ".join(name for name in benches if name in (row.run, verdict))
+            pair = " and ".join(name for name in by_name if name in (row.run, verdict))
             exchanged.setdefault(pair, []).append(f"{_word(row.name)} of {row.run}")
             verdict = f"from the period of {verdict}"
-        small = _uncertainty(row, scale, bench, rows) if scale is not None and row.u > 0.0 else None
+        small = _uncertainty(row, scale, run, rows) if scale is not None and row.u > 0.0 else None
         if small is not None:
             also = f"its u is {small.numbers['times']} times too small"
             verdict = also if verdict == "agrees" else f"{verdict}; {also}"
@@ -126,68 +118,61 @@ def judge(rows: Sequence[Reported], runs: Sequence[Run]) -> tuple[tuple[Reported
     return tuple(judged), by_severity(word(each) for each in (*mixed, *found))
 
 
-class _Bench:
-    """A run with what its recording gives for each quantity."""
+def _expected(run: Run, name: str, period: Estimate | None = None) -> list[Estimate]:
+    """Return what may be printed for a quantity, with the period of another run if it is given.
 
-    def __init__(self, run: Run) -> None:
-        self.run, motion = run, run.analysis.motion
-        assert isinstance(motion, Oscillation)
-        self.damping = motion.damping
-
-    def expected(self, name: str, period: Estimate | None = None) -> list[Estimate]:
-        """Return what may be printed for a quantity, with the period of another run if it is given.
-
-        For k that is also :math:`\\omega^2 m` of the bob alone, which leaves the mass of the spring out.
-        """
-        if name not in self.run and name != "gamma":
-            return []
-        found = [self.run[name if name in self.run else "damping_rate"]]
-        estimates = [Estimate(each.value, each.u, each.unit or "") for each in found]
-        omega, mass = self.run["angular_frequency"], self.run.scene.bob_mass_kg
-        if name == "spring_constant" and mass is not None:
-            k = omega.value**2 * mass.value
-            estimates.append(Estimate(k, k * math.hypot(2.0 * omega.u / omega.value, mass.u / mass.value), "N/m"))
-        ratio = 1.0 if period is None else (period.value / self.run["period"].value) ** PERIODIC[name]
-        return [Estimate(each.value * ratio, each.u * ratio, each.unit) for each in estimates]
-
-    def agrees(self, row: Reported, expected: Estimate, scale: float = 1.0, roughly: float = 0.0) -> bool:
-        """Tell whether a printed value is within its u, or that of reading it off a graph, of an expected one."""
-        by_eye = STATED_ERROR_M / math.sqrt(2.0) if row.name == "amplitude" and expected.unit == "m" else 0.0
-        if row.name in PERIODIC:
-            by_eye = abs(PERIODIC[row.name] * expected.value) * READING_S / CYCLES / self.run["period"].value
-        allowed = APART * math.hypot(max(row.u * scale, by_eye), expected.u) + row.rounding * scale
-        return abs(row.value * scale - expected.value) <= max(allowed, roughly * abs(expected.value))
+    For k that is also :math:`\\omega^2 m` of the bob alone, which leaves the mass of the spring out.
+    """
+    if name not in run and name != "gamma":
+        return []
+    found = run[name if name in run else "damping_rate"]
+    estimates = [Estimate(found.value, found.u, found.unit or "")]
+    omega, mass = run["angular_frequency"], run.scene.bob_mass_kg
+    if name == "spring_constant" and mass is not None:
+        k = omega.value**2 * mass.value
+        estimates.append(Estimate(k, k * math.hypot(2.0 * omega.u / omega.value, mass.u / mass.value), "N/m"))
+    ratio = 1.0 if period is None else (period.value / run["period"].value) ** PERIODIC[name]
+    return [Estimate(each.value * ratio, each.u * ratio, each.unit) for each in estimates]
 
 
-def _value(row: Reported, bench: _Bench, others: Mapping[str, _Bench]) -> tuple[str, Found | None, float | None]:
+def _agrees(run: Run, row: Reported, expected: Estimate, scale: float = 1.0, roughly: float = 0.0) -> bool:
+    """Tell whether a printed value is within its u, or that of reading it off a graph, of an expected one."""
+    by_eye = STATED_ERROR_M / math.sqrt(2.0) if row.name == "amplitude" and expected.unit == "m" else 0.0
+    if row.name in PERIODIC:
+        by_eye = abs(PERIODIC[row.name] * expected.value) * READING_S / CYCLES / run["period"].value
+    allowed = APART * math.hypot(max(row.u * scale, by_eye), expected.u) + row.rounding * scale
+    return abs(row.value * scale - expected.value) <= max(allowed, roughly * abs(expected.value))
+
+
+def _value(row: Reported, run: Run, others: Mapping[str, Run]) -> tuple[str, Found | None, float | None]:
     """Return the verdict on a value, or the run that it was exchanged with; the mistake; and the factor that mends it.
 
     The factor is None where the uncertainty of the value cannot be judged.
     """
-    expected = bench.expected(row.name)
+    expected, motion = _expected(run, row.name), run.analysis.motion
     ours = expected[0]
     about = {"run": row.run, "name": _word(row.name), "printed": row.printed, "ours": str(ours)}
     if row.name == "noise":
         if ours.value < TOO_SMALL * row.value and row.value < TOO_SMALL * ours.value:
             return "agrees", None, None
         return "not the noise of a sample", Found("reported_not_noise", about), None
-    linear = bench.damping.fits.get("linear")
+    linear = motion.damping.fits.get("linear") if isinstance(motion, Oscillation) else None
     if row.name in ("damping_rate", "gamma") and linear is not None and linear.rejection:
-        if bench.agrees(row, ours):
+        if _agrees(run, row, ours):
             return "agrees", None, 1.0
         return "an exponential does not describe this decay", Found("reported_not_exponential", about), 1.0
-    if (echoes := _echoes(row, bench, ours)) is not None:
+    if (echoes := _echoes(row, run, ours)) is not None:
         return "the velocities include false echoes", Found("reported_false_echoes", {**about, **echoes}), 1.0
     # A spring that nobody weighed makes k so uncertain that even exchanged values would agree: it counts last.
-    unweighed = row.name == "spring_constant" and bench.run.scene.spring_mass_kg is None
+    unweighed = row.name == "spring_constant" and run.scene.spring_mass_kg is None
     hypotheses = [("agrees", each) for each in expected[unweighed:]]
     for name, other in others.items() if row.name in PERIODIC else ():
-        hypotheses += [(name, each) for each in bench.expected(row.name, other.expected("period")[0])[unweighed:]]
+        hypotheses += [(name, each) for each in _expected(run, row.name, _expected(other, "period")[0])[unweighed:]]
     for name, each in (*hypotheses, *(("agrees", each) for each in expected[:unweighed])):
-        if bench.agrees(row, each):
+        if _agrees(run, row, each):
             return name, None, 1.0
     for power in POWERS:
-        if any(bench.agrees(row, each, 10.0**power, ROUGHLY) for _, each in hypotheses):
+        if any(_agrees(run, row, each, 10.0**power, ROUGHLY) for _, each in hypotheses):
             about["factor"] = f"{10 ** abs(power):,} times too {'small' if power > 0 else 'large'}"
             return about["factor"], Found("reported_power_of_ten", about), 10.0**power
     far = abs(row.value - ours.value) / math.hypot(max(row.u, row.rounding), ours.u)
@@ -195,38 +180,38 @@ def _value(row: Reported, bench: _Bench, others: Mapping[str, _Bench]) -> tuple[
     return "differs", Found("reported_differs", about), None
 
 
-def _echoes(row: Reported, bench: _Bench, ours: Estimate) -> dict[str, float] | None:
+def _echoes(row: Reported, run: Run, ours: Estimate) -> dict[str, float] | None:
     """Return the number of false echoes and the ratio to this analysis if a velocity or Re is that of all samples.
 
     Without recorded velocities a value that is too large is enough.
     """
-    echoes, velocity = bench.run.result["quality"].get("false_echo", 0), bench.run.loaded.track.velocity
+    echoes, velocity = run.result["quality"].get("false_echo", 0), run.loaded.track.velocity
     if row.name not in ("velocity_rms", "reynolds_number") or not echoes or ours.value <= 0.0:
         return None
     ratio = row.value / ours.value
     if ratio < ECHOES or ratio - 1.0 < APART * ours.u / ours.value:
         return None
     if velocity is not None and np.isfinite(velocity).any():
-        whole = float(np.sqrt(np.nanmean(np.square(velocity)))) / bench.run["velocity_rms"].value
+        whole = float(np.sqrt(np.nanmean(np.square(velocity)))) / run["velocity_rms"].value
         if abs(ratio - whole) > 0.25 * (whole - 1.0):
             return None
     return {"echoes": echoes, "ratio": ratio}
 
 
-def _uncertainty(row: Reported, scale: float, bench: _Bench, rows: Sequence[Reported]) -> Found | None:
+def _uncertainty(row: Reported, scale: float, run: Run, rows: Sequence[Reported]) -> Found | None:
     """Return a finding if an uncertainty is smaller than what is sure to be in it.
 
     That is the u of the quantity that the report derives it from, by its own numbers; the u of this analysis, which
     uses every sample; and the difference of the value from this analysis.
     """
-    u, expected = row.u * scale, bench.expected(row.name)
+    u, expected = row.u * scale, _expected(run, row.name)
     ours = min(expected, key=lambda each: each.u)
     needed = [(ours.u, f"this analysis finds {ours}")]
     nearest = min(expected, key=lambda each: abs(row.value * scale - each.value))
     off = abs(row.value * scale - nearest.value) - row.rounding * scale
-    if off > APART * math.hypot(u, nearest.u) and bench.agrees(row, nearest, scale):
+    if off > APART * math.hypot(u, nearest.u) and _agrees(run, row, nearest, scale):
         needed.append((off, f"this analysis finds {nearest}"))
-    mass = bench.run.scene.bob_mass_kg
+    mass = run.scene.bob_mass_kg
     for other in rows if row.name in PERIODIC else ():
         if other.run == row.run and other.name in PERIODIC and other.name not in (row.name, "spring_constant"):
             relative = abs(PERIODIC[row.name]) * other.u / abs(other.value) if other.value else 0.0

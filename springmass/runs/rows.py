@@ -97,14 +97,12 @@ def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
 _IN_TABLE = tuple(name for name, quantity in QUANTITIES.items() if quantity.in_table)
 
 
-def table_rows(
-    runs: Sequence[Analysis | Mapping[TableKey, Estimate]], *, missing: bool = False
-) -> tuple[TableRow, ...]:
+def table_rows(runs: Sequence[Analysis], *, missing: bool = False) -> tuple[TableRow, ...]:
     """Return Table 1: every quantity that at least one run gives, with one column per run.
 
     With ``missing``, a row says what the spring constant requires, if no run gives it.
     """
-    columns = [table_estimates(run) if isinstance(run, Analysis) else run for run in runs]
+    columns = [table_estimates(run) for run in runs]
     rows = []
     for name, q in QUANTITIES.items():
         keys = [{key.row: key for key in run if key.name == name} for run in columns]
@@ -132,15 +130,14 @@ def table_rows(
 NEEDS_MASS = "needs the mass: --mass-kg KG"
 
 
-def _needs_mass(run: Analysis | Mapping[TableKey, Estimate], column: Mapping[TableKey, Estimate]) -> bool:
+def _needs_mass(run: Analysis, column: Mapping[TableKey, Estimate]) -> bool:
     """Return whether a distance oscillates and only the mass is missing."""
-    if isinstance(run, Analysis) and run.scene.bob_mass_kg is not None:
-        return False
     amplitude = column.get(TableKey("amplitude"))
-    return TableKey("period") in column and amplitude is not None and amplitude.unit == "m"
+    of_length = TableKey("period") in column and amplitude is not None and amplitude.unit == "m"
+    return of_length and run.scene.bob_mass_kg is None
 
 
-def every_number(analysis: Analysis) -> dict[str, Estimate]:
+def _every_number(analysis: Analysis) -> dict[str, Estimate]:
     """Return every estimate of a run, and every law's parameters under names ``LAW.PARAMETER``."""
     everything = dict(analysis.estimates)
     if isinstance(analysis.motion, Oscillation):
@@ -150,7 +147,7 @@ def every_number(analysis: Analysis) -> dict[str, Estimate]:
     return everything
 
 
-def results_csv(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Estimate]]) -> str:
+def results_csv(names: Sequence[str], runs: Sequence[Analysis]) -> str:
     """Return every number of every run as CSV with the columns run, name, value, u, unit.
 
     Numbers keep all their digits: the file is for programs.
@@ -159,6 +156,6 @@ def results_csv(names: Sequence[str], runs: Sequence[Analysis | Mapping[str, Est
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["run", "name", "value", "u", "unit"])
     for name, run in zip(names, runs, strict=True):
-        for quantity, x in (every_number(run) if isinstance(run, Analysis) else run).items():
+        for quantity, x in _every_number(run).items():
             writer.writerow([cell(name), quantity, repr(float(x.value)), repr(float(x.u)), x.unit])
     return out.getvalue()

@@ -1,24 +1,24 @@
-"""One run: a recording with its analysis, which every command, page, report, course and script shows."""
+"""A recording with its analysis, which every command, page, report, course and script shows; and a loop over many."""
 
 from __future__ import annotations
 
-import copy
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from acquisition.errors import AcquisitionError, NeedsAnswer
 from acquisition.recordings.recording import Trap
 from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
 from pipeline.bench.scene import Scene
-from pipeline.errors import AnalysisError
+from pipeline.errors import AnalysisError, PipelineError
 from pipeline.findings.finding import Finding
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic, classic
 from pipeline.track import Track
-from springmass.errors import detail
+from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, ProgramError, detail, internal_error
 from springmass.runs.arrays import loaded_of, refuse_reading
 from springmass.runs.estimates import Value
 from springmass.runs.frames import estimates_frame, run_dataset, samples_dataset
@@ -27,8 +27,9 @@ from springmass.runs.loading import Loaded, load, within
 from springmass.runs.options import HOW, How
 from springmass.runs.outputs import now_utc, save_run
 from springmass.runs.rows import TableRow, table_rows
-from springmass.runs.scenes import scene_from, stated_keys
+from springmass.runs.scenes import Amendments, amended, scene_from, stated_keys
 from springmass.runs.showing import html_summary, text_summary
+from storage.errors import StorageError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,10 +94,8 @@ class Run(Mapping[str, Value]):
 
     def named(self, name: str, **changes: Any) -> Run:
         """Return the run under another name, and with other fields, with its analysis if it has one."""
-        other = copy.copy(self)
-        other.__dict__.pop("result", None)
-        for field, value in {"name": name, **changes}.items():
-            object.__setattr__(other, field, value)
+        other = replace(self, name=name, **changes)
+        vars(other).update({each: vars(self)[each] for each in ("analysis", "classic") if each in vars(self)})
         return other
 
     @cached_property
@@ -292,3 +291,63 @@ class _NoValue(KeyError):
 
     def __str__(self) -> str:
         return str(self.args[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A recording to analyse, under a name; ``values`` replace those of its scene."""
+
+    path: str
+    name: str
+    scene: Scene | None = None
+    how: How = HOW
+    values: Amendments = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """A recording that gives no run: the exit code, a line that says why, and the question that it leaves open."""
+
+    task: Task
+    code: int
+    message: str
+    question: NeedsAnswer | None = None
+
+
+def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
+    """Yield the analysed run of each recording, or why there is none; a failure does not stop the others."""
+    for task in tasks:
+        try:
+            run = Run.of(task.path, task.scene, task.how, task.name)
+            if task.values:
+                run = replace(run, stated=amended(run.scene, task.values, where="the command line"))
+            _ = run.analysis
+            yield run
+        except NeedsAnswer as error:
+            yield Failed(task, UNREADABLE, str(error), error)
+        except ProgramError as error:
+            yield Failed(task, error.exit_code, str(error))
+        except (AcquisitionError, StorageError) as error:
+            yield Failed(task, UNREADABLE, str(error))
+        except (PipelineError, OSError) as error:
+            yield Failed(task, UNREADABLE, f"{task.path}: {error}")
+        except MemoryError:
+            yield Failed(task, UNREADABLE, f"{task.path}: {NO_MEMORY}")
+        except Exception as error:  # a defect that one recording meets must not keep the others from their results
+            yield Failed(task, INTERNAL, f"{task.path}: {internal_error(error)}")
+
+
+def analysed(tasks: Iterable[Task]) -> list[Run]:
+    """Return the analysed run of each recording; the first failure is an error."""
+    runs = []
+    for found in analyse_all(tasks):
+        if isinstance(found, Failed):
+            raise found.question or ProgramError(found.message, found.code)
+        runs.append(found)
+    return runs
+
+
+def law_lines(runs: Iterable[Run]) -> list[str]:
+    """Return a line for each damping law that a scene states, unless an option set another."""
+    laws = [run.scene.damping_law for run in runs if run.how.law in (None, run.scene.damping_law)]
+    return [f"damping law {law}: stated in the scene" for law in dict.fromkeys(filter(None, laws))]

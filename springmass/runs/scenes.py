@@ -1,20 +1,30 @@
-"""Read scene files: one for all runs, or one for each run."""
+"""Scenes from files, and notes made on a recording afterwards: scene, remarks and marks.
+
+Recordings and run files are never changed; the notes, in ``bob.about.toml`` or ``bob.txt.about.toml``, may be. Every
+command that reads the recording uses them and reports that it does.
+"""
 
 from __future__ import annotations
 
 import codecs
+import glob
 import os
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import tomli_w
 
 from acquisition.errors import visible
 from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
-from springmass.errors import USAGE, ProgramError, complain
+from springmass.errors import ProgramError, complain
+from springmass.runs.inputs import is_recording
+from storage.atomic import write_whole
 
 Amendments = Mapping[tuple[str, str], Any]
 """Mapping of a scene's (table, key) to a value as a scene file states it."""
@@ -26,8 +36,7 @@ def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
     if len(paths) not in (0, 1, count):
         raise ProgramError(
             f"--scene was given {len(paths)} times for {count} runs; give it once for all of them, "
-            "or once for each in their order",
-            USAGE,
+            "or once for each in their order"
         )
     scenes: list[Scene | None] = [read_scene(path) for path in paths] or [None]
     return scenes * count if len(scenes) == 1 else scenes
@@ -35,7 +44,7 @@ def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
 
 def read_scene(path: str | Path) -> Scene:
     """Read a scene file (TOML)."""
-    return _scene_of(read_tables(path), str(path))
+    return Scene.from_mapping(read_tables(path), where=str(path))
 
 
 def scene_from(given: Any) -> Scene | None:
@@ -46,7 +55,7 @@ def scene_from(given: Any) -> Scene | None:
         return Scene.from_mapping(given)
     if not isinstance(given, str | os.PathLike):
         demand = f"scene must be a Scene, a mapping of its tables or a path, got {visible(repr(given)[:80])}"
-        raise ProgramError(f"{demand}; name a file", USAGE)
+        raise ProgramError(f"{demand}; name a file")
     return read_scene(Path(given))
 
 
@@ -56,12 +65,11 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         with open_regular(path) as file:
             content = file.read(LONGEST_SCENE + 1) or b""
     except OSError as error:
-        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name", USAGE) from error
+        raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name") from error
     if len(content) > LONGEST_SCENE:
         raise ProgramError(
             f"{path}: expected a scene file of at most {LONGEST_SCENE} bytes, got a longer one; "
-            "name the scene, not the recording",
-            USAGE,
+            "name the scene, not the recording"
         )
     text = ""
     try:
@@ -73,17 +81,10 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         if unfilled := re.search(r"^\s*(\w+)\s*=[^#\n]*\.\.\.", text, re.MULTILINE):
             demand = f"{unfilled[1]} has no number yet; put yours for the dots, or # before the line"
-            raise ProgramError(f"{path}: {demand}", USAGE) from error
+            raise ProgramError(f"{path}: {demand}") from error
         reason = " ".join(str(error).split())
         demand = f"not a TOML file ({reason}); see the scene file in the reference"
-        raise ProgramError(f"{path}: {demand}", USAGE) from error
-
-
-def _scene_of(tables: Any, where: str) -> Scene:
-    try:
-        return Scene.from_mapping(tables, where=where)
-    except SceneError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(f"{path}: {demand}") from error
 
 
 def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
@@ -94,7 +95,7 @@ def amended(scene: Scene, values: Amendments, *, where: str) -> Scene:
     try:
         return Scene.from_mapping(tables, where=where)
     except SceneError as error:
-        raise ProgramError(str(error), USAGE) from error
+        raise ProgramError(str(error)) from error
 
 
 def stated_keys(scene: Scene) -> str:
@@ -109,3 +110,81 @@ def ask_about(scene: Scene, where: str | Path) -> None:
     """
     for clause in scene.unusual():
         complain(f"{where}: {clause}; check value and unit")
+
+
+RUNS = (".h5", ".hdf5", ".nxs", ".wire")
+"""Suffixes of run files and logs: the stem names their recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """The notes next to a recording, whose file may not exist; marks are times in the record, s, with their texts."""
+
+    path: Path
+    scene: Scene | None = None
+    notes: tuple[str, ...] = ()
+    marks: tuple[tuple[float, str], ...] = ()
+
+    def with_more(self, scene: Scene | None, notes: Sequence[str], marks: Sequence[tuple[float, str]]) -> About:
+        """Return the notes with the given scene, if any, and with additional notes and marks."""
+        together = tuple(sorted({*self.marks, *marks}))
+        return replace(self, scene=scene or self.scene, notes=(*self.notes, *notes), marks=together)
+
+    def described(self, *, scene: bool = True) -> str:
+        """Return a summary of the notes in words, with or without their scene; empty if there are none."""
+        parts = ["its scene"] if scene and self.scene is not None else []
+        parts += [f"{len(self.notes)} notes"] if self.notes else []
+        parts += [f"{len(self.marks)} marks"] if self.marks else []
+        return ", ".join(parts)
+
+
+def about_path(recording: Path) -> Path:
+    """Return the path of the notes on a recording, whether the file exists or not.
+
+    A text has them under its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings. Notes under the stem,
+    as earlier versions wrote them, are those of a text if no other recording has that stem.
+    """
+    by_stem = recording.with_name(f"{recording.stem}.about.toml")
+    by_name = recording.with_name(f"{recording.name}.about.toml")
+    if recording.suffix.lower() in RUNS:
+        return by_stem
+    # Path.exists would raise for a name that is too long.
+    if os.path.exists(by_name) or not os.path.exists(by_stem) or any(map(is_recording, _namesakes(recording))):
+        return by_name
+    return by_stem
+
+
+def _namesakes(recording: Path) -> Iterator[Path]:
+    for other in sorted(recording.parent.glob(f"{glob.escape(recording.stem)}.*")):
+        if other.stem == recording.stem and other.name != recording.name and other.is_file():
+            yield other
+
+
+def about_of(recording: Path) -> About:
+    """Read the notes next to a recording; they are empty if there is no such file."""
+    path = about_path(recording)
+    if not os.path.exists(path):
+        return About(path)
+    tables = read_tables(path)
+    if unknown := sorted(set(tables) - {"scene", "notes", "marks"}):
+        raise ProgramError(f"{path}: unknown key {unknown[0]!r}; allowed are scene, notes, marks")
+    try:
+        scene = Scene.from_mapping(tables["scene"], where=f"{path} [scene]") if "scene" in tables else None
+        marks = tuple((float(mark["t_s"]), str(mark["text"])) for mark in tables.get("marks", ()))
+        notes = tuple(str(note) for note in tables.get("notes", ()))
+    except SceneError as error:
+        raise ProgramError(str(error)) from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        demand = "notes are a list of texts, marks are [[marks]] with t_s and text"
+        raise ProgramError(f"{path}: {demand}; mend or remove the file") from error
+    return About(path, scene, notes, marks)
+
+
+def write_about(about: About) -> Path:
+    """Write the notes atomically, replacing any earlier file, and return their path."""
+    tables: dict[str, Any] = {"notes": list(about.notes)} if about.notes else {}
+    if about.scene is not None and (scene := about.scene.to_mapping()):
+        tables["scene"] = scene
+    if about.marks:
+        tables["marks"] = [{"t_s": t_s, "text": text} for t_s, text in about.marks]
+    return write_whole(about.path, tomli_w.dumps(tables), overwrite=True)

@@ -9,7 +9,7 @@ import re
 from datetime import datetime
 from pathlib import Path
 
-from springmass.errors import USAGE, ProgramError
+from springmass.errors import ProgramError
 from storage.recovery.recover import run_paths
 
 
@@ -39,7 +39,7 @@ def demand_new(path: Path, sensors: int) -> None:
             why = "exists already, and a recording never replaces one; choose another name"
         else:
             continue
-        raise ProgramError(f"{there}: {why}", USAGE)
+        raise ProgramError(f"{there}: {why}")
 
 
 def _longest_name(folder: Path) -> int:

@@ -99,7 +99,7 @@ def meeting(sensor: Sensor, identity: Identity) -> Iterator[str]:
     if outdated(identity):
         yield (
             f"{port}: its firmware {identity.version} is older than {VERSION}, which comes with this program; "
-            f"`springmass firmware --port {port} --flash` updates it"
+            f"`springmass firmware --port {port}` shows how to update it"
         )
     if sensor.rate_hz is not None and rate_hz is not None and sensor.rate_hz != rate_hz:
         yield (

@@ -27,7 +27,7 @@ class TaskProgress:
     time per finished item.
     """
 
-    def __init__(self, what: str, total: int | None = None, *, lines: bool = False, quiet: bool = False) -> None:
+    def __init__(self, what: str, total: int, *, lines: bool = False, quiet: bool = False) -> None:
         self._what, self._total = what, total
         self._lines, self._quiet = lines and not quiet, quiet
         self._began_s = self._shown_s = time.monotonic()
@@ -48,14 +48,13 @@ class TaskProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def update(self, done: int, total: int | None = None) -> None:
-        """Show the number of finished items, and set the total if it is given."""
-        self._total = self._total if total is None else total
+    def update(self, done: int) -> None:
+        """Show the number of finished items."""
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=self._total)
             return
         now_s = time.monotonic()
-        if not self._lines or self._total is None or not 0 < done < self._total or now_s - self._shown_s < EVERY_S:
+        if not self._lines or not 0 < done < self._total or now_s - self._shown_s < EVERY_S:
             return
         self._shown_s = now_s
         left_s = (now_s - self._began_s) * (self._total - done) / done

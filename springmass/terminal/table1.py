@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from acquisition.errors import visible
 from pipeline.analyse import Analysis
-from pipeline.numerics.estimate import Estimate
-from springmass.runs.rows import TableKey, table_rows
+from springmass.runs.rows import table_rows
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 
 NARROW, NARROWEST = 24, 12  # width of the column for the names of quantities, which wrap, for several runs and for one
 
 
-def text_table(
-    names: Sequence[str], runs: Sequence[Analysis | Mapping[TableKey, Estimate]], style: TerminalStyle = PLAIN
-) -> str:
+def text_table(names: Sequence[str], runs: Sequence[Analysis], style: TerminalStyle = PLAIN) -> str:
     """Return Table 1 in aligned columns; runs that do not fit side by side follow in another block.
 
     Names that are wider than their column are shortened. If the runs do not fit side by side, the uncertainty is given

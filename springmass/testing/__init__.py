@@ -6,7 +6,7 @@ from itertools import product
 from typing import Any
 
 from acquisition.decoders.family import Family
-from acquisition.recordings.base import Format
+from acquisition.recordings.recording import Format
 from pipeline.damping.laws import Law
 from pipeline.dynamics import Integrator
 from springmass.testing import formats, integrators, laws, sensors

@@ -11,9 +11,8 @@ import numpy as np
 
 from acquisition.block import Flag
 from acquisition.errors import FormatError
-from acquisition.recordings.base import Format
 from acquisition.recordings.identify import formats
-from acquisition.recordings.recording import Recording
+from acquisition.recordings.recording import Format, Recording
 from acquisition.recordings.tables.text import HEAD_BYTES
 from pipeline.track import F8
 from springmass.testing.demands import demand

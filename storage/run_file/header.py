@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from acquisition.block import UNITS
-from acquisition.source import ClockKind, Kind
+from acquisition.block import UNITS, ClockKind, Kind
 from storage.schema import Count, ValueRefused, decoded, json_text, parsed, plain, shown
 
 SCHEMA = 1
@@ -20,7 +19,7 @@ _Length = Annotated[float, Meta(ge=0.0, le=1e30)]
 
 
 class Info(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The source, as :class:`acquisition.source.SourceInfo` describes it."""
+    """The source, as :class:`acquisition.block.SourceInfo` describes it."""
 
     kind: Kind
     name: _Text

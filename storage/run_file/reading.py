@@ -17,10 +17,9 @@ from typing import Any, Self
 
 from numpy.typing import NDArray
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.recordings.recording import Original, Trap
 from acquisition.regular_file import open_regular
-from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunClosed, RunDamaged, one_line
 from storage.hdf5 import damaged, reading_h5
 from storage.run_file import layout
@@ -96,34 +95,9 @@ class Run:
         return SourceInfo(**plain(self.header.info))
 
     @property
-    def title(self) -> str:
-        """The run's title; may be empty."""
-        return self.header.title
-
-    @property
-    def channel(self) -> str:
-        """The quantity or column of the recording that is used as the distance."""
-        return self.header.channel
-
-    @property
-    def format(self) -> str:
-        """The format family of the recording from which the run was made; empty if there is none."""
-        return self.header.format
-
-    @property
-    def scene(self) -> Mapping[str, Any] | None:
-        """The scene's tables; None if there is no scene."""
-        return self.header.scene
-
-    @property
     def traps(self) -> tuple[Trap, ...]:
         """The remarks of the reader on the recording."""
         return tuple(Trap(**plain(trap)) for trap in self.header.traps)
-
-    @property
-    def malformed_rows(self) -> int:
-        """Number of rows of the recording that were not samples."""
-        return self.header.malformed_rows
 
     @property
     def provenance(self) -> Mapping[str, Any]:

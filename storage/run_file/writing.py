@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import UNITS, Block, concatenate
+from acquisition.block import UNITS, Block, SourceInfo, concatenate
 from acquisition.recordings.recording import Original, Trap
-from acquisition.source import SourceInfo
 from storage.errors import WriteFailed
 from storage.hdf5 import whole_h5, writing_h5
 from storage.run_file import layout

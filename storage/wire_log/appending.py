@@ -4,18 +4,61 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
 import secrets
+import sys
 import threading
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from itertools import accumulate
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
+from storage.atomic import sync_folder
 from storage.errors import RunExists, WriteFailed, one_line
-from storage.wire_log.log_file import LogFile, open_log_file
 from storage.wire_log.records import Kind, LogHeader, frame
+
+if sys.platform != "win32":
+    import fcntl
+
+
+class LogFile(Protocol):
+    """The interface between the log's writer and the disk; tests replace it with a failing one."""
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Append bytes; return how many of them were written, as ``os.write`` does. Raises OSError."""
+
+    def sync(self) -> None:
+        """Sync all written bytes to the disk. Raises OSError."""
+
+    def close(self) -> None:
+        """Close the file."""
+
+
+class _NewFile(io.FileIO):
+    """A new file that is locked while it is open and has no buffers outside the kernel."""
+
+    # macOS and Windows have no fdatasync; fsync also syncs the metadata.
+    _sync: Callable[[int], None] = staticmethod(getattr(os, "fdatasync", os.fsync))
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "x", opener=lambda name, flags: os.open(name, flags | os.O_APPEND, 0o666))
+        if sys.platform != "win32":
+            with contextlib.suppress(OSError):  # a network disk without locks
+                fcntl.flock(self.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def sync(self) -> None:
+        self._sync(self.fileno())
+
+
+def open_log_file(path: Path) -> LogFile:
+    """Create a new file for appending and sync its name to the disk. Raises OSError."""
+    file = _NewFile(path)
+    with contextlib.suppress(OSError):  # a disk that cannot sync a folder
+        sync_folder(path.parent)
+    return file
+
 
 SECOND_COPY = 32768
 """Size of the log after which the header is written once more, bytes."""
@@ -86,10 +129,10 @@ class WireLogWriter:
         self.extended = 0
         if refused := self._append_error or self._sync_error:
             raise refused
-        copies = int(not self._copied and self.written.bytes >= SECOND_COPY)
-        if copies:
+        if not self._copied and self.written.bytes >= SECOND_COPY:
             self._copied = True
-            items = [(Kind.HEADER, 0, items[0][2], self._header), *items]
+            self.extend([(Kind.HEADER, 0, items[0][2], self._header)])
+            self.extended = 0
         records = [
             frame(kind, payload, sequence, mono_ns, self._log, channel)
             for sequence, (kind, channel, mono_ns, payload) in enumerate(items, self.written.records)
@@ -104,14 +147,14 @@ class WireLogWriter:
         except OSError as error:
             ends = list(accumulate(map(len, records)))
             whole = bisect_right(ends, taken)
-            self._count(whole, ends[whole - 1] if whole else 0, copies)
+            self._count(whole, ends[whole - 1] if whole else 0)
             self._append_error = self._failed("could not be continued", error)
             raise self._append_error from error
-        self._count(len(records), len(data), copies)
+        self._count(len(records), len(data))
 
-    def _count(self, records: int, size: int, copies: int) -> None:
+    def _count(self, records: int, size: int) -> None:
         self.written = Written(self.written.records + records, self.written.bytes + size)
-        self.extended = max(records - copies, 0)
+        self.extended = records
 
     def sync(self) -> None:
         """Sync everything appended before the call to the disk.

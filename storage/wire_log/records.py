@@ -31,9 +31,9 @@ from typing import Annotated, Any, NamedTuple
 
 from msgspec import Meta, Struct, field
 
+from acquisition.block import Kind as SourceKind
 from acquisition.errors import CalibrationError
 from acquisition.live.calibration import Calibration
-from acquisition.source import Kind as SourceKind
 from storage.schema import ValueRefused, decoded, json_text, parsed, plain, shown
 
 HIGHEST_CHANNEL = 255

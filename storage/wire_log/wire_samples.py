@@ -11,8 +11,8 @@ from acquisition.block import Block
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from storage.wire_log.parts import Part, Parts
 from storage.wire_log.records import Kind, Record, SensorEntry, event_content
+from storage.wire_log.survey import Part, Parts
 
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
 """Events that interrupt the bytes of a channel."""
@@ -121,7 +121,8 @@ class LogDecoder:
 
     def _hand_over(self, part: Part) -> None:
         held = self._held[part]
-        self.chains[part].take_all(held)
+        for host_ns, data in held:
+            self.chains[part].take(host_ns, data)
         self.reads[part] += len(held)
         held.clear()
 

@@ -37,6 +37,19 @@ class Done:
         return line
 
 
+BENCH = """
+[bob]
+mass_kg = 0.2
+[spring]
+constant_n_per_m = 20.0
+[start]
+displacement_m = 0.05
+"""
+MIXED = f"{BENCH}[damping]\ngamma_per_s = 0.0073\nbeta_per_m_s = 0.235\n"
+Cli = Callable[..., Any]
+"""What calls a command line, and returns a `Done`."""
+
+
 @pytest.fixture
 def cli(capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
     """Return a function that runs a command line here."""

@@ -6,17 +6,15 @@ import io
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import springmass
 from storage.run_file.writing import write_run
+from tests.cli.conftest import Cli
 
-Cli = Callable[..., Any]
 FILES = [f"{name}_simulated_position.txt" for name in ("undamped", "damped", "clipped")]
 
 

@@ -12,8 +12,8 @@ import pytest
 
 import springmass
 from acquisition.block import Flag
+from tests.cli.conftest import Cli
 
-Cli = Callable[..., Any]
 Write = Callable[..., Path]
 
 COMMANDS = ("analyse", "formats", "convert", "replay")

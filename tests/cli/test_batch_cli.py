@@ -129,11 +129,9 @@ def test_bad_files_fail_alone(tmp_path, monkeypatch, cli, good):
     monkeypatch.chdir(tmp_path)
     runs = Path(short_course(tmp_path / "runs", good).name)
     inputs = [str(path) for path in sorted(runs.iterdir())]
-    Path("list.txt").write_text("\n".join(inputs))
-    assert cli("batch", "@list.txt", "-o", "good", "--jobs", "1", *QUICK).code == 0
+    assert cli("batch", *inputs, "-o", "good", "--jobs", "1", *QUICK).code == 0
     bad = bad_files(runs)
-    Path("list.txt").write_text("\n".join(sorted([*inputs, *bad])))
-    done = cli("batch", "@list.txt", "-o", "bad", "--jobs", "1", *QUICK)
+    done = cli("batch", *inputs, *bad, "-o", "bad", "--jobs", "1", *QUICK)
     assert done.code == 1
     assert f"{good + len(bad)} runs: 0 unchanged, {good + len(bad)} analysed, {len(bad)} failed" in done.err
     assert "defect of the program" not in done.err
@@ -144,17 +142,16 @@ def test_bad_files_fail_alone(tmp_path, monkeypatch, cli, good):
         assert row["path"] in row["error"]
         assert done.err.splitlines().count(f"springmass: {row['error']}") == 1
     assert [row for row in table if row["status"] == "ok"] == rows("good")
-    done = cli("batch", "@list.txt", "-o", "bad", "--jobs", "1", *QUICK)
+    done = cli("batch", *inputs, *bad, "-o", "bad", "--jobs", "1", *QUICK)
     assert done.code == 1  # still
     assert f"{good + len(bad)} unchanged, 0 analysed, {len(bad)} failed" in done.err
 
 
-def test_lists_patterns_and_folders_in_folders_are_inputs(runs, cli):
-    """A list names files, a pattern finds them, folders are looked into; a file that several name is one run."""
+def test_patterns_and_folders_in_folders_are_inputs(runs, cli):
+    """A pattern finds files, folders are looked into; a file that several name is one run."""
     (runs / "late").mkdir()
     shutil.copy(runs / "run000.txt", runs / "late" / "run000.txt")
-    Path("list.txt").write_text("# three\nruns/run001.txt\nruns/run002.txt\nruns/late/run000.txt\n")
-    cli("batch", "@list.txt", "runs/run00[12].txt", "-o", "some", "--jobs", "1", *QUICK)
+    cli("batch", "runs/late/run000.txt", "runs/run001.txt", "runs/run00[12].txt", "-o", "some", "--jobs", "1", *QUICK)
     assert [row["run"] for row in rows("some")] == ["late/run000", "run001", "run002"]
     cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
     assert len(rows("out")) == 7

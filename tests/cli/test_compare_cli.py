@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from springmass.cli import main
 from springmass.runs.loading import sample_data
+from tests.cli.conftest import Cli
 
 DATA = sample_data()
 BARE, DISC = (str(DATA / f"{name}_simulated_position.txt") for name in ("undamped", "damped"))
@@ -19,14 +18,6 @@ BARE_SCENE, DISC_SCENE = (str(DATA / f"{name}.scene.toml") for name in ("undampe
 FAST = ("--accuracy", "fast")
 RIGHT = [BARE, DISC, "--scene", BARE_SCENE, "--scene", DISC_SCENE]
 EXCHANGED = [BARE, DISC, "--scene", DISC_SCENE, "--scene", BARE_SCENE]
-
-
-def compared(arguments: list[str], capsys: pytest.CaptureFixture[str], code: int = 0) -> dict[str, Any]:
-    """Return the JSON object of a comparison; nothing but it stands on stdout."""
-    assert main(["compare", *arguments, "--json"]) == code
-    lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 1
-    return dict(json.loads(lines[0]))
 
 
 def written_run(
@@ -49,9 +40,9 @@ def written_run(
     return str(path)
 
 
-def test_the_reports_exchange_is_found_from_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_reports_exchange_is_found_from_the_command_line(cli: Cli) -> None:
     """With the two scenes exchanged the constants part as 14.0 and 16.3 N/m did, and the exchange is named."""
-    result = compared(EXCHANGED, capsys)
+    (result,) = cli("compare", *EXCHANGED, "--json").results
     found = result["comparison"]
     low, high = sorted(each["spring_constant"]["value"] for each in found["each"])
     # (0.2214 / 0.2040)^2 between the two, as 16.3 / 14.0 between the report's.
@@ -62,44 +53,43 @@ def test_the_reports_exchange_is_found_from_the_command_line(capsys: pytest.Capt
     assert [(f["code"], f["severity"]) for f in result["findings"]] == [("runs_exchanged", "error")]
 
 
-def test_disagreement_is_an_error_under_strict(capsys: pytest.CaptureFixture[str]) -> None:
+def test_disagreement_is_an_error_under_strict(cli: Cli) -> None:
     """Exit code 5 and one line that says why; the same runs with their own scenes agree on the true 14 N/m."""
-    assert main(["compare", *EXCHANGED, "--strict", "--json", *FAST]) == 5
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "runs_exchanged" in line
-    constant = compared([*RIGHT, "--strict", *FAST], capsys)["comparison"]["spring_constant"]
+    done = cli("compare", *EXCHANGED, "--strict", "--json", *FAST)
+    assert (done.code, "runs_exchanged" in done.complaint) == (5, True)
+    (result,) = cli("compare", *RIGHT, "--strict", "--json", *FAST).results
+    constant = result["comparison"]["spring_constant"]
     assert constant["value"] == pytest.approx(14.0, abs=3 * constant["u"])
 
 
-def test_another_spring_is_told_apart_from_an_exchange(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_spring_is_told_apart_from_an_exchange(tmp_path: Path, cli: Cli) -> None:
     """Two springs under one bob differ, and nothing is said to be exchanged."""
     runs = [written_run(tmp_path / f"{o}.txt", omega=o, seconds=20.0) for o in (8.0, 8.4)]
-    result = compared([*runs, "--scene", BARE_SCENE], capsys)
+    (result,) = cli("compare", *runs, "--scene", BARE_SCENE, "--json").results
     assert result["comparison"]["exchanged"] == []
     assert [f["code"] for f in result["findings"]] == ["springs_differ"]
 
 
-def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_report_is_written_where_it_is_wanted(tmp_path: Path, cli: Cli) -> None:
     """The folder holds the page with the figure of the constants, and the JSON as printed; without --output nothing."""
     out = tmp_path / "both"
-    assert main(["compare", *RIGHT, *FAST, "--output", str(out), "--json", "--figures", "svg"]) == 0
-    printed = json.loads(capsys.readouterr().out)
+    (printed,) = cli("compare", *RIGHT, *FAST, "--output", out, "--json", "--figures", "svg").results
     assert json.loads((out / "results.json").read_text("utf-8")) == printed
     assert (out / "figures" / "comparison.svg").stat().st_size > 1000
     assert "damped_simulated_position" in (out / "report.html").read_text("utf-8")
 
 
-def test_a_run_that_does_not_oscillate_cannot_be_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_does_not_oscillate_cannot_be_compared(tmp_path: Path, cli: Cli) -> None:
     """A bob at rest has no spring constant: exit code 3 and its name."""
     still = written_run(tmp_path / "still.txt", omega=8.0, amplitude_m=1e-9, seconds=10.0)
-    assert main(["compare", BARE, still, "--scene", BARE_SCENE]) == 3
-    assert "still" in capsys.readouterr().err
+    done = cli("compare", BARE, still, "--scene", BARE_SCENE)
+    assert (done.code, "still" in done.complaint) == (3, True)
 
 
-def test_an_unreadable_run_ends_the_comparison(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unreadable_run_ends_the_comparison(cli: Cli) -> None:
     """A comparison of what is left would answer another question: exit code 3."""
-    assert main(["compare", BARE, "nothing.txt", "--scene", BARE_SCENE]) == 3
-    assert "nothing.txt" in capsys.readouterr().err
+    done = cli("compare", BARE, "nothing.txt", "--scene", BARE_SCENE)
+    assert (done.code, "nothing.txt" in done.complaint) == (3, True)
 
 
 def five_masses(folder: Path, hooke: str) -> list[str]:
@@ -116,7 +106,7 @@ def five_masses(folder: Path, hooke: str) -> list[str]:
 
 
 @pytest.mark.parametrize("head", ["mass (g),position (cm)", "mass_g;position_cm"])
-def test_many_masses_and_hookes_law(head: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_many_masses_and_hookes_law(head: str, tmp_path: Path, cli: Cli) -> None:
     """The line through T^2 gives k and a third of the spring's mass, and positions give k by Hooke's law, with E_n."""
     errors_cm = (0.04, -0.05, 0.02, 0.03, -0.04)
     rows = [
@@ -126,7 +116,7 @@ def test_many_masses_and_hookes_law(head: str, tmp_path: Path, capsys: pytest.Ca
     comma = ";" in head
     body = "".join(f"{g};{y:.2f}\n".replace(".", ",") if comma else f"{g},{y:.2f}\n" for g, y in rows)
     arguments = five_masses(tmp_path, f"{head}\n{body}")
-    result = compared([*arguments, "-o", str(tmp_path / "out"), "--figures", "svg"], capsys)
+    (result,) = cli("compare", *arguments, "-o", tmp_path / "out", "--figures", "svg", "--json").results
     line = result["mass_line"]
     assert abs(line["constant"]["value"] - 14.0) < 3 * line["constant"]["u"]
     assert abs(line["effective_mass"]["value"] - 0.02 / 3) < 3 * line["effective_mass"]["u"]
@@ -134,36 +124,33 @@ def test_many_masses_and_hookes_law(head: str, tmp_path: Path, capsys: pytest.Ca
     assert result["hooke"]["normalised_error"] < 1.0
     for chart in ("masses", "hooke"):
         assert (tmp_path / "out" / "figures" / f"{chart}.svg").exists()
-    assert main(["compare", *arguments]) == 0
-    assert "Hooke's law: k = 1" in capsys.readouterr().out
+    assert "Hooke's law: k = 1" in cli("compare", *arguments).out
 
 
 @pytest.mark.parametrize(
     ("table", "words"),
     [
         ("weight,position_m\n1,2\n", "expected the columns mass_kg and position_m"),
-        ("mass_kg,position_m\n0.1,far\n", "line 2: position must be a number"),
+        ("mass_kg,position_m\n0.1,far\n", "line 2: position_m must be a finite number"),
         ("mass_kg,position_m\n0.1,0.5\n0.2,0.4\n", "three masses"),
         ("mass_kg,position_m\n0.1,0.5\n0.2,0.4\n0.3,0.52\n", "do not follow the masses"),
     ],
 )
 def test_a_static_measurement_that_gives_no_constant_is_one_line(
-    table: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    table: str, words: str, tmp_path: Path, cli: Cli
 ) -> None:
     """The error says what to write or to do."""
-    assert main(["compare", *five_masses(tmp_path, table)]) in (2, 3)
-    said = capsys.readouterr().err
-    assert words in said
-    assert "Traceback" not in said
+    done = cli("compare", *five_masses(tmp_path, table))
+    assert (done.code in (2, 3), words in done.complaint) == (True, True)
 
 
-def test_runs_of_one_bob_that_differ_in_damping_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_runs_of_one_bob_that_differ_in_damping_are_told(tmp_path: Path, cli: Cli) -> None:
     """Where two runs of one bob follow laws with other coefficients a warning says so, and k agrees all the same."""
     omega = math.sqrt(14.0 / (0.2176 + 0.01 / 3 + 8 / 3 * 1.1999 * 0.051**3))
     runs = [
         written_run(tmp_path / f"{name}.txt", omega=omega, beta=beta, seed=seed)
         for name, beta, seed in (("still_air", 0.2, 1), ("draught", 0.3, 2))
     ]
-    result = compared([*runs, "--scene", DISC_SCENE], capsys)
+    (result,) = cli("compare", *runs, "--scene", DISC_SCENE, "--json").results
     assert result["comparison"]["agree"] is True
     assert [f["code"] for f in result["findings"]] == ["laws_differ"]

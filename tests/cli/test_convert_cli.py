@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,7 @@ from acquisition.recordings.recording import Original
 from springmass.runs.scenes import read_scene
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
-
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 
 def same_samples(a: Any, b: Any) -> bool:

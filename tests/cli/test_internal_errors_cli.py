@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from springmass.errors import INTERNAL, USAGE
+from tests.cli.conftest import Cli
 
-Cli = Callable[..., Any]
 REPO_ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import springmass
-from tests.cli.conftest import Done
+from tests.cli.conftest import Cli
 
 RUN = "undamped_simulated_position.txt"
 
@@ -31,7 +30,7 @@ def scene(folder: Path, law: str) -> Path:
     return path
 
 
-def test_a_law_is_stated_by_an_option_and_never_noted(cli: Callable[..., Done], run: Path) -> None:
+def test_a_law_is_stated_by_an_option_and_never_noted(cli: Cli, run: Path) -> None:
     """The result holds the law, and nothing is written next to the recording."""
     done = cli("analyse", run, "--law", "linear", "--json")
     (result,) = done.results
@@ -43,17 +42,15 @@ def test_a_law_is_stated_by_an_option_and_never_noted(cli: Callable[..., Done], 
     assert not list(run.parent.glob("*.about.toml"))
 
 
-def test_a_law_of_a_scene_file_is_named_first(cli: Callable[..., Done], run: Path) -> None:
-    """The first line of the output names law and file; an option takes precedence over the file."""
+def test_a_law_of_a_scene_file_is_named_first(cli: Cli, run: Path) -> None:
+    """The first line of the output names the law; an option takes precedence over the file."""
     bench = scene(run.parent, "linear")
-    first = cli("analyse", run, "--scene", bench, "--no-report").out.splitlines()[0]
-    assert "linear" in first
-    assert str(bench) in first
+    assert "linear" in cli("analyse", run, "--scene", bench, "--no-report").out.splitlines()[0]
     (free,) = cli("analyse", run, "--scene", bench, "--law", "any", "--json").results
     assert free["damping"]["stated"] is None
 
 
-def test_a_law_that_does_not_exist_is_refused(cli: Callable[..., Done], run: Path) -> None:
+def test_a_law_that_does_not_exist_is_refused(cli: Cli, run: Path) -> None:
     """Option and scene file list the laws."""
     assert "linear+quadratic" in cli("analyse", run, "--law", "cubic", "--no-report").complaint
     done = cli("analyse", run, "--scene", scene(run.parent, "cubic"), "--no-report")
@@ -61,7 +58,7 @@ def test_a_law_that_does_not_exist_is_refused(cli: Callable[..., Done], run: Pat
     assert "linear+quadratic" in done.complaint
 
 
-def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Callable[..., Done], run: Path) -> None:
+def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Cli, run: Path) -> None:
     """The column law of the table of runs takes precedence over the option; the results have both laws."""
     other = run.with_name("other.txt")
     other.write_bytes(run.read_bytes())
@@ -81,7 +78,7 @@ def test_batch_takes_a_law_for_all_runs_and_for_each(cli: Callable[..., Done], r
     assert "law must be one of" in wrong.complaint
 
 
-def test_a_damping_rate_that_is_not_to_be_quoted_is_not_recommended(cli: Callable[..., Done], tmp_path: Path) -> None:
+def test_a_damping_rate_that_is_not_to_be_quoted_is_not_recommended(cli: Cli, tmp_path: Path) -> None:
     """Table 1 and the sentence on damping agree about it, and the sentence counts the seconds that were analysed."""
     t, rng = np.arange(1400) / 100, np.random.default_rng(1)
     y = 0.2 + np.where(t < 4.0, 0.1, 0.02 * np.cos(8.0 * t) * np.exp(-5e-4 * t)) + 1e-3 * rng.standard_normal(t.size)

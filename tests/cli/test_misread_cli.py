@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.cli.conftest import Cli
 from tests.cli.not_recordings import TABLES
-
-Cli = Callable[..., Any]
 
 PERIOD_S = 0.790066
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from springmass.runs.loading import sample_data
-
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 
 @pytest.fixture
@@ -72,5 +69,3 @@ def test_the_folder_of_sample_data_can_be_analysed(cli: Cli) -> None:
     assert len(done.results) == 5
     assert "5 recordings" in done.err
     assert "damped_simulated.truth.json" in done.err
-    listed = {row["file"]: row for row in cli("formats", sample_data(), "--json").results}
-    assert listed["damped_simulated.truth.json"]["family"] == ""

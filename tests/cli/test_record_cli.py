@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 import tty
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,6 +23,7 @@ from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
 from springmass import analyse, load
 from springmass.cli import main
 from storage.run_file.reading import open_run
+from tests.cli.conftest import Cli
 from tests.encoders import ENCODERS
 from tests.sampling import sampled
 
@@ -89,7 +90,7 @@ def test_a_simulated_run_becomes_a_run_file_with_its_truth(recorded: Path) -> No
     assert not recorded.with_suffix(".wire").exists()
 
 
-def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Callable, tmp_path: Path, recorded: Path) -> None:
+def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Cli, tmp_path: Path, recorded: Path) -> None:
     """The log that travels inside a run gives the same samples through the same decoders."""
     with open_run(recorded) as run:
         (log,) = run.originals()
@@ -102,7 +103,7 @@ def test_the_run_rebuilt_from_its_own_wire_bytes_is_the_same(cli: Callable, tmp_
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Callable, tmp_path: Path, recorded: Path) -> None:
+def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Cli, tmp_path: Path, recorded: Path) -> None:
     """A run recorded with 344 m/s comes out of its log with any other speed, every distance in proportion."""
     assert cli("convert", recorded, tmp_path / "run.wire").code == 0
     done = cli("recover", tmp_path / "run.wire", "-o", tmp_path / "warm.h5", "--speed-of-sound", "350")
@@ -112,7 +113,7 @@ def test_another_speed_of_sound_is_applied_to_the_same_echoes(cli: Callable, tmp
 
 
 @pytest.mark.parametrize("name", ["run.h5", "run.wire", "run.part2.h5"])
-def test_nothing_is_ever_recorded_over(cli: Callable, tmp_path: Path, scene: Path, name: str) -> None:
+def test_nothing_is_ever_recorded_over(cli: Cli, tmp_path: Path, scene: Path, name: str) -> None:
     """Where a run file or its log exists the command ends before it opens anything."""
     (tmp_path / name).write_bytes(b"precious")
     done = cli("record", "--simulate", "--scene", scene, "--seconds", "1", "-o", tmp_path / "run.h5")
@@ -122,7 +123,7 @@ def test_nothing_is_ever_recorded_over(cli: Callable, tmp_path: Path, scene: Pat
 
 
 def test_a_place_that_cannot_hold_the_run_is_refused_before_the_recording(
-    cli: Callable, tmp_path: Path, scene: Path
+    cli: Cli, tmp_path: Path, scene: Path
 ) -> None:
     """A link to nothing, and a name too long for the log's suffix: one line, exit code 2, nothing recorded."""
     (tmp_path / "run.h5").symlink_to(tmp_path / "nowhere" / "run.h5")
@@ -132,7 +133,7 @@ def test_a_place_that_cannot_hold_the_run_is_refused_before_the_recording(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bench.toml", "run.h5"]
 
 
-def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
+def test_two_sensors_give_two_run_files(cli: Cli, tmp_path: Path) -> None:
     """Several sensors in one run: one log, a run file each, both complete."""
     with speaking("line-protocol") as one, speaking("ffhls") as other:
         one.start()
@@ -149,7 +150,7 @@ def test_two_sensors_give_two_run_files(cli: Callable, tmp_path: Path) -> None:
 
 
 def test_a_disk_nearly_full_is_told_before_a_run_starts(
-    cli: Callable, tmp_path: Path, scene: Path, monkeypatch: pytest.MonkeyPatch
+    cli: Cli, tmp_path: Path, scene: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Less room than the run needs: one line, exit code 4, no port opened, no log."""
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=1000))
@@ -158,7 +159,7 @@ def test_a_disk_nearly_full_is_told_before_a_run_starts(
     assert not (tmp_path / "run.wire").exists()
 
 
-def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: Path, scene: Path) -> None:
+def test_a_killed_recording_is_recovered_from_its_log(cli: Cli, tmp_path: Path, scene: Path) -> None:
     """After kill -9 the log gives a run file with the first second whole."""
     words = ["record", "--simulate", "--scene", str(scene), "-o", str(tmp_path / "run.h5")]
     command = [sys.executable, "-m", "springmass", *words]
@@ -179,7 +180,7 @@ def test_a_killed_recording_is_recovered_from_its_log(cli: Callable, tmp_path: P
 
 
 @pytest.mark.trials
-def test_a_port_is_probed(cli: Callable) -> None:
+def test_a_port_is_probed(cli: Cli) -> None:
     """Listening to a port says which family speaks on it."""
     with speaking("line-protocol") as sensor:
         sensor.start()
@@ -208,7 +209,7 @@ class Hands:
         return "\n"
 
 
-def rulered(cli: Callable, tmp_path: Path, hands: Hands, *rulers: str) -> SimpleNamespace:
+def rulered(cli: Cli, tmp_path: Path, hands: Hands, *rulers: str) -> SimpleNamespace:
     """Record a still target with a speed of sound that is 2 % too high, calibrated by a ruler."""
     finder = VirtualRangefinder(lambda t: hands.place + 0.0 * t, VirtualSensor(), np.random.default_rng(5))
     with VirtualPort(get_family("line-protocol"), finder, SystemClock(), seconds=30.0) as sensor:
@@ -221,7 +222,7 @@ def rulered(cli: Callable, tmp_path: Path, hands: Hands, *rulers: str) -> Simple
 
 
 def test_two_distances_by_the_ruler_set_offset_and_scale(
-    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A scale 2 % off is put right by two known distances."""
     hands = Hands([0.2, 0.6, 0.4])
@@ -231,7 +232,7 @@ def test_two_distances_by_the_ruler_set_offset_and_scale(
     np.testing.assert_allclose(load(tmp_path / "run.h5").loaded.samples.distance[-10:], 0.4, atol=0.002)
 
 
-def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable, tmp_path: Path, scene: Path) -> None:
+def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Cli, tmp_path: Path, scene: Path) -> None:
     """--still, --ruler and --trigger work without hardware: the ruler's distance is the rest, the run its motion."""
     done = cli(
         *("record", "--simulate", "--scene", scene, "--still", "0.5", "--ruler", "0.26"),
@@ -251,7 +252,7 @@ def test_the_simulated_bob_hangs_still_until_its_rest_is_measured(cli: Callable,
     assert abs(loaded.track.trigger_s - moment_s) < 0.03
 
 
-def test_silence_ends_a_recording_before_it_starts(cli: Callable, tmp_path: Path, silent_port: str) -> None:
+def test_silence_ends_a_recording_before_it_starts(cli: Cli, tmp_path: Path, silent_port: str) -> None:
     """After three seconds a line says what to check; it ends with 4 and leaves no file."""
     done = cli("record", "--port", silent_port, "--sensor", "line-protocol", "-o", tmp_path / "run.h5")
     assert done.code == 4
@@ -262,7 +263,7 @@ def test_silence_ends_a_recording_before_it_starts(cli: Callable, tmp_path: Path
 
 
 @pytest.mark.parametrize("away", sampled([0.005, 0.3], 1))
-def test_useless_readings_are_said_at_once(cli: Callable, tmp_path: Path, away: float) -> None:
+def test_useless_readings_are_said_at_once(cli: Cli, tmp_path: Path, away: float) -> None:
     """No target and an echo of something fixed are said with what to check; a run without a distance ends with 4."""
     finder = VirtualRangefinder(
         lambda _: away, VirtualSensor(noise_m=0.0, false_echo_rate_hz=0.0), np.random.default_rng(5)
@@ -282,7 +283,7 @@ def test_useless_readings_are_said_at_once(cli: Callable, tmp_path: Path, away: 
 
 @pytest.mark.trials
 def test_record_alone_finds_the_only_rangefinder(
-    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, silent_port: str
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, silent_port: str
 ) -> None:
     """Of two ports one speaks: it is named and recorded, into a file named by date, time and title."""
     monkeypatch.chdir(tmp_path)
@@ -298,7 +299,7 @@ def test_record_alone_finds_the_only_rangefinder(
 
 
 def test_no_rangefinder_and_several_are_told(
-    cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, silent_port: str
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, silent_port: str
 ) -> None:
     """What was heard on each port is said, with what to name; exit code 4."""
     monkeypatch.setattr("serial.tools.list_ports.comports", list)

@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.cli.conftest import Done
+from tests.cli.conftest import MIXED, Cli
 
-SCENE = """
-[bob]
-mass_kg = 0.2
-[spring]
-constant_n_per_m = 20.0
-[start]
-displacement_m = 0.05
-[damping]
-gamma_per_s = 0.0073
-beta_per_m_s = 0.235
-"""
 RUN, OTHER = "DATA/undamped_simulated_position.txt", "DATA/damped_simulated_position.txt"
 BARE = ("--scene", "DATA/undamped.scene.toml")
 RECORD = ("record", "--simulate", "--scene", "SCENE", "--sensor", "line-protocol", "-o", "OUT")
@@ -66,12 +54,10 @@ LINES: list[tuple[tuple[str, ...], str]] = [
 
 
 @pytest.mark.parametrize(("line", "words"), LINES, ids=str)
-def test_what_cannot_be_is_one_line(
-    cli: Callable[..., Done], data: Path, tmp_path: Path, line: tuple[str, ...], words: str
-) -> None:
+def test_what_cannot_be_is_one_line(cli: Cli, data: Path, tmp_path: Path, line: tuple[str, ...], words: str) -> None:
     """It is said before anything is written."""
     scene, out = tmp_path / "bench.toml", tmp_path / "run.h5"
-    scene.write_text(SCENE)
+    scene.write_text(MIXED)
     places = {"SCENE": str(scene), "OUT": str(out)}
     done = cli(*(places.get(word, word.replace("DATA", str(data))) for word in line))
     assert (done.code, done.out) == (2, "")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import pytest
 
-from springmass.cli import main
+from tests.cli.conftest import Cli
 from tests.reported import Row, periodic_rows, record, write_table
 from tests.synthetic import Truth
 
@@ -47,15 +46,13 @@ def bench(tmp_path: Path) -> list[str]:
     return arguments
 
 
-def test_six_of_six_on_the_reports_own_table(
-    bench: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_six_of_six_on_the_reports_own_table(bench: list[str], tmp_path: Path, cli: Cli) -> None:
     """Each mistake has its line on the terminal, in the JSON and on the page; --strict rejects the table."""
-    table = str(write_table(tmp_path / "printed.csv", PRINTED))
-    assert main(["compare", *bench, "--reported", table, "-o", str(tmp_path / "out"), "--strict"]) == 5
-    printed, page = capsys.readouterr().out, (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert main(["compare", *bench, "--reported", table, "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)
+    table = write_table(tmp_path / "printed.csv", PRINTED)
+    done = cli("compare", *bench, "--reported", table, "-o", tmp_path / "out", "--strict")
+    printed, page = done.out, (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert done.code == 5
+    (result,) = cli("compare", *bench, "--reported", table, "--json").results
     codes = {finding["code"] for finding in result["findings"]}
     for code in SIX:
         for where in (printed, page, codes):
@@ -64,7 +61,7 @@ def test_six_of_six_on_the_reports_own_table(
     assert len(result["reported"]) == len(PRINTED)
 
 
-def test_a_right_table_has_no_findings(bench: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_right_table_has_no_findings(bench: list[str], tmp_path: Path, cli: Cli) -> None:
     """Values read off a graph, with semicolons and decimal commas as a sheet writes them, agree."""
     rows = [
         *periodic_rows("bare", 5.08, 0.2007),
@@ -73,19 +70,17 @@ def test_a_right_table_has_no_findings(bench: list[str], tmp_path: Path, capsys:
     ]
     table = write_table(tmp_path / "printed.csv", rows)
     table.write_text(table.read_text().replace(",", ";").replace(".", ","))
-    assert main(["compare", *bench, "--reported", str(table), "--json", "--strict"]) == 0
-    result = json.loads(capsys.readouterr().out)
+    done = cli("compare", *bench, "--reported", table, "--json", "--strict")
+    (result,) = done.results
+    assert done.code == 0
     assert {row["verdict"] for row in result["reported"]} == {"agrees"}
     assert not [f for f in result["findings"] if f["code"].startswith("reported_")]
 
 
-def test_a_value_that_no_usual_mistake_explains_differs(
-    bench: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_value_that_no_usual_mistake_explains_differs(bench: list[str], tmp_path: Path, cli: Cli) -> None:
     """It is said how far off it is; a quantity that a recording does not give is not compared, and says so."""
     rows: list[Row] = [("bare", "period", 0.9, 0.001, "s"), ("bare", "colour", 3, "", "")]
-    assert main(["compare", *bench, "--reported", str(write_table(tmp_path / "t.csv", rows)), "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)
+    (result,) = cli("compare", *bench, "--reported", write_table(tmp_path / "t.csv", rows), "--json").results
     assert "reported_differs" in {f["code"] for f in result["findings"]}
     assert result["reported"][1]["verdict"].startswith("not compared")
 
@@ -102,12 +97,10 @@ def test_a_value_that_no_usual_mistake_explains_differs(
     ],
 )
 def test_a_table_that_cannot_be_read_names_the_line(
-    bench: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, words: str
+    bench: list[str], tmp_path: Path, cli: Cli, line: str, words: str
 ) -> None:
     """The error names file and line, and says what to write."""
     table = tmp_path / "t.csv"
     table.write_text(f"run,name,value,u,unit\n{line}\n")
-    assert main(["compare", *bench, "--reported", str(table)]) == 2
-    said = capsys.readouterr().err
-    assert "t.csv, line 2" in said
-    assert words in said
+    done = cli("compare", *bench, "--reported", table)
+    assert (done.code, "t.csv, line 2" in done.complaint, words in done.complaint) == (2, True, True)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from pipeline.bench.scene import Scene
 from springmass.runs.scenes import read_scene, stated_keys
-
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 
 @pytest.fixture
@@ -101,7 +98,8 @@ def test_scenes_are_saved_on_request_under_the_whole_name(cli: Cli, data: Path, 
     scene = ("--scene", data / "damped.scene.toml", "--accuracy", "fast")
     cli("analyse", *runs, *scene, "--output", tmp_path / "out")
     assert not list(tmp_path.glob("*.about.toml"))
-    cli("analyse", *runs, *scene, "--no-report", "--save-scene")
+    for run in runs:
+        cli("scene", run, *scene[:2])
     assert sorted(path.name for path in tmp_path.glob("*.about.toml")) == ["a.txt.about.toml", "b.txt.about.toml"]
     (tmp_path / "a.txt.about.toml").rename(tmp_path / "a.about.toml")
     assert "spring_constant" in cli("analyse", tmp_path / "a.txt", "--json").results[0]["estimates"]

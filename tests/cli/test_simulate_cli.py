@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition.block import Block
-from acquisition.source import SourceInfo
+from acquisition.block import Block, SourceInfo
 from springmass import analyse, load
 from springmass.charts.chart import decoded
 from storage.run_file.writing import write_run
-
-LINEAR = """
-[bob]
-mass_kg = 0.2
-[spring]
-constant_n_per_m = 20.0
-[start]
-displacement_m = 0.05
-"""
-MIXED = LINEAR + "[damping]\ngamma_per_s = 0.0073\nbeta_per_m_s = 0.235\n"
+from tests.cli.conftest import BENCH as LINEAR
+from tests.cli.conftest import MIXED, Cli
 
 
 @pytest.fixture
@@ -44,7 +34,7 @@ def scene(tmp_path: Path) -> Path:
     ],
 )
 def test_the_prediction_is_told_in_the_quantities_of_table_1(
-    cli: Callable, tmp_path: Path, damping: str, rate: float, last: float
+    cli: Cli, tmp_path: Path, damping: str, rate: float, last: float
 ) -> None:
     """Period, damping rate and Q at the start, and the amplitude at the end as its law says; printed and in JSON."""
     path = tmp_path / "bench.toml"
@@ -59,7 +49,7 @@ def test_the_prediction_is_told_in_the_quantities_of_table_1(
     assert f"A = {predicted['last_amplitude_m']:.4g} m after 20 s" in done.out
 
 
-def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Callable, scene: Path, tmp_path: Path) -> None:
+def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Cli, scene: Path, tmp_path: Path) -> None:
     """A run file of kind simulated, which nothing overwrites unasked."""
     run = tmp_path / "run.h5"
     scene.write_text(f"{MIXED}[sensor]\nsigma_m = 2e-4\n")
@@ -73,7 +63,7 @@ def test_readings_are_a_recording_whose_analysis_finds_the_scene(cli: Callable, 
     assert cli(*arguments).code == 2
 
 
-def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Callable, scene: Path, tmp_path: Path) -> None:
+def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Cli, scene: Path, tmp_path: Path) -> None:
     """One line, exit code 2, nothing written; --force runs it and measures how wrong it is."""
     arguments = ("simulate", "--scene", scene, "--seconds", "10", "--method", "forward-euler")
     arguments += ("--folder", tmp_path / "out")
@@ -88,7 +78,7 @@ def test_an_unstable_step_is_refused_with_limit_and_remedy(cli: Callable, scene:
     assert cli(*arguments[:-2], "--dt", str(limit), "--json").code == 0
 
 
-def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path: Path) -> None:
+def test_a_run_at_rest_takes_no_prediction(cli: Cli, scene: Path, tmp_path: Path) -> None:
     """Exit code 3, one line."""
     noise = np.random.default_rng(1).normal(0.25, 1e-4, 1000)
     samples = Block(0, np.arange(1000) / 100.0, noise, np.zeros(1000, np.uint8))
@@ -107,7 +97,7 @@ def test_a_run_at_rest_takes_no_prediction(cli: Callable, scene: Path, tmp_path:
         ("constant_n_per_m = 20.0", "constant_n_per_m = 20.0\ncubic_n_per_m3 = -9000.0", "softening spring"),
     ],
 )
-def test_a_scene_that_cannot_move_is_one_line(cli: Callable, tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_a_scene_that_cannot_move_is_one_line(cli: Cli, tmp_path: Path, old: str, new: str, message: str) -> None:
     """Negative mass, a start that is no number, no spring, a spring that lets go: exit code 2."""
     path = tmp_path / "bad.toml"
     path.write_text(MIXED.replace(old, new))
@@ -139,7 +129,7 @@ def bench(tmp_path: Path) -> Path:
     return path
 
 
-def test_the_charts_of_a_simulation_stand_on_a_page(cli: Callable, scene: Path, tmp_path: Path) -> None:
+def test_the_charts_of_a_simulation_stand_on_a_page(cli: Cli, scene: Path, tmp_path: Path) -> None:
     """Its charts are in simulation.html, and files only on request; both Euler methods are beside the exact motion."""
     assert cli("simulate", "--scene", scene, "--seconds", "20", "--folder", tmp_path).code == 0
     folder = tmp_path / "bench.simulated"
@@ -156,7 +146,7 @@ def test_the_charts_of_a_simulation_stand_on_a_page(cli: Callable, scene: Path, 
     assert {path.name for path in (folder / "figures").iterdir()} == {f"{name}.pdf" for name in charts}
 
 
-def test_auto_keeps_the_tolerance_and_says_so(cli: Callable, scene: Path) -> None:
+def test_auto_keeps_the_tolerance_and_says_so(cli: Cli, scene: Path) -> None:
     """The object holds method, step, predicted and measured error, both below the tolerance."""
     done = cli("simulate", "--scene", scene, "--seconds", "30", "--tolerance", "1e-7", "--check", "--json")
     assert done.code == 0
@@ -166,7 +156,7 @@ def test_auto_keeps_the_tolerance_and_says_so(cli: Callable, scene: Path) -> Non
     assert found["samples"] == 3001
 
 
-def test_a_record_outside_the_band_names_what_would_have_to_move(cli: Callable, bench: Path, tmp_path: Path) -> None:
+def test_a_record_outside_the_band_names_what_would_have_to_move(cli: Cli, bench: Path, tmp_path: Path) -> None:
     """A run of another spring leaves the band, and the spring constant is named with the value that it had."""
     other = tmp_path / "other.toml"
     other.write_text(BENCH.replace("value = 14.0", "value = 14.08"))
@@ -183,7 +173,7 @@ def test_a_record_outside_the_band_names_what_would_have_to_move(cli: Callable, 
     assert same["inside_95"] > 0.93
 
 
-def test_a_run_with_its_scene_is_enough(cli: Callable, scene: Path, tmp_path: Path) -> None:
+def test_a_run_with_its_scene_is_enough(cli: Cli, scene: Path, tmp_path: Path) -> None:
     """Start, constant and damping come from the recording, the mass from its scene, and the length is the run's."""
     run, full = tmp_path / "bob.h5", MIXED
     scene.write_text(full)
@@ -203,7 +193,7 @@ def test_a_run_with_its_scene_is_enough(cli: Callable, scene: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize("step_s", [0.002, 0.01, 0.03])
-def test_forward_euler_grows_by_its_formula(cli: Callable, tmp_path: Path, step_s: float) -> None:
+def test_forward_euler_grows_by_its_formula(cli: Cli, tmp_path: Path, step_s: float) -> None:
     """Each step multiplies the amplitude by sqrt(1 + w^2 h^2), that of symplectic Euler keeps it; measured alike."""
     path = tmp_path / "linear.toml"
     path.write_text(LINEAR)
@@ -216,7 +206,7 @@ def test_forward_euler_grows_by_its_formula(cli: Callable, tmp_path: Path, step_
     assert symplectic["fails_above_s"] == pytest.approx(0.2)
 
 
-def test_the_measured_run_stands_in_the_charts_of_both_methods(cli: Callable, scene: Path, tmp_path: Path) -> None:
+def test_the_measured_run_stands_in_the_charts_of_both_methods(cli: Cli, scene: Path, tmp_path: Path) -> None:
     """Position, velocity, energy and phase have the recording, which is the exact motion here, as their points."""
     run = tmp_path / "bob.h5"
     assert cli("simulate", "--scene", scene, "--seconds", "20", "--sensor", "ideal", "-o", run).code == 0

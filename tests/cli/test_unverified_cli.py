@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import h5py
 import pytest
 
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 COMMANDS = ("analyse", "convert", "replay", "trade", "simulate", "compare", "formats")
 
@@ -30,7 +29,7 @@ def arguments(command: str, path: Path, out: Path, data: Path) -> list[Any]:
     return {
         "analyse": ["analyse", "--json", path],
         "convert": ["convert", path, out],
-        "replay": ["replay", path, "--speed", "max", "-o", out],
+        "replay": ["replay", path, "--speed", "max"],
         "trade": ["trade", path],
         "simulate": ["simulate", "--scene", scene, "--json", "--against", path],
         "compare": ["compare", path, path, "--scene", scene, "--json"],
@@ -62,7 +61,7 @@ def test_what_is_made_of_it_is_never_blessed(cli: Cli, edited: Path, tmp_path: P
     """A run file made of it has valid digests and says that it comes from one without, down the generations."""
     first, second = tmp_path / "first.h5", tmp_path / "second.h5"
     assert cli("convert", edited, first, "--unverified").code == 0
-    assert cli("replay", first, "--speed", "max", "-o", second).code == 0
+    assert cli("convert", first, second).code == 0
     for path in (first, second):
         done = cli("analyse", "--json", "--strict", path)
         assert done.code == 5

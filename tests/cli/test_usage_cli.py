@@ -6,15 +6,12 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 
 import springmass
 from springmass.commands import COMMANDS
-
-Cli = Callable[..., Any]
+from tests.cli.conftest import Cli
 
 
 def test_every_command_explains_itself(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:

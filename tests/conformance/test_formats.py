@@ -123,7 +123,7 @@ def logger_pro(t: Any, x: Any) -> bytes:
 
 
 def phyphox(t: Any, x: Any, mark: str = ",", newline: str = "\n") -> bytes:
-    """Write a phyphox export."""
+    """Write a phyphox export: the digits of a float, whose step changes with the distance."""
     body = rows(t, x, f"{{t:.9E}}{mark}{{x:.9E}}")
     return newline.join([f'"Time (s)"{mark}"Distance (m)"', *body]).replace("E-0", "E-").replace("E+0", "E").encode()
 
@@ -359,12 +359,12 @@ CASES = [
     Case("datastudio", "second-block", datastudio, options={"run": "Run #1"}),
     Case("vernier", "format-2", vernier),
     Case("logger-pro", "latest", logger_pro, options={"run": "run 1"}),
-    Case("phyphox", "comma", phyphox),
-    Case("phyphox", "tab-CRLF", lambda t, x: phyphox(t, x, "\t", "\r\n")),
+    Case("table", "phyphox", phyphox, None),
+    Case("table", "phyphox-tab-CRLF", lambda t, x: phyphox(t, x, "\t", "\r\n"), None),
     Case("phyphox", "XML", phyphox_xml, None, text=False),
-    Case("tracker", "masa", tracker, options={"channel": "y", "unit": "m"}),
+    Case("table", "tracker", tracker, options={"channel": "y", "unit": "m"}),
     Case("workbook", "xlsx", xlsx, text=False),
-    Case("zip", "phyphox", phyphox_zip, text=False),
+    Case("zip", "phyphox", phyphox_zip, None, text=False),
     Case("logger-pro", "cmbl", cmbl, None, options={"run": "run 1"}, text=False),
     Case("logger-pro", "gambl", gambl, None, options={"run": "run 1"}, text=False),
     Case("tracker", "trk", trk, None, options={"channel": "y"}, text=False),
@@ -391,9 +391,7 @@ SAMPLED = [
 @pytest.mark.parametrize("case", SAMPLED)
 def test_it_keeps_the_rules_for_formats(case: Case) -> None:
     """What its writer wrote is read, and every fault of a file is flagged, counted or refused in one line."""
-    # phyphox prints the digits of a float, whose step changes with the distance.
-    quantum_m = None if case.format == "phyphox" else case.quantum_m
-    check(get_format(case.format), File(case.build, case.options, quantum_m, case.offset_known, case.text))
+    check(get_format(case.format), File(case.build, case.options, case.quantum_m, case.offset_known, case.text))
 
 
 def test_every_format_of_the_registry_has_a_case() -> None:

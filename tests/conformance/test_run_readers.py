@@ -9,9 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition.block import Block, Flag
+from acquisition.block import Block, Flag, SourceInfo
 from acquisition.recordings.recording import Original, Trap
-from acquisition.source import SourceInfo
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
 from tests.sampling import sampled

@@ -8,11 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from acquisition.block import Block, Flag, concatenate
+from acquisition.block import Block, Flag, Source, SourceInfo, concatenate
 from acquisition.clock import Clock, VirtualClock
 from acquisition.replay import Replay
 from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
-from acquisition.source import Source, SourceInfo
 
 SECONDS = 120
 RATE_HZ = 100.0

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, get_integrator, halving, solve_ivp
+from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, get_integrator, halving, methods
 from pipeline.dynamics.halving import auto, halved, solved_once
 from pipeline.errors import DynamicsError
 
@@ -62,7 +62,7 @@ def test_every_number_is_answered_by_a_number_or_one_line(seed: int, monkeypatch
     """From 1e-12 to 1e12, and extremes to refuse: warnings are errors, so are overflows and NaN."""
     # What would take minutes gives up after moments, by the same way.
     monkeypatch.setattr(halving, "MOST_STEPS", 50_000)
-    monkeypatch.setattr(solve_ivp, "MOST_CALLS", 5_000)
+    monkeypatch.setattr(methods, "MOST_CALLS", 5_000)
     rng = np.random.default_rng((61, seed))
     for _ in range(PROBLEMS):
         given: dict[str, Any] = coefficients(rng)
@@ -113,7 +113,7 @@ def chosen_for(problem: Problem, step: float, tolerance: float) -> None:
 
 def test_a_run_that_would_not_end_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """A number of calls is the end of an adaptive method, and its line says what to take instead."""
-    monkeypatch.setattr(solve_ivp, "MOST_CALLS", 5_000)
+    monkeypatch.setattr(methods, "MOST_CALLS", 5_000)
     problem = Problem(Equation.from_laws(8.66, beta_per_m_s=0.235), 0.05)
     with pytest.raises(DynamicsError, match=r"dop853 .*take .*strang or auto"):
         get_integrator("dop853").run(problem, 1.0, 10_000)

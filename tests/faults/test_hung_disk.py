@@ -21,7 +21,7 @@ from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import QUEUE_BYTES, Recorder
 from storage.run_file.reading import open_run
-from storage.wire_log.log_file import LogFile, open_log_file
+from storage.wire_log.appending import LogFile, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.sampling import sampled

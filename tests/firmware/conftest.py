@@ -112,7 +112,8 @@ class Emulated:
             arrived = -(-self.true_ns(cycle) // 1_000_000) * 1_000_000 + int(late)
             stamp = max(stamp, arrived)  # a read that waits holds up those behind it
             reads.append((stamp, line))
-        chain.take_all(reads)
+        for host_ns, data in reads:
+            chain.take(host_ns, data)
         return chain, chain.block()
 
 

@@ -12,9 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from acquisition.block import Block, concatenate
+from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.recordings.recording import Original, Trap
-from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunDamaged
 from storage.run_file.reading import Run, open_run
 from storage.run_file.writing import write_run
@@ -112,15 +111,14 @@ def test_everything_comes_back_bit_for_bit(
             assert bits(run.samples()) == whole
             if len(run):
                 assert bits(concatenate(run.blocks(size))) == whole
-            assert (run.info, run.title, run.scene, run.provenance) == (info, title, scene, provenance)
+            assert (run.info, run.header.title, run.header.scene, run.provenance) == (info, title, scene, provenance)
             assert (run.traps, run.originals()) == (tuple(seen), tuple(files))
             run.verify()
 
 
 def everything(run: Run) -> tuple[Any, ...]:
     """Return all that a run says."""
-    described = (run.info, run.title, run.channel, run.format, run.scene, run.traps, run.provenance)
-    return *described, run.malformed_rows, bits(run.samples()), run.originals()
+    return run.header, run.traps, bits(run.samples()), run.originals()
 
 
 @pytest.fixture(scope="module")

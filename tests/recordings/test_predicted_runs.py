@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pipeline.analyse import Analysis, Oscillation, analyse
-from pipeline.bench.derived_drag import derive_drag
+from pipeline.bench.disc import derive_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics.band import spread
 from pipeline.numerics.estimate import Estimate

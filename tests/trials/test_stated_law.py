@@ -1,17 +1,15 @@
 """The damping rate by a stated law is as certain as any estimate of that law can be, and its intervals cover the truth.
 
-``python -m tests.trials.test_stated_law --seeds 300 --jobs 2`` prints the table of docs/explanation/accuracy.md, with
-the law stated and without. The recordings are decaying cosines of ``test_law_coverage``, whose amplitude is integrated
-step by step; no code of the estimators is in them, nor in the bound.
+``SPRINGMASS_TRIALS=60 pytest -m trials -s tests/trials/test_stated_law.py`` prints the table of
+docs/explanation/accuracy.md, with the law stated and without. The recordings are decaying cosines of
+``test_law_coverage``, whose amplitude is integrated step by step; no code of the estimators is in them, nor in the
+bound.
 """
 
 from __future__ import annotations
 
-import argparse
-import itertools
 import math
 import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -94,9 +92,8 @@ class Cell:
         return f"| {self.law}, {how} | {self.seconds:g} s, {self.noise_m * 1e3:g} mm | {numbers} |"
 
 
-def one_record(job: tuple[str, bool, float, float, int]) -> tuple[float, float, bool]:
+def one_record(law: str, stated: bool, seconds: float, noise_m: float, seed: int) -> tuple[float, float, bool]:
     """Return error and u of the damping rate of one recording, and whether a warning contradicts the law."""
-    law, stated, seconds, noise_m, seed = job
     rng = np.random.default_rng([seed, 44, *law.encode()])
     size = amplitudes(law, seconds)
     t = np.arange(size.size) / RATE_HZ
@@ -113,26 +110,25 @@ def one_record(job: tuple[str, bool, float, float, int]) -> tuple[float, float, 
     return analysis.estimates["damping_rate"].value - rate_of(AMPLITUDE_M, DRAGS[law]), u, against
 
 
-def measured(
-    law: str, seconds: float, noise_m: float, trials: int, *, stated: bool, map_: Any = map, first: int = 0
-) -> Cell:
-    """Return one cell."""
-    jobs = [(law, stated, seconds, noise_m, seed) for seed in range(first, first + trials)]
-    errors, u, against = zip(*map_(one_record, jobs), strict=True)
+def measured(law: str, stated: bool, seconds: float, noise_m: float) -> Cell:
+    """Return one cell, of recordings by which no constant of the program was chosen."""
+    found = [one_record(law, stated, seconds, noise_m, seed) for seed in range(5000, 5000 + TRIALS)]
+    errors, u, against = zip(*found, strict=True)
     return Cell(law, stated, seconds, noise_m, np.array(errors), np.array(u), sum(against))
 
 
 @pytest.mark.parametrize("noise_m", NOISES_M)
 @pytest.mark.parametrize("seconds", SECONDS)
 @pytest.mark.parametrize("law", LAWS)
-def test_a_stated_law_gives_the_rate_to_its_bound(law: str, seconds: float, noise_m: float) -> None:
-    """u is at most 1.1 of the bound, 95 % intervals cover in 93 % and more, and hardly a recording is charged."""
-    cell = measured(law, seconds, noise_m, TRIALS, stated=True)
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_stated_law_gives_the_rate_to_its_bound(stated: bool, law: str, seconds: float, noise_m: float) -> None:
+    """95 % intervals cover in 93 % and more; by a stated law u is at most 1.1 of the bound, and few are charged."""
+    cell = measured(law, stated, seconds, noise_m)
     print(cell.row())
     doubt = 3.3 * math.sqrt(LEAST_95 * (1.0 - LEAST_95) / TRIALS)
     assert cell.covered >= LEAST_95 - doubt, cell.row()
     # The median of u scatters by what the noise of so many recordings does; more recordings leave less room.
-    assert cell.width <= MOST_WIDTH * (1.0 + 0.3 / math.sqrt(TRIALS)), cell.row()
+    assert not stated or cell.width <= MOST_WIDTH * (1.0 + 0.3 / math.sqrt(TRIALS)), cell.row()
     assert cell.contradicted <= 0.01 * TRIALS + 3.3 * math.sqrt(0.01 * TRIALS), cell.row()
 
 
@@ -144,24 +140,3 @@ def test_the_bound_of_an_exponential_is_its_textbook_one() -> None:
     weight = 0.5 * (AMPLITUDE_M * np.exp(-rate * t) / noise_m) ** 2
     spread = np.sum(weight * (t - np.average(t, weights=weight)) ** 2)
     assert bound("linear", seconds, noise_m) == pytest.approx(spread**-0.5, rel=2e-3)
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--seeds", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0, help="seed to begin with")
-    parser.add_argument("--jobs", type=int, default=1)
-    options = parser.parse_args()
-    with ProcessPoolExecutor(options.jobs) as pool:
-
-        def in_processes(work: Any, jobs: list[Any]) -> Any:
-            return pool.map(work, jobs, chunksize=10)
-
-        for stated, law, seconds, noise_m in itertools.product((True, False), LAWS, SECONDS, NOISES_M):
-            cell = measured(law, seconds, noise_m, options.seeds, stated=stated, map_=in_processes, first=options.first)
-            print(cell.row(), flush=True)
-
-
-if __name__ == "__main__":
-    main()

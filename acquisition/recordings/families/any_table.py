@@ -149,9 +149,9 @@ def _formula(table: Layout) -> Formula | None:
 
 def without_monitor(text: Text) -> Text:
     """Return a text in which the clock times that a serial monitor writes before each line are the first column."""
-    if not _MONITOR.search(decode(text.data[text.start : min(text.start + (1 << 16), text.stop)])):
+    if not _MONITOR.search(decode(text.data[: 1 << 16])):
         return text
-    lines = decode(text.data[text.start : text.stop]).replace("\r\n", "\n").replace("\r", "\n")
+    lines = decode(text.data)
     found = len(_MONITOR.findall(lines))
     if found < max(_FEWEST, _SHARE * len(re.findall(r"^.*\S", lines, re.MULTILINE))):
         return text
@@ -167,21 +167,20 @@ def prepared(text: Text) -> Text:
     A sketch may print the time on one line and the values on the next. The line numbers stay as they are.
     """
     text = without_monitor(text)
-    head = [line.text for line in text.head(_HEAD)]
+    head = text.head(_HEAD)
     mark = next((mark for mark in "\t;," if any(mark in line for line in head)), " ")
     widths = [_width(line, mark) for line in head]
     first = in_turn(widths)
     if first is None:
         return text
-    lines = decode(text.data[text.start : text.stop]).splitlines()
+    lines = text.lines()
     joined, at = lines[:first], first
     while at < len(lines):
         pair = lines[at : at + 2]
         whole = [_width(line, mark) for line in pair] == widths[first : first + 2]
         joined += [mark.join(line.strip() for line in pair), ""] if whole else pair[:1]
         at += 2 if whole else 1
-    ended = text.data[text.stop - 1 : text.stop] in (b"\n", b"\r")
-    return Text.of("\n".join([*joined, ""] if ended else joined).encode())
+    return Text.of("\n".join([*joined, ""] if text.ended else joined).encode())
 
 
 def _width(line: str, mark: str) -> int:

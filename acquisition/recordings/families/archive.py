@@ -15,8 +15,7 @@ from functools import partial
 from pathlib import PurePosixPath
 
 from acquisition.errors import FormatError
-from acquisition.recordings.foreign import foreign_format
-from acquisition.recordings.identify import formats
+from acquisition.recordings.identify import foreign_format, formats
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.table import Table

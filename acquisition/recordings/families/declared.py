@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from acquisition.errors import AcquisitionError
-from acquisition.recordings.base import dialect_folder
+from acquisition.recordings.identify import dialect_folder
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading

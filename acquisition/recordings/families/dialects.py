@@ -1,4 +1,4 @@
-"""Families of text that are known by the lines above their rows: PASCO, Vernier, phyphox and Tracker.
+"""Families of text that are known by the lines above their rows: PASCO and Vernier.
 
 What is easy to get wrong:
 
@@ -11,29 +11,18 @@ What is easy to get wrong:
   from small programs, only long names and units, or headings with units in brackets. Further data sets follow, each
   with its name and headings.
 - Logger Pro: runs are side by side under ``Latest: Position (m)`` or ``Data Set 1:Time(s)``.
-- phyphox: the phone measures the times, so their steps vary, and each sensor may have a separate column of times.
-- Tracker: an optional line ``mass A``, in the user's language, above ``t x y``. Lengths have the unit of the
-  calibration stick, so the user must state it.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import islice
 
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import text_format
-from acquisition.recordings.tables.headings import (
-    Heading,
-    headings_of,
-    is_time,
-    name_and_unit,
-    split_heading,
-    words,
-)
+from acquisition.recordings.tables.headings import Heading, headings_of, is_time, name_and_unit, split_heading, words
 from acquisition.recordings.tables.table import Header
-from acquisition.recordings.tables.text import Line, Text
+from acquisition.recordings.tables.text import Text
 
 _CAPSTONE = re.compile(r"(?P<quantity>.*\S)\s+(?P<run>\S+ #\s?\d+|Run \d+)")
 _QUANTITIES = words(
@@ -41,10 +30,8 @@ _QUANTITIES = words(
     "vitesse accélération posición velocidad aceleración 位置 速度 加速度"
 )
 _DATASTUDIO = re.compile(r"(?P<name>[^\t;]+), (?P<run>\S+ #\s?\d+)\s*")
-_DATASTUDIO_LINE = re.compile(rb"[\r\n]([^\t;\r\n]+, [^\s]+ #[ \t]?\d+[ \t]*)(?=[\r\n])")
+_DATASTUDIO_LINE = re.compile(rb"\n([^\t;\n]+, [^\s]+ #[ \t]?\d+[ \t]*)(?=\n)")
 _LOGGER_PRO = re.compile(r"(?P<run>[^:]+):\s*(?P<quantity>.+)")
-_QUOTED = re.compile(r'\s*(?:"[^"]*"[,;\t]?)+\s*')
-_COORDINATES = frozenset(("x", "y", "r"))
 _VERNIER = "Vernier Format 2"
 _MOST_HEADINGS, _MOST_LINES = 3, 40
 
@@ -78,15 +65,13 @@ def datastudio(lines: Sequence[str]) -> Header | None:
     return Header(f'line 1 is the run, "{name}", line 2 the headings with units', 2, mark, headings, title=name)
 
 
-def _datastudio_runs(text: Text, first: Header) -> Iterator[tuple[Line, Header]]:
+def _datastudio_runs(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
     """Yield the two lines above each further run."""
     del first
-    counted, number = text.start, 1
-    for match in _DATASTUDIO_LINE.finditer(text.data, text.start, text.stop):
-        number += text.line_ends(counted, counted := match.start(1))
-        header = datastudio([line.text for line in islice(text.lines(counted), 2)])
-        if header is not None:
-            yield Line(number, counted, counted, ""), header
+    for match in _DATASTUDIO_LINE.finditer(text.data):
+        begin = text.at(match.start(1))
+        if (header := datastudio(text.lines(begin, 2))) is not None:
+            yield begin, header
 
 
 def logger_pro(lines: Sequence[str]) -> Header | None:
@@ -99,41 +84,6 @@ def logger_pro(lines: Sequence[str]) -> Header | None:
     if not any(is_time(each.name) for each in headings) and not all(each.unit for each in headings):
         return None
     return Header(f'headings in line 1 begin with a run, "{headings[0].run}: "', 1, mark, headings)
-
-
-def phyphox(lines: Sequence[str]) -> Header | None:
-    """Read quoted headings, the first of which is a time with its unit."""
-    if not _QUOTED.fullmatch(lines[0]):
-        return None
-    cells, mark = split_heading(lines[0])
-    headings = headings_of(cells)
-    if len(headings) < 2 or not is_time(headings[0].name) or not headings[0].unit:
-        return None
-    begin = f'"{headings[0].name} ({headings[0].unit})"'
-    return Header(f"line 1 is quoted headings that begin with {begin}", 1, mark, headings)
-
-
-def tracker(lines: Sequence[str]) -> Header | None:
-    """Read the line of headings, which is line 1, or line 2 below the name of the mass."""
-    for at, line in enumerate(lines[:2]):
-        cells, mark = _tracker_cells(line)
-        headings = headings_of(cells)
-        names = [each.name for each in headings]
-        if len(names) < 2 or names[0] != "t" or not _COORDINATES & set(names):
-            continue
-        above = [cell for cell in _tracker_cells(lines[0])[0] if cell] if at else []
-        row = lines[at + 1] if len(lines) > at + 1 else ""
-        first = [cell for cell in row.split(mark or None) if cell.strip()][:1]
-        if len(above) > 2 or not first or parse_number(first[0].strip()) is None:
-            return None
-        mass = " ".join(above)
-        why = f'line {at + 1} is "{" ".join(cells)}"' + (f' below "{mass}"' if at else "")
-        return Header(why, at + 1, mark, headings, title=mass)
-    return None
-
-
-def _tracker_cells(line: str) -> tuple[list[str], str]:
-    return split_heading(line) if any(mark in line for mark in "\t;,") else (line.split(), "")
 
 
 def vernier(lines: Sequence[str]) -> Header | None:
@@ -177,25 +127,23 @@ def _vernier_headings(lines: Sequence[str]) -> list[Heading]:
     return [Heading(name, unit) for name, unit in zip(names, units, strict=False)]
 
 
-def _vernier_sets(text: Text, first: Header) -> Iterator[tuple[Line, Header]]:
+def _vernier_sets(text: Text, first: Header) -> Iterator[tuple[int, Header]]:
     """Yield further data sets: each repeats the line of long names, below its own name or below all lines of a file."""
-    lines = text.head(first.lines + 1)
-    names = [line for line in lines[2 : first.lines] if line.text.strip()]
-    if not names or len(lines) <= first.lines:
+    names = [at for at in range(2, min(first.lines, len(text))) if text.line(at).strip()]
+    if not names:
         return
     long_names = names[1 if first.run and len(names) > 1 else 0]
-    needle = b"\n" + text.data[long_names.start : long_names.next].rstrip(b"\r\n")
-    rows, counted, number = lines[first.lines].start, lines[first.lines].start, lines[first.lines].number
-    while (again := text.data.find(needle, rows, text.stop)) >= 0:
+    needle = b"\n" + text.data[text.starts[long_names] : text.starts[long_names + 1]].rstrip(b"\n")
+    rows = first.lines
+    while (again := text.find(needle, rows)) is not None:
         begin = text.words_above(rows, again + 1)
-        number += text.line_ends(counted, counted := begin)
-        head = [line.text for line in text.head(_MOST_LINES, begin, number)]
+        head = text.head(_MOST_LINES, begin)
         skip = next((at + 2 for at, line in enumerate(head[:_MOST_HEADINGS]) if line.startswith(_VERNIER)), 0)
         below = _data_set(head[skip:])
         if begin <= rows or below is None:
             return
-        yield Line(number, begin, begin, ""), Header(first.why, skip + below[1], "\t", below[2], run=below[0])
-        rows = again + len(needle)
+        yield begin, Header(first.why, skip + below[1], "\t", below[2], run=below[0])
+        rows = again + 1
 
 
 _TITLE = "PASCO Capstone CSV: runs side by side, any decimal mark"
@@ -208,9 +156,5 @@ DATASTUDIO = text_format(
     blocks=_datastudio_runs,
 )
 VERNIER = text_format(
-    "vernier",
-    "Vernier Format 2 text of Logger Pro",
-    vernier,
-    expected=f'"{_VERNIER}" in line 1',
-    blocks=_vernier_sets,
+    "vernier", "Vernier Format 2 text of Logger Pro", vernier, expected=f'"{_VERNIER}" in line 1', blocks=_vernier_sets
 )

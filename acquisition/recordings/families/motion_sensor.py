@@ -21,10 +21,9 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.base import Survey
-from acquisition.recordings.recording import Original, Recording, Trap
-from acquisition.recordings.sampling.nominal import median, time_flags
-from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS
+from acquisition.recordings.recording import Original, Recording, Survey, Trap
+from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS, time_flags
+from acquisition.recordings.sampling.timing import median
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
 from acquisition.recordings.tables.channel import Samples, check_values, read_channel
 from acquisition.recordings.tables.choose import Answers
@@ -248,30 +247,17 @@ def _integrate(velocity: F8, index: I8, rate_hz: float) -> tuple[F8, B1]:
     return position, bridged
 
 
-def _outer_join(left: I8, right: I8, regular: B1 | None = None) -> tuple[I8, I8]:
+def _outer_join(left: I8, right: I8, regular: B1) -> tuple[I8, I8]:
     """Pair the rows of two recordings by their sample numbers.
 
-    If a number repeats, its n-th row on the left pairs with its n-th row on the right. ``regular`` marks the rows of
-    ``left`` whose numbers are in order. Return the row of each joined sample in ``left`` and in ``right``, -1 if there
-    is none. Rows of ``left`` keep their order, and rows that exist only in ``right`` are inserted according to their
-    numbers.
+    ``regular`` marks the rows of ``left`` whose numbers are in order. Return the row of each joined sample in ``left``
+    and in ``right``, -1 if there is none. Rows of ``left`` keep their order, and rows that exist only in ``right`` are
+    inserted according to their numbers.
     """
-    rows_of = {key: row for row, key in enumerate(_with_turn(right))}
-    partner = np.array([rows_of.pop(key, -1) for key in _with_turn(left)], np.int64)
-    alone = np.array(sorted(rows_of.values()), np.int64)
-    standing = left if regular is None else np.where(regular, left, np.iinfo(np.int64).min)
+    order = np.argsort(right, kind="stable")
+    found = order[np.minimum(np.searchsorted(right[order], left), right.size - 1)]
+    partner = np.where(right[found] == left, found, -1)
+    alone = np.setdiff1d(np.arange(right.size), partner)
+    standing = np.where(regular, left, np.iinfo(np.int64).min)
     where = np.searchsorted(np.maximum.accumulate(standing), right[alone], side="right")
-    from_left = np.insert(np.arange(left.size), where, -1)
-    from_right = np.insert(partner, where, alone)
-    return from_left, from_right
-
-
-def _with_turn(numbers: I8) -> list[tuple[int, int]]:
-    if np.all(np.diff(numbers) > 0):
-        return [(number, 0) for number in numbers.tolist()]
-    seen: dict[int, int] = {}
-    keys = []
-    for number in numbers.tolist():
-        keys.append((number, seen.get(number, 0)))
-        seen[number] = seen.get(number, 0) + 1
-    return keys
+    return np.insert(np.arange(left.size), where, -1), np.insert(partner, where, alone)

@@ -19,7 +19,7 @@ import io
 import math
 import re
 import tarfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -28,7 +28,7 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError
-from acquisition.recordings.families.dialects import logger_pro, phyphox, tracker
+from acquisition.recordings.families.dialects import logger_pro
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading, Role, is_time, name_and_unit, numbered_apart
@@ -95,7 +95,7 @@ def _phyphox_evidence(head: bytes) -> str:
 
 def _phyphox_tables(path: str, data: bytes) -> list[Table]:
     text = text_of(path, data)
-    root = _read_markup(path, text.data[text.start : text.stop], "save the experiment in phyphox again")
+    root = _read_markup(path, text.data, "save the experiment in phyphox again")
     buffers = {}
     for each in root.iter("container"):
         values = _numbers(cell for cell in each.get("init", "").split(",") if cell.strip())
@@ -172,7 +172,7 @@ def _cassy_tables(path: str, data: bytes) -> list[Table]:
     if not _begins(data[:HEAD_BYTES], _CASSY):
         return _cassy_text(path, text)
     columns = []
-    for each in _read_markup(path, text.data[text.start : text.stop], _CASSY_EXPORT).iter("channel"):
+    for each in _read_markup(path, text.data, _CASSY_EXPORT).iter("channel"):
         values = _numbers(value.text or "" for value in each.iter("value"))
         if values.size:
             described = ((each.findtext(tag) or "").strip() for tag in ("quantity", "symbol", "unit"))
@@ -194,18 +194,17 @@ _COMPUTED = re.compile(r"10( -?\d+){3}")
 def _cassy_text(path: str, text: Text) -> list[Table]:
     lines = text.head(_MOST_HEAD_LINES)
     for at, line in enumerate(lines[:-1]):
-        size = re.fullmatch(r"(\d+) (\d+)", line.text.strip())
-        row = lines[at + 1].text.rstrip("\t").split("\t")
+        size = re.fullmatch(r"(\d+) (\d+)", line.strip())
+        row = lines[at + 1].rstrip("\t").split("\t")
         if size and len(row) == int(size[1]) > 1 and all(parse_number(cell) is not None for cell in row if cell):
             break
     else:
         raise FormatError(path, "expected the numbers of columns and rows, and the rows below", _CASSY_EXPORT)
-    headings, first = _described(path, [each.text for each in lines[:at]], len(row)), lines[at + 1]
     # Settings follow the rows and contain no tabs; if their first line has no end, it is an incomplete row.
-    tab = text.data.rfind(b"\t", first.start, text.stop)
-    end = next((line.next for line in text.lines(tab)), text.stop)
-    stop = end if b"\n" in text.data[end : text.stop] else text.stop
-    return side_by_side(replace(read_rows(path, text, first, "\t", stop=stop), ragged=True), headings)
+    tab = text.at(text.data.rfind(b"\t"))
+    stop = tab + 1 if tab + 2 < len(text) or text.ended else len(text)
+    table = read_rows(path, text, at + 1, "\t", stop=stop)
+    return side_by_side(replace(table, ragged=True), _described(path, lines[:at], len(row)))
 
 
 def _described(path: str, above: Sequence[str], width: int) -> list[Heading]:
@@ -309,23 +308,12 @@ def _world(frame: int, pixel: Sequence[float], systems: Sequence[tuple[int, Sequ
 
 
 _TITLE = "Logger Pro, Graphical Analysis: CSV, or saved as cmbl or gambl"
-_LOGGER_PRO_TEXT = text_format("logger-pro", _TITLE, logger_pro, expected='headings like "Latest: Position (m)"')
-_PHYPHOX_TEXT = text_format("phyphox", "phyphox export as CSV, or saved state as XML", phyphox)
-_TRACKER_TEXT = text_format("tracker", "Tracker: table t x y of a mass on video, or saved as trk (XML)", tracker)
-
-
-def _or_text(
-    text: ColumnFormat, evidence: Callable[[bytes], str], tables: Callable[[str, bytes], Sequence[Table]]
-) -> ColumnFormat:
-    """Return a format of text whose program also saves files with other evidence and tables."""
-    return replace(
-        text,
-        evidence=lambda head: evidence(head) or text.evidence(head),
-        tables=lambda path, data: (tables if evidence(data[:HEAD_BYTES]) else text.tables)(path, data),
-    )
-
-
-LOGGER_PRO = _or_text(_LOGGER_PRO_TEXT, _vernier_evidence, _vernier_tables)
-PHYPHOX = _or_text(_PHYPHOX_TEXT, _phyphox_evidence, _phyphox_tables)
-TRACKER = _or_text(_TRACKER_TEXT, _tracker_evidence, _tracker_tables)
+_TEXT = text_format("logger-pro", _TITLE, logger_pro, expected='headings like "Latest: Position (m)"')
+LOGGER_PRO = replace(
+    _TEXT,
+    evidence=lambda head: _vernier_evidence(head) or _TEXT.evidence(head),
+    tables=lambda path, data: (_vernier_tables if _vernier_evidence(data[:HEAD_BYTES]) else _TEXT.tables)(path, data),
+)
+PHYPHOX = ColumnFormat("phyphox", "phyphox: saved state as XML", _phyphox_evidence, _phyphox_tables)
+TRACKER = ColumnFormat("tracker", "Tracker: saved as trk (XML)", _tracker_evidence, _tracker_tables)
 CASSY = ColumnFormat("cassy", "CASSY Lab: saved as labx (XML) or lab (text)", _cassy_evidence, _cassy_tables)

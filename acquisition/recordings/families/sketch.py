@@ -20,7 +20,7 @@ from acquisition.recordings.tables.headings import Heading, is_time
 from acquisition.recordings.tables.layout import runs_forward
 from acquisition.recordings.tables.rows import count_from_first
 from acquisition.recordings.tables.table import Column, Lines, Table, side_by_side
-from acquisition.recordings.tables.text import Line, Text, in_turn, is_text, text_of
+from acquisition.recordings.tables.text import Text, in_turn, is_text, text_of
 
 _FEWEST, _SHARE, _MOST, _HEAD = 3, 0.6, 40, 120
 _BRACKETS = re.compile(r"\s*[(\[]")  # as Python prints tuples and lists
@@ -29,9 +29,9 @@ Kind = tuple[tuple[tuple[str, ...], str], ...]
 """The words and units of the numbers of a line."""
 
 
-def _usual(of: list[Line]) -> tuple[bool, Kind] | None:
+def _usual(of: list[tuple[int, str]]) -> tuple[bool, Kind] | None:
     """Return whether commas are decimal commas, and the usual kind of line; None without words or units."""
-    lines = [line.text for line in of[: _MOST + 1][:-1]]  # the last may be cut
+    lines = [line for _, line in of[: _MOST + 1][:-1]]  # the last may be cut
     pairs = [match for line in lines if (match := re.search(r"(\d+),\d", line))]
     marks = Counter(has_decimal_comma(match.string) for match in pairs).most_common(1)
     # Nothing but a comma between two groups of digits: a clock before it counts.
@@ -43,14 +43,14 @@ def _usual(of: list[Line]) -> tuple[bool, Kind] | None:
     return (comma, kind) if worded and count >= max(_FEWEST, _SHARE * len(lines)) else None
 
 
-def _joined(lines: list[Line]) -> list[Line]:
-    """Return lines without blank ones; lines of two kinds in turn (the time, then the distance) are joined."""
-    lines = [line for line in lines if line.text.strip()]
-    first = in_turn([_kind(numbers(line.text)) for line in lines[:_MOST]])
+def _joined(lines: list[str]) -> list[tuple[int, str]]:
+    """Return lines with their numbers, but for blank ones; two kinds in turn (time, then distance) are joined."""
+    numbered = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    first = in_turn([_kind(numbers(line)) for _, line in numbered[:_MOST]])
     if first is None:
-        return lines
-    pairs = list(zip(lines[first::2], lines[first + 1 :: 2], strict=False))
-    return [a._replace(next=b.next, text=f"{a.text}\t{b.text}") for a, b in pairs]
+        return numbered
+    pairs = zip(numbered[first::2], numbered[first + 1 :: 2], strict=False)
+    return [(number, f"{line}\t{below}") for (number, line), (_, below) in pairs]
 
 
 def _kind(found: list[Number]) -> Kind:
@@ -64,15 +64,15 @@ def _evidence(head: bytes) -> str:
 
 def _tables(path: str, data: bytes) -> list[Table]:
     text = text_of(path, data)
-    joined = _joined(list(text.lines()))
+    joined = _joined(text.lines())
     usual = _usual(joined)
     if usual is None:
         raise FormatError(path, "expected lines with words and numbers", "export a table of times and positions")
     comma, kind = usual
-    lines = [(line, numbers(line.text, decimal_comma=comma)) for line in joined]
-    like = [_kind(found) == kind for _, found in lines]
+    lines = [(number, line, numbers(line, decimal_comma=comma)) for number, line in joined]
+    like = [_kind(found) == kind for _, _, found in lines]
     first, stop = like.index(True), len(like) - like[::-1].index(True)
-    rows = [(line.text, found if _kind(found) == kind else []) for line, found in lines[first:stop]]
+    rows = [(line, found if _kind(found) == kind else []) for _, line, found in lines[first:stop]]
     distance = find_distance(*rows[0])
     headings, columns = [], []
     for at, (words, unit) in enumerate(kind):
@@ -92,9 +92,8 @@ def _tables(path: str, data: bytes) -> list[Table]:
         columns.insert(0, Column("", "", *clock_times(stamps)[:2]))
         count_from_first(columns[0])
         headings.insert(0, Heading("Time", "s", role="time"))
-    numbered = np.array([line.number for line, _ in lines[first:stop]])
-    skipped = np.repeat(np.arange(1, len(rows)), np.diff(numbered) - 1)
-    where = Lines(int(numbered[0]), len(rows), skipped, np.zeros(len(rows), bool), zeros=text.zeros)
+    numbered = np.array([number for number, _, _ in lines[first:stop]])
+    where = Lines(numbered, np.zeros(len(rows), bool), zeros=text.zeros)
     return side_by_side(Table(tuple(columns), lines=where), headings)
 
 

@@ -17,8 +17,7 @@ from functools import partial
 from acquisition.errors import FormatError
 from acquisition.recordings.families import workbook_child
 from acquisition.recordings.families.archive import tables_of_parts
-from acquisition.recordings.foreign import foreign_format
-from acquisition.recordings.identify import formats
+from acquisition.recordings.identify import foreign_format, formats
 from acquisition.recordings.tables.format import ColumnFormat, tables_of_text
 from acquisition.recordings.tables.rows import Sheet
 from acquisition.recordings.tables.table import Table
@@ -51,7 +50,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
     families = [each for each in formats() if isinstance(each, ColumnFormat) and each.header is not None]
 
     def reader(name: str, sheet: Sheet) -> Callable[[], list[Table]] | None:
-        lines = [line.text for line in sheet.head(_HEAD_LINES)]
+        lines = sheet.head(_HEAD_LINES)
         header = next((each.header for each in families if lines and each.header and each.header(lines)), None)
         return None if header is None else partial(tables_of_text, f"{path}, sheet {name}", sheet, header, "rows")
 

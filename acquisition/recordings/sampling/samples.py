@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
 from acquisition.block import B1, F8, I8, U8, Flag
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import median, place_unread, snap, time_flags
-from acquisition.recordings.sampling.timing import Rows, Timing
+from acquisition.recordings.sampling.timing import Grid, Rows, Timing, median, snap
 
 IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
@@ -21,6 +20,50 @@ _SAMPLE = 65536
 _FEWEST = 50  # minimum number of distances; with fewer, a common step may be accidental
 _ZEROS = 10
 _BACKWARD = "run backward or ahead of their neighbours"
+
+
+def place_unread(t: F8, unread: B1, grid: Grid | None) -> F8:
+    """Return the times of all rows; NaN for an unread row if nothing shows that it was a sample.
+
+    An unread row has a time if the unread rows exactly fill the grid between two others, or if its printed time (a NaN
+    if that was not read either) is the one that its row number predicts. Without a grid it must lie between the others.
+    """
+    out = np.where(unread, np.nan, t)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], unread.view(np.int8), [0]))))
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        own = t[start:stop]
+        before, after = t[start - 1] if start else -np.inf, t[stop] if stop < t.size else np.inf
+        if grid is None:
+            out[start:stop] = np.where(np.isfinite(after - before) & (before < own) & (own < after), own, np.nan)
+            continue
+        # As numbers of steps of the grid: the printed time, and what the rows above and below predict.
+        first, printed, last = ((each - grid.origin_s) * grid.rate_hz for each in (before, own, after))
+        above, below = first + 1 + np.arange(own.size), last - 1 - np.arange(own.size)[::-1]
+        fills = np.abs(above - below) < 0.5
+        alike = (np.abs(printed - above) < 0.5) | (np.abs(printed - below) < 0.5)
+        out[start:stop] = np.where(fills | alike, grid.time(np.rint(np.where(fills, above, printed))), np.nan)
+    return out
+
+
+def time_flags(t: F8, step: float) -> U8:
+    """Flag repeated times, backward times and gaps, given the nominal time between samples (s).
+
+    The times of samples with neither DUPLICATE_TIME nor NON_MONOTONIC_TIME increase strictly. If a single time is
+    ahead of its neighbours, only that time is flagged, and not all the times after it.
+    """
+    flags = np.zeros(t.size, np.uint8)
+    steps = np.diff(t)
+    if not steps.size or (steps.min() > 0 and steps.max() <= 1.5 * step):
+        return flags
+    spike = np.zeros(t.size, bool)
+    spike[:-1] = (t[:-1] > t[1:]) & (np.concatenate(([-np.inf], t[:-2])) < t[1:])
+    reached = np.maximum.accumulate(np.where(spike, -np.inf, t))
+    before = np.concatenate(([-np.inf], reached[:-1]))
+    flags[spike | (t < before)] |= Flag.NON_MONOTONIC_TIME.value
+    flags[~spike & (t == before)] |= Flag.DUPLICATE_TIME.value
+    ahead = ~spike & (t > before)
+    flags[ahead & np.isfinite(before) & (t - before > 1.5 * step)] |= Flag.GAP_BEFORE.value
+    return flags
 
 
 def place(rows: Rows, timing: Timing) -> F8:
@@ -59,18 +102,24 @@ def row_traps(rows: Rows, timed: B1, zeros: int) -> Iterator[Trap]:
     last = unread.size - 1
     if rows.cut:
         outcome = "its sample counts as missing" if timed[last] else "it was left out, because its time is unknown"
-        yield Trap("truncated_row", f"the last row is incomplete; {outcome}", 1, rows.line(last))
+        yield Trap("truncated_row", f"the last row is incomplete; {outcome}", 1, line_of(rows.lines, last))
     unread_rows = np.flatnonzero(unread[:-1] if rows.cut else unread)
     if unread_rows.size:
-        first = rows.line(int(unread_rows[0]))
+        first = line_of(rows.lines, int(unread_rows[0]))
         kept_rows = int(np.count_nonzero(timed[unread_rows]))
         rows_are = "1 row" if unread_rows.size == 1 else f"{unread_rows.size} rows"
-        message = f"{rows_are} could not be read, the first in line {first}; {kept_rows} kept as missing samples"
+        where = "" if first is None else f", the first in line {first}"
+        message = f"{rows_are} could not be read{where}; {kept_rows} kept as missing samples"
         yield Trap("malformed_rows", message, int(unread_rows.size), first)
 
 
-def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | None]) -> Iterator[Trap]:
-    """Report the flagged samples, grouped by flag; ``line`` returns the line number of a sample."""
+def line_of(lines: I8 | None, row: int) -> int | None:
+    """Return the number of the line in which a row stands; None in a binary file."""
+    return None if lines is None else int(lines[row])
+
+
+def sample_traps(flags: U8, t: F8, rate_hz: float, lines: I8 | None) -> Iterator[Trap]:
+    """Report the flagged samples, grouped by flag; ``lines`` are the line numbers of the samples."""
     if not flags.any():
         return
     kinds = (
@@ -81,18 +130,18 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, line: Callable[[int], int | N
     for code, flag, what in kinds:
         rows = np.flatnonzero(flags & flag.value)
         if rows.size:
-            yield Trap(code, f"{rows.size} {what}; kept and flagged", int(rows.size), line(int(rows[0])))
+            yield Trap(code, f"{rows.size} {what}; kept and flagged", int(rows.size), line_of(lines, int(rows[0])))
     gaps = np.flatnonzero(flags & Flag.GAP_BEFORE.value)
     if gaps.size:
         reached = np.maximum.accumulate(np.where(flags & IRREGULAR, -np.inf, t))
         lost = int(np.sum(np.rint((t[gaps] - reached[gaps - 1]) * rate_hz) - 1))
         gaps_are = "1 gap" if gaps.size == 1 else f"{gaps.size} gaps"
         message = f"about {lost} samples are missing in {gaps_are}; the sample after each is flagged"
-        yield Trap("missing_samples", message, lost, line(int(gaps[0])))
+        yield Trap("missing_samples", message, lost, line_of(lines, int(gaps[0])))
 
 
 def value_traps(
-    distance: F8, flags: U8, resolution: float, line: Callable[[int], int | None], *, length: bool = True
+    distance: F8, flags: U8, resolution: float, lines: I8 | None, *, length: bool
 ) -> tuple[float, tuple[Trap, ...]]:
     """Find zeros that fill the end, a lost target, and distances rounded more coarsely than printed.
 
@@ -106,14 +155,14 @@ def value_traps(
         distance[tail:] = np.nan
         flags[tail:] |= Flag.MISSING.value
         message = f"the last {count} distances are exactly 0, which no rangefinder reads; kept as missing samples"
-        traps.append(Trap("zero_filled_tail", message, count, line(tail)))
+        traps.append(Trap("zero_filled_tail", message, count, line_of(lines, tail)))
     far = _far(distance, resolution) if length else np.empty(0, np.int64)
     if far.size:
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
         distances = f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others"
         message = f"{distances}: the target was lost; kept and flagged"
-        traps.append(Trap("lost_target", message, int(far.size), line(int(far[0]))))
+        traps.append(Trap("lost_target", message, int(far.size), line_of(lines, int(far[0]))))
     quantum = _common_step(distance, resolution)
     if length and quantum >= _COARSE_M * (1 - 1e-9):
         message = f"distances are multiples of {quantum * 1e3:g} mm: smaller motion is lost by rounding"

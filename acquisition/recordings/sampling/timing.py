@@ -1,19 +1,108 @@
-"""Find the times of samples from printed times, a formula in the header or a given rate, and report on them."""
+"""Find the times of samples from printed times, a formula in the header or a given rate: rate, grid and faults."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.block import B1, F8, I8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import Grid, find_rate, median
+
+_USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
+_SHARE_ON_GRID = 0.5
+_PROBE = 2048
+
+
+class Grid(NamedTuple):
+    """Times ``origin_s + i / rate_hz`` for integer i."""
+
+    rate_hz: float
+    origin_s: float = 0.0
+
+    def nearest(self, t: F8) -> I8:
+        """Return the index i of the grid point nearest to each time."""
+        return np.rint((t - self.origin_s) * self.rate_hz).astype(np.int64)
+
+    def time(self, index: I8) -> F8:
+        """Return the time of each index i, s."""
+        return self.origin_s + index / self.rate_hz if self.origin_s else index / self.rate_hz
+
+
+def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[float, float, Grid | None, bool] | None:
+    """Infer the rate from printed times (s) with a last digit of ``resolution``; None without two different times.
+
+    Times may repeat, run backward or be missing. If the rate is known, only grids of this rate are tried. Return the
+    rate in Hz, the relative half-width of the range of rates that are compatible with the rounding of the times, and
+    the grid from which the times were rounded, or None if they fit no grid. The rate is certain if no grid with a rate
+    one hertz higher or lower fits equally well.
+    """
+    times = t if (t[1:] > t[:-1]).all() else np.unique(t[np.isfinite(t)])
+    if times.size < 2:
+        return None
+    step, relative_u = _mean_step(times, resolution)
+    rough = 1.0 / step
+    nice_step = round(step / resolution) * resolution
+    nice = [round(1.0 / nice_step, 9)] if nice_step > 0 else []
+    tried = [rate_hz] if rate_hz else [*_USUAL_RATES_HZ, round(rough), *nice, rough]
+    rates = dict.fromkeys(float(f) for f in tried if f and abs(f - rough) <= rough * relative_u * 1.5 + 1e-9)
+    probe = _probe(times)
+
+    def share(grid: Grid) -> float:
+        return float(np.mean(snap(probe, grid, resolution)[1]))
+
+    for origin in (0.0, float(times[0])):
+        shares = {grid: share(grid) for grid in (Grid(rate, origin) for rate in rates) if _every_point(times, grid)}
+        best = max(shares, key=lambda grid: shares[grid], default=None)
+        if best is not None and shares[best] > _SHARE_ON_GRID:
+            beside = (Grid(rate, origin) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
+            near = [grid for grid in beside if abs(grid.rate_hz - rough) <= 1.5 * rough * relative_u]
+            return best.rate_hz, relative_u, best, all(share(grid) < shares[best] for grid in near)
+    return rough, relative_u, None, False
+
+
+def median(values: NDArray[np.number]) -> float:
+    """Return the median of finite numbers; numpy's median imports numpy.ma, a tenth of the start-up time."""
+    half = values.size // 2
+    part = np.partition(values, half)
+    return float(part[half] if values.size % 2 else 0.5 * (part[:half].max() + part[half]))
+
+
+def _probe(apart: F8) -> F8:
+    """Return enough times to distinguish grids: all times of a short run, or both ends and a subset of a long run."""
+    if apart.size <= 4 * _PROBE:
+        return apart
+    return np.concatenate((apart[:_PROBE], apart[:: apart.size // _PROBE], apart[-_PROBE:]))
+
+
+def _every_point(apart: F8, grid: Grid) -> bool:
+    """Return whether consecutive times usually lie at consecutive grid points."""
+    return median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0
+
+
+def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
+    """Return the typical step of increasing times (s) and its relative half-width, refined over longer spans."""
+    every = max(1, apart.size // _PROBE)
+    step = max(median(apart[1::every] - apart[:-1:every]), resolution)
+    span, relative_u = 1, resolution / step
+    while (span := span * 4) < apart.size and relative_u > 1e-6:
+        lengths = apart[span::every] - apart[:-span:every]
+        steps = np.rint(lengths / step)
+        step = median(lengths / np.maximum(steps, 1))
+        relative_u = resolution / (span * step)
+    if apart.size > 2:  # use the whole length if the number of steps in it is certain
+        length = float(apart[-1] - apart[0])
+        steps_in_all = length / step
+        if steps_in_all * relative_u < 0.5 <= steps_in_all:
+            step, relative_u = length / round(steps_in_all), resolution / length
+    return step, relative_u
+
 
 _PLACEHOLDER_S = 1.0  # the step that LabVIEW writes if no rate was set
 _SHARE_OF_JITTER = 0.2
@@ -23,6 +112,16 @@ _SHORT_STEP = 0.25  # maximum step within a burst, relative to the mean step
 _CLEAR_STEPS = 0.95  # minimum share of steps that are clearly within a burst or between two bursts
 _REGULAR_INTERVALS = 0.9  # minimum share of intervals that differ from the median by less than half of it
 _SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; two rows may be two sensors
+
+
+def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, B1]:
+    """Replace each time by the nearest grid point if the two agree within the rounding of the printed time.
+
+    Return the times and a mask of those that agree.
+    """
+    exact = grid.time(grid.nearest(t))
+    agrees = np.abs(exact - t) <= resolution * 0.5001
+    return np.where(agrees, exact, t), agrees
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +138,16 @@ class Rows:
     """The rows of one channel, before they become samples; every array has one element for each row.
 
     ``printed`` are the times as printed, s, or None; ``value`` the values in SI, NaN if unread or absent. ``remark``
-    marks rows of text between samples, which are not samples. ``time_resolution`` (s) and ``resolution`` are the last
-    printed digits, the latter 0 for binary values. ``cut`` says that the last row is incomplete.
+    marks rows of text between samples, which are not samples. ``lines`` are line numbers; None in a binary file.
+    ``time_resolution`` (s) and ``resolution`` are the last printed digits, the latter 0 for binary values. ``cut`` says
+    that the last row is incomplete.
     """
 
     printed: F8 | None
     value: F8
     unread: B1
     remark: B1
-    line: Callable[[int], int]
+    lines: I8 | None
     time_resolution: float
     resolution: float
     cut: bool = False
@@ -105,21 +205,22 @@ def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None)
     """Infer the rate from the printed times (s) of valid rows; ask for it if they do not show it."""
     if (bursts := find_bursts(printed)) is not None:
         return _spread(path, bursts, resolution, rate_hz)
-    rate = find_rate(printed, resolution, rate_hz=rate_hz)
-    if rate is None:
+    found = find_rate(printed, resolution, rate_hz)
+    if found is None:
         if rate_hz is None:
             reason = f"expected different times, got {printed.size} rows at one time"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
         origin = float(printed[0]) if printed.size else 0.0
         return Timing(rate_hz, Grid(rate_hz, origin), resolution, certain=False, given=True)
-    steps = _jitter(printed) if rate.grid is None else None
+    rate, relative_u, grid, certain = found
+    steps = _jitter(printed) if grid is None else None
     if rate_hz is not None:
-        allowed = rate_hz * (1.5 * rate.relative_u + 1e-6 + (0.01 if steps else 0.0))
-        if abs(rate.rate_hz - rate_hz) > allowed:
-            problem = f"rate_hz must agree with the times, {rate.rate_hz:.6g} Hz, got {rate_hz:g}"
+        allowed = rate_hz * (1.5 * relative_u + 1e-6 + (0.01 if steps else 0.0))
+        if abs(rate - rate_hz) > allowed:
+            problem = f"rate_hz must agree with the times, {rate:.6g} Hz, got {rate_hz:g}"
             raise FormatError(path, problem, "leave the rate out or correct it")
-        return Timing(rate_hz, rate.grid, resolution, certain=True, given=True, steps_s=steps)
-    return Timing(rate.rate_hz, rate.grid, resolution, rate.certain, steps_s=steps)
+        return Timing(rate_hz, grid, resolution, certain=True, given=True, steps_s=steps)
+    return Timing(rate, grid, resolution, certain, steps_s=steps)
 
 
 def _spread(path: str, bursts: Bursts, resolution: float, rate_hz: float | None) -> Timing:

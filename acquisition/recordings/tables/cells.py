@@ -95,7 +95,7 @@ def split_page(page: bytes, delimiter: str, *, brackets: bool = False) -> list[l
 
     The delimiter is empty for runs of white space. With brackets, ``[``, ``]`` and ``;`` are blanks.
     """
-    page = page.translate(_DAMAGE).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    page = page.translate(_DAMAGE)
     if brackets:
         page = page.translate(bytes.maketrans(b"[];", b"   "))
     lines = page.split(b"\n")

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
 import numpy as np
 
-from acquisition.block import B1, F8, I8, U8, Block, Flag
+from acquisition.block import B1, F8, I8, U8, Block, ClockKind, Flag, Kind, SourceInfo
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Original, Recording, Trap
-from acquisition.recordings.sampling.samples import flags_of, place, row_traps, sample_traps, value_traps
+from acquisition.recordings.sampling.samples import flags_of, line_of, place, row_traps, sample_traps, value_traps
 from acquisition.recordings.sampling.timing import Rows, Timing, check_rate, clock_traps, find_timing
 from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
 from acquisition.recordings.tables.text import says_simulated
 from acquisition.recordings.units import TIMES, Measure, time_unit
-from acquisition.source import ClockKind, Kind, SourceInfo
 
 _LONGEST_S = 1e10
 """Times beyond three hundred years are no times."""
@@ -29,7 +28,7 @@ _HOUR_S, _DAY_S, _MOST_JUMPS, _SLOWEST_HZ = 3600.0, 86400.0, 10, 0.01
 class Samples:
     """The samples of a chosen channel in SI units, and the remarks on them and on the file.
 
-    ``resolution`` is the size of the last printed digit of a value. ``line`` returns the line number of a sample; None
+    ``resolution`` is the size of the last printed digit of a value. ``lines`` are the line numbers of the samples, None
     for a binary file. ``sound`` marks the rows of the table that could be read. ``quantum`` is the step of which all
     values are multiples, and ``error_m`` the usual error that the file states.
     """
@@ -44,7 +43,7 @@ class Samples:
     timing: Timing
     resolution: float
     traps: tuple[Trap, ...]
-    line: Callable[[int], int | None]
+    lines: I8 | None
     sound: B1
     quantum: float | None = None
     error_m: float | None = None
@@ -108,21 +107,20 @@ def read_samples(
     t, value = t[where], rows.value[where]
     if np.isnan(value).all():
         problem = f'expected numbers as "{column.name}", got NaN in all {value.size} rows'
-        raise FormatError(path, problem, "record the run again", line=rows.line(0) or None)
-
-    def line(row: int) -> int | None:
-        return rows.line(row if isinstance(where, slice) else int(where[row])) or None
-
+        raise FormatError(path, problem, "record the run again", line=line_of(rows.lines, 0))
+    lines = None if rows.lines is None else rows.lines[where]
     flags = flags_of(t, value, unread[where], timing.rate_hz)
     if difference and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
-    found += _jumps(t, timing.rate_hz, line)
+    found += _jumps(t, timing.rate_hz, lines)
     zeros = table.lines.zeros if table.lines else 0
-    found += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, line)]
-    return Samples(path, table, column, measured, t, value, flags, timing, rows.resolution, tuple(found), line, ~unread)
+    found += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, lines)]
+    return Samples(
+        path, table, column, measured, t, value, flags, timing, rows.resolution, tuple(found), lines, ~unread
+    )
 
 
-def _jumps(t: F8, rate_hz: float, line: Callable[[int], int | None]) -> list[Trap]:
+def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[Trap]:
     """Report where a clock was set forward: by full hours, as for summer time, or by more than a day."""
     traps: list[Trap] = []
     if rate_hz < _SLOWEST_HZ or float(t.max() - t.min()) < 0.5 * _HOUR_S:
@@ -131,16 +129,16 @@ def _jumps(t: F8, rate_hz: float, line: Callable[[int], int | None]) -> list[Tra
     for row in np.flatnonzero(steps > _HOUR_S - 2.0 / rate_hz)[:_MOST_JUMPS].tolist():
         step = float(steps[row])
         if step > _DAY_S or abs((step + 0.5 * _HOUR_S) % _HOUR_S - 0.5 * _HOUR_S) < 2.0 / rate_hz:
-            where = f"lines {line(row)} and {line(row + 1)}" if line(row) else f"samples {row + 1} and {row + 2}"
+            where = f"samples {row + 1} and {row + 2}" if lines is None else f"lines {lines[row]} and {lines[row + 1]}"
             perhaps = "for summer time" if round(step) == _HOUR_S else "during the recording"
             message = f"the times jump by {step:.0f} s between {where}: the clock was perhaps set {perhaps}"
-            traps.append(Trap("time_jump", message, 1, line(row + 1)))
+            traps.append(Trap("time_jump", message, 1, line_of(lines, row + 1)))
     return traps
 
 
 def check_values(samples: Samples, *, length: bool) -> Samples:
     """Return samples with their quantum and with what is peculiar in their values; see :func:`value_traps`."""
-    quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.line, length=length)
+    quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.lines, length=length)
     return replace(samples, quantum=quantum or None, traps=(*samples.traps, *found))
 
 
@@ -165,7 +163,7 @@ def _binary_rows(times: Column | None, column: Column, measured: Measure, second
         unread = ~np.isfinite(t)
     value[unread] = np.nan
     largest = 0.0 if t is None else float(np.fmax.reduce(np.abs(t), initial=0.0))
-    return Rows(t, value, unread, np.zeros(size, bool), lambda _: 0, max(float(np.spacing(largest)), 1e-12), 0.0)
+    return Rows(t, value, unread, np.zeros(size, bool), None, max(float(np.spacing(largest)), 1e-12), 0.0)
 
 
 def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: Measure, seconds: Measure) -> Rows:
@@ -184,7 +182,7 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
         present[int(filled[-1]) + 1 if filled.size else 0 :] = False
     keep = present | remark
     if not (keep & ~remark).any():
-        raise _no_numbers(path, column, 0, lines.first)
+        raise _no_numbers(path, column, 0, int(lines.numbers[0]) if lines.rows else None)
     chosen = _rows_in(keep)
     remark, unknown = remark[chosen], (unread | remark)[chosen]
     printed, time_digit = None, 0.0
@@ -200,17 +198,15 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
     resolution = last_digit(value, form, measured.power) * measured.factor
     value *= measured.factor
 
-    def line(row: int) -> int:
-        return lines.line(row if isinstance(chosen, slice) else int(chosen[row]))
-
+    numbers = lines.numbers[chosen]
     if unknown.all():
-        raise _no_numbers(path, column, unknown.size, line(0))
+        raise _no_numbers(path, column, unknown.size, int(numbers[0]))
     return Rows(
         printed=printed,
         value=value,
         unread=unknown,
         remark=remark,
-        line=line,
+        lines=numbers,
         time_resolution=time_digit,
         resolution=resolution,
         cut=lines.cut and bool(unknown[-1]) and bool(keep[-1]),
@@ -222,7 +218,7 @@ def _rows_in(mask: B1) -> I8 | slice:
     return slice(None) if mask.all() else np.flatnonzero(mask)
 
 
-def _no_numbers(path: str, column: Column, rows: int, line: int) -> FormatError:
+def _no_numbers(path: str, column: Column, rows: int, line: int | None) -> FormatError:
     problem = f'expected rows of numbers for "{column.name}", got none' + (f" in {rows} lines" if rows else "")
     remedy = "check that rows and headings belong together" if rows else "check that the export ended"
     return FormatError(path, problem, remedy, line=line)

@@ -10,10 +10,9 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.questions import Missing, MissingItem, Question, Times
+from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import median
-from acquisition.recordings.sampling.timing import rate_needed
+from acquisition.recordings.sampling.timing import median, rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
 from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
@@ -100,14 +99,11 @@ def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Chan
 
 def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple[Trap, ...]]:
     """Return the measure of a channel's values, and the assumptions made for it."""
-    stated = column.measure
-    given = None if unit is None else measure_of(unit)
-    if unit is not None and given is None:
-        raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
-    if given is None:
-        if stated is None:
-            raise NeedsAnswer(Question(path, (_unit_needed(column),), (column.label,)))
+    stated, given = column.measure, measure_of(unit or "")
+    if unit is None and stated is not None:
         return stated, ()
+    if given is None:
+        raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
     if stated == given:
         return given, ()
     if stated is not None and (stated.quantity in ("length", given.quantity)):
@@ -299,11 +295,12 @@ def _first_numbers(column: Column) -> F8:
     return head[np.isfinite(head)][:_FIRST_ROWS]
 
 
-def _range_of(times: Column | None) -> Times | str:
-    """Return the range of times, only their name if there are too few numbers, or an empty text without times."""
+def _range_of(times: Column | None) -> str:
+    """Return the name of the times, with their range if there are enough numbers; an empty text without times."""
     if times is None:
         return ""
+    name = f'"{times.name or "time"}"'
     first, known = _first_numbers(times), times.values[np.isfinite(times.values)]
     if first.size < 2:
-        return times.name or "time"
-    return Times(times.name or "time", float(first[0]), float(known[-1]), median(np.diff(first)))
+        return name
+    return f"{name} ({first[0]:.6g} to {known[-1]:.6g}, {median(np.diff(first)):.3g} apart)"

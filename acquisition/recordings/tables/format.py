@@ -9,13 +9,12 @@ from typing import Any
 
 from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.base import Survey
-from acquisition.recordings.recording import Recording, Trap
+from acquisition.recordings.recording import Recording, Survey, Trap
 from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.rows import Sheet, read_rows
 from acquisition.recordings.tables.table import Column, Header, Stated, Table, names_apart, set_back, side_by_side
-from acquisition.recordings.tables.text import Line, Text, head_lines, text_of
+from acquisition.recordings.tables.text import Text, head_lines, text_of
 from acquisition.recordings.units import NUMBER
 
 _HEAD_LINES = 300
@@ -91,7 +90,7 @@ def text_format(
     *,
     expected: str = "other lines above the rows",
     prepare: Callable[[Text], Text] | None = None,
-    blocks: Callable[[Text, Header], Iterator[tuple[Line, Header]]] | None = None,
+    blocks: Callable[[Text, Header], Iterator[tuple[int, Header]]] | None = None,
 ) -> ColumnFormat:
     """Return a format of text whose rows follow below some lines that identify it.
 
@@ -106,7 +105,7 @@ def text_format(
     prepare : callable, optional
         Takes the text and returns it without what precedes its rows.
     blocks : callable, optional
-        Takes the text and its first header; yields the first line and the header of each further run below.
+        Takes the text and its first header; yields the index of the first line and the header of each further run.
 
     Returns
     -------
@@ -116,7 +115,7 @@ def text_format(
     def evidence(head: bytes) -> str:
         lines = head_lines(head)
         if prepare is not None and lines != [""]:
-            lines = [line.text for line in prepare(Text.of(head)).head(_HEAD_LINES)]
+            lines = prepare(Text.of(head)).head(_HEAD_LINES)
         found = header(lines[:_HEAD_LINES])
         return found.why if found else ""
 
@@ -132,36 +131,32 @@ def tables_of_text(
     text: Text | Sheet,
     header: Callable[[Sequence[str]], Header | None],
     expected: str,
-    blocks: Callable[[Text, Header], Iterator[tuple[Line, Header]]] | None = None,
+    blocks: Callable[[Text, Header], Iterator[tuple[int, Header]]] | None = None,
 ) -> list[Table]:
     """Read a text or a sheet: its header, the rows below it, and further runs with their headers."""
     head = text.head(_HEAD_LINES)
-    found = header([line.text for line in head] or [""])
+    found = header(head or [""])
     if found is None or not head:
         raise FormatError(path, f"expected {expected}", "export the run again", line=1)
     if found.refused is not None:
         raise FormatError(path, *found.refused, line=found.lines + 1)
-    begins = [(head[0], found)]
+    begins = [(0, found)]
     if blocks is not None and isinstance(text, Text):
         begins += islice(blocks(text, found), _MOST_RUNS)
     if len(begins) > _MOST_RUNS:
         raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
     title, several = " / ".join([each.title for _, each in begins if each.title][:4]), len(begins) > 1
-    ends = [*(begin.start for begin, _ in begins[1:]), None]
+    ends = [*(begin for begin, _ in begins[1:]), None]
     tables: list[Table] = []
     for (begin, own), end in zip(begins, ends, strict=True):
         tables += _tables(path, text, begin, replace(own, title=title, run=own.run if several else ""), end)
     return tables
 
 
-def _tables(path: str, text: Text | Sheet, begin: Line, header: Header, stop: int | None) -> list[Table]:
+def _tables(path: str, text: Text | Sheet, begin: int, header: Header, stop: int | None) -> list[Table]:
     """Read the rows below a header that begins at a line."""
-    if isinstance(text, Sheet):
-        first = Line(begin.number + header.lines, 0, 0, "")
-    else:
-        end = Line(begin.number + header.lines, text.stop, text.stop, "")
-        first = next(islice(text.lines(begin.start, begin.number), header.lines, None), end)
-    read = read_rows(path, text, first, header.delimiter, stop=stop, clock=header.clock, brackets=header.brackets)
+    first, mark = begin + header.lines, header.delimiter
+    read = read_rows(path, text, first, mark, stop=stop, clock=header.clock, brackets=header.brackets)
     stated = {each.name: getattr(header, each.name) for each in fields(Stated)}
     common = replace(read, **{**stated, "traps": (*header.traps, *read.traps)})
     tables = side_by_side(common, header.headings, header.run)

@@ -11,13 +11,7 @@ import numpy as np
 
 from acquisition.block import F8
 from acquisition.recordings.tables.cells import CLOCK, parse_number
-from acquisition.recordings.tables.headings import (
-    Heading,
-    heading_of,
-    is_time,
-    is_uncertainty,
-    split_heading,
-)
+from acquisition.recordings.tables.headings import Heading, heading_of, is_time, is_uncertainty, split_heading
 from acquisition.recordings.units import measure_of, time_unit
 
 _MARKS = ("\t", ";", ",", "")
@@ -178,7 +172,7 @@ def _with_names(lines: Sequence[str], start: int, mark: str, brackets: bool, wid
     for name, unit in zip(names, units, strict=True):
         plain, own = heading_of(name)
         headings.append(Heading(plain, own or unit.strip(" ()[]")))
-    preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t")))
+    preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t;,")))
     return Layout(preamble, tuple(headings), spare, start, mark, brackets)
 
 

@@ -24,7 +24,7 @@ from acquisition.recordings.tables.cells import (
     split_page,
 )
 from acquisition.recordings.tables.table import Column, Lines, Table
-from acquisition.recordings.tables.text import Line, Text
+from acquisition.recordings.tables.text import Text
 
 _MOST_EMPTY = 4_000_000
 """Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
@@ -39,10 +39,9 @@ class Sheet:
 
     columns: tuple[tuple[float | str, ...], ...]
 
-    def head(self, limit: int) -> list[Line]:
+    def head(self, limit: int) -> list[str]:
         """Return the first rows as lines of text between tabs, like those of a :class:`Text`."""
-        rows = zip(*(column[:limit] for column in self.columns), strict=True)
-        return [Line(at, at, at + 1, "\t".join(map(_printed, row))) for at, row in enumerate(rows, 1)]
+        return ["\t".join(map(_printed, row)) for row in zip(*(column[:limit] for column in self.columns), strict=True)]
 
 
 def _printed(value: float | str) -> str:
@@ -52,7 +51,7 @@ def _printed(value: float | str) -> str:
 def read_rows(
     path: str,
     text: Text | Sheet,
-    first: Line,
+    first: int,
     mark: str,
     *,
     stop: int | None = None,
@@ -64,19 +63,18 @@ def read_rows(
     The cells of column ``clock`` are times of day. With brackets, ``[``, ``]`` and ``;`` are blanks.
     """
     if isinstance(text, Sheet):
-        return _rows_of_sheet(text, first.number, clock)
-    stop = text.stop if stop is None else stop
+        return _rows_of_sheet(text, first, clock)
+    stop = len(text) if stop is None else stop
+    first = min(first, stop)
     pieces: list[list[tuple[F8, I1, B1]]] = []  # for each column
     sizes: list[int] = []
-    skipped: list[int] = []
-    most, count, last = stop - first.start + _MOST_EMPTY, 0, []
-    for page in text.pages(first.start, stop):
-        rows = []
-        for line in split_page(page, mark, brackets=brackets):
-            if line:
-                rows.append(line)
-            else:
-                skipped.append(count + len(rows))
+    numbers = [np.empty(0, np.int64)]
+    most, count, number, last = int(text.starts[stop] - text.starts[first]) + _MOST_EMPTY, 0, first + 1, []
+    for page in text.pages(first, stop):
+        lines = split_page(page, mark, brackets=brackets)
+        numbers.append(np.flatnonzero(list(map(bool, lines))) + number)
+        number += len(lines)
+        rows = list(filter(None, lines))
         if not rows:
             continue
         most -= len(rows) * max(map(len, rows))
@@ -104,7 +102,7 @@ def read_rows(
         columns.append(Column("", "", values, decimals))
         commas.append(comma)
     traps = _decimal_marks(path, columns, commas)
-    ended = first.start >= stop or text.data[stop - 1 : stop] in (b"\n", b"\r")
+    ended = first >= stop or stop < len(text) or text.ended
     cut = False
     if count and not ended:
         own_values, own_decimals = columns[len(last) - 1].values, columns[len(last) - 1].forms
@@ -114,8 +112,8 @@ def read_rows(
     if clock is not None and clock < len(columns):
         count_from_first(columns[clock])
     words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
-    lines = Lines(first.number, count, np.array(skipped, np.int64), words, ended, cut, text.zeros)
-    return Table(tuple(columns), lines=lines, traps=traps)
+    where = Lines(np.concatenate(numbers), words, ended, cut, text.zeros)
+    return Table(tuple(columns), lines=where, traps=traps)
 
 
 def count_from_first(column: Column) -> None:
@@ -130,7 +128,7 @@ def count_from_first(column: Column) -> None:
 def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Table:
     columns = []
     for at, cells in enumerate(sheet.columns):
-        below = cells[first - 1 :]
+        below = cells[first:]
         if at == clock:
             values, decimals, _ = clock_times([_printed(each).encode("latin-1", "replace") for each in below])
         else:
@@ -145,9 +143,7 @@ def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Table:
     columns = [Column("", "", column.values[filled], column.forms[filled]) for column in columns]
     if clock is not None:
         count_from_first(columns[clock])
-    skipped = np.cumsum(filled)[~filled].astype(np.int64)
-    lines = Lines(first, int(filled.sum()), skipped, columns[0].forms == UNREAD)
-    return Table(tuple(columns), lines=lines)
+    return Table(tuple(columns), lines=Lines(first + 1 + np.flatnonzero(filled), columns[0].forms == UNREAD))
 
 
 def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -> tuple[Trap, ...]:

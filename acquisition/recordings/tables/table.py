@@ -12,8 +12,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.nominal import median
-from acquisition.recordings.sampling.timing import Formula
+from acquisition.recordings.sampling.timing import Formula, median
 from acquisition.recordings.tables.cells import EMPTY, I1
 from acquisition.recordings.tables.headings import Heading, numbered_apart, role_of
 from acquisition.recordings.units import Measure, measure_of
@@ -92,36 +91,21 @@ class Column:
 class Lines(NamedTuple):
     """Where rows stand in a text.
 
-    ``first`` is the number of the first row's line, and ``skipped`` holds, for each line that is no row, the number of
-    rows before it. ``words`` marks rows that begin with text. ``ended`` says that the last row has a line end, ``cut``
-    that it is incomplete. ``zeros`` is the number of zero bytes that were left out at the end of the file.
+    ``numbers`` are the one-based numbers of their lines. ``words`` marks rows that begin with text. ``ended`` says that
+    the last row has a line end, ``cut`` that it is incomplete. ``zeros`` is the number of zero bytes that were left out
+    at the end of the file.
     """
 
-    first: int
-    rows: int
-    skipped: I8
+    numbers: I8
     words: B1
     ended: bool = True
     cut: bool = False
     zeros: int = 0
 
-    def line(self, row: int) -> int:
-        """Return the one-based line number of a row."""
-        return self.first + int(row) + int(np.searchsorted(self.skipped, row, side="right"))
-
-    def part(self, start: int, stop: int) -> Lines:
-        """Return where some of the rows stand."""
-        inside = (self.skipped > start) & (self.skipped < stop)
-        last = stop == self.rows
-        return Lines(
-            self.line(start),
-            stop - start,
-            self.skipped[inside] - start,
-            self.words[start:stop],
-            self.ended or not last,
-            self.cut and last,
-            self.zeros if last else 0,
-        )
+    @property
+    def rows(self) -> int:
+        """The number of rows."""
+        return int(self.words.size)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -227,11 +211,7 @@ def side_by_side(table: Table, headings: Sequence[Heading], run: str = "") -> li
             channels.setdefault((each.run, times.get(each.run)), []).append(columns[at])
     return [
         replace(
-            table,
-            columns=tuple(own),
-            times=None if time is None else columns[time],
-            run=own_run or run,
-            beside=columns,
+            table, columns=tuple(own), times=None if time is None else columns[time], run=own_run or run, beside=columns
         )
         for (own_run, time), own in channels.items()
     ]
@@ -256,7 +236,9 @@ def set_back(table: Table) -> list[Table]:
             table,
             columns=tuple(each.part(start, stop) for each in table.columns),
             times=table.times.part(start, stop),
-            lines=table.lines.part(start, stop),
+            lines=Lines(table.lines.numbers[start:stop], table.lines.words[start:stop], *table.lines[2:])
+            if stop == t.size
+            else Lines(table.lines.numbers[start:stop], table.lines.words[start:stop]),
             beside=tuple(each.part(start, stop) for each in table.beside),
             run=f"{table.run}, part {number}" if table.run else f"Part {number}",
         )

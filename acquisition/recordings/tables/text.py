@@ -6,8 +6,10 @@ import codecs
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
+import numpy as np
+
+from acquisition.block import I8
 from acquisition.errors import FormatError
 
 HEAD_BYTES = 8192
@@ -18,32 +20,21 @@ _CONTROL = bytes(c for c in range(32) if c not in b"\t\n\r\f\x1a")
 _FOREIGN = re.compile(rb"[\x80-\xff]+[\x21-\x7e]?")
 _HANZI = re.compile(rb"(?:[\xb0-\xd7\xa1-\xa3][\xa1-\xfe])+[\x21-\x7e]?")
 """Common Chinese characters in GB 2312; in cp1252 these codes are capitals with accents, which rarely come in pairs."""
-_LINE_END = re.compile(rb"\r\n|\r|\n")
 _NUMBER = re.compile(rb"[\s,;]*[-+]?[.,]?\d")
 _ZIP = b"PK\x03\x04"
 _PAGE_BYTES = 1 << 16
 _HEAD_SPAN = 1 << 16
 
 
-class Line(NamedTuple):
-    """One line: its one-based number, the byte positions of its start and of the next line, its text."""
-
-    number: int
-    start: int
-    next: int
-    text: str
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Text:
-    """A text as bytes in which every digit, sign and separator is one byte.
+    """A text as bytes in which every digit, sign and separator is one byte; a LF ends every line but perhaps the last.
 
-    It lies between ``start``, after a byte order mark, and ``stop``, before trailing zero bytes (``zeros`` in number).
+    ``starts`` are the positions of its lines, and its end. ``zeros`` counts zero bytes that were left out at its end.
     """
 
     data: bytes
-    start: int
-    stop: int
+    starts: I8
     zeros: int
 
     @classmethod
@@ -51,56 +42,55 @@ class Text:
         """Return the text of a file's bytes."""
         if encoding := _utf16(data[:HEAD_BYTES]):
             data = data.decode(encoding, errors="replace").removeprefix("\ufeff").encode("utf-8", "replace")
-        start = 3 if data.startswith(codecs.BOM_UTF8) else 0
-        stop = len(data)
-        if data[-1:] in (b"\0", b"\x1a"):
-            stop = max(len(data.rstrip(b"\0\x1a")), start)
-        return cls(data, start, stop, len(data) - stop)
+        whole = data.rstrip(b"\0\x1a") if data[-1:] in (b"\0", b"\x1a") else data
+        text = whole.removeprefix(codecs.BOM_UTF8).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        starts = np.flatnonzero(np.frombuffer(text, np.uint8) == ord("\n")) + 1
+        last = [] if not text or text.endswith(b"\n") else [len(text)]
+        return cls(text, np.concatenate(([0], starts, last)).astype(np.int64), len(data) - len(whole))
 
-    def lines(self, start: int | None = None, number: int = 1) -> Iterator[Line]:
-        """Yield the lines from byte ``start``, the first with this number; an empty last line is not yielded."""
-        at = self.start if start is None else start
-        for match in _LINE_END.finditer(self.data, at, self.stop):
-            yield Line(number, at, match.end(), decode(self.data[at : match.start()]))
-            at, number = match.end(), number + 1
-        if at < self.stop:
-            yield Line(number, at, self.stop, decode(self.data[at : self.stop]))
+    def __len__(self) -> int:
+        """Return the number of lines."""
+        return self.starts.size - 1
 
-    def head(self, limit: int, start: int | None = None, number: int = 1) -> list[Line]:
-        """Return at most ``limit`` lines, all of which start within 64 KiB."""
-        lines: list[Line] = []
-        for line in self.lines(start, number):
-            if len(lines) == limit or line.start - (self.start if start is None else start) > _HEAD_SPAN:
-                break
-            lines.append(line)
-        return lines
+    @property
+    def ended(self) -> bool:
+        """Whether the last line has a line end."""
+        return self.data.endswith(b"\n")
+
+    def line(self, at: int) -> str:
+        """Return a line without its line end."""
+        return decode(self.data[self.starts[at] : self.starts[at + 1]].removesuffix(b"\n"))
+
+    def lines(self, first: int = 0, limit: int | None = None) -> list[str]:
+        """Return the lines from line ``first`` on, at most ``limit``."""
+        return [self.line(at) for at in range(first, len(self) if limit is None else min(first + limit, len(self)))]
+
+    def head(self, limit: int, first: int = 0) -> list[str]:
+        """Return at most ``limit`` lines from line ``first`` on, all of which start within 64 KiB."""
+        near = int(np.searchsorted(self.starts[:-1], self.starts[first] + _HEAD_SPAN, side="right"))
+        return self.lines(first, min(limit, near - first))
+
+    def find(self, what: bytes, first: int) -> int | None:
+        """Return the first line from line ``first`` on that contains ``what``."""
+        at = self.data.find(what, self.starts[first])
+        return None if at < 0 else self.at(at)
+
+    def at(self, position: int) -> int:
+        """Return the line of a byte."""
+        return int(np.searchsorted(self.starts, position, side="right")) - 1
 
     def words_above(self, low: int, at: int) -> int:
-        """Return where the lines begin that stand above position ``at``, as far as they do not begin with a number."""
-        while at > low:
-            above = max(self.data.rfind(b"\n", low, at - 1) + 1, low)
-            if _NUMBER.match(self.data, above, at):
-                break
-            at = above
+        """Return the first of the lines above line ``at``, not below ``low``, that do not begin with a number."""
+        while at > low and not _NUMBER.match(self.data, self.starts[at - 1], self.starts[at]):
+            at -= 1
         return at
 
-    def line_ends(self, start: int, stop: int) -> int:
-        """Return the number of line ends between two positions."""
-        return self.data.count(b"\n", start, stop) or self.data.count(b"\r", start, stop)
-
-    def pages(self, start: int, stop: int) -> Iterator[bytes]:
-        """Yield whole lines, about 64 KiB at a time."""
-        while start < stop:
-            end = min(start + _PAGE_BYTES, stop)
-            if end < stop:
-                # A page ends after a LF, after a CR that is not part of CRLF, or at the end of its only line.
-                whole = self.data.rfind(b"\n", start, end) + 1 or self.data.rfind(b"\r", start, end - 1) + 1
-                if not whole:
-                    match = _LINE_END.search(self.data, end - 1, stop)
-                    whole = match.end() if match else stop
-                end = whole
-            yield self.data[start:end]
-            start = end
+    def pages(self, first: int, stop: int) -> Iterator[bytes]:
+        """Yield the lines from ``first`` to before ``stop``, about 64 KiB at a time."""
+        while first < stop:
+            end = min(max(self.at(self.starts[first] + _PAGE_BYTES), first + 1), stop)
+            yield self.data[self.starts[first] : self.starts[end]]
+            first = end
 
 
 def restated(path: str, data: bytes, delimiter: str | None, decimal: str | None) -> bytes:
@@ -113,8 +103,7 @@ def restated(path: str, data: bytes, delimiter: str | None, decimal: str | None)
     if not allowed or decimal not in (None, ".", ","):
         problem = f"delimiter must be one mark like , ; tab or space, and decimal . or , (got {delimiter}, {decimal})"
         raise FormatError(path, problem, "state those of the file")
-    own = text_of(path, data)
-    text = re.sub("\r\n?", "\n", decode(own.data[own.start : own.stop]))
+    text = decode(text_of(path, data).data)
     if not mark and decimal == "." and not re.search("[\t;]", text):
         mark = ","
     lines = text.split("\n")

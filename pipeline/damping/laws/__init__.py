@@ -10,11 +10,9 @@ a law from a function.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from types import MappingProxyType
-from typing import Any, cast
 
-from failure.extensions import entry_points_of, load_entry
+from failure.extensions import load_named
 from pipeline.damping.laws.drag import DRAGS, Drag
 from pipeline.damping.laws.law import Law, free_power, in_units, units_of, words_of
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
@@ -53,12 +51,5 @@ def find_law(law: str | Law) -> Law:
         return LAWS[law]
     if law not in law_names():
         raise AnalysisError(f"laws must be of {', '.join(law_names())}, or laws of your own; got {law!r}")
-    found = load_entry(entry_points_of(GROUP)[law], f"law {law!r}", AnalysisError, partial(_named, law))
-    return cast(Law, found)
-
-
-def _named(name: str, loaded: Any) -> Law:
-    """Return what an entry point gives, if it is a law of that name."""
-    if not isinstance(loaded, Law) or loaded.name != name:
-        raise AnalysisError(f"expected a law named {name!r}, got {loaded!r:.80}")
-    return loaded
+    found: Law = load_named(GROUP, law, Law, AnalysisError)
+    return found

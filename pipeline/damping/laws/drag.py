@@ -36,11 +36,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.numerics.quantity import Unit
 from pipeline.track import F8
 
 COEFFICIENTS = ("mu", "gamma", "beta")  # coefficients of the powers 0, 1 and 2 of the amplitude
-FLOOR = 1e-3  # minimum start value of A0, as a share of the maximum amplitude
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Drag:
         """
         level = float(amplitude.max())
         found = np.zeros(len(self.parameters))
-        found[0] = max(float(amplitude.mean()), FLOOR * level)
+        found[0] = max(float(amplitude.mean()), NEGLIGIBLE * level)
         if amplitude.size < 2 or not t[-1] > t[0]:
             return found
         y, span = amplitude / level, float(t[-1])

@@ -10,7 +10,7 @@ import numpy as np
 from acquisition.clock import Clock
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory
-from pipeline.dynamics.problem import Problem
+from pipeline.dynamics.equation import Problem
 from pipeline.dynamics.strang import STRANG
 from springmass.runs.simulating.simulation import prepare
 

@@ -6,25 +6,24 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from pipeline.bench.derived_drag import DerivedDrag, derive_drag, needs_drag
+from pipeline.analysis import Analysis
+from pipeline.bench.disc import DerivedDrag, derive_drag, needs_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Integrator, Problem, Trajectory, get_integrator
 from pipeline.dynamics.band import STRONGEST, Band, spread, uncertain
 from pipeline.dynamics.halving import Solution, auto, demand_tolerance, halved, rounding_error, solved_once
-from pipeline.dynamics.solve_ivp import DOP853
+from pipeline.dynamics.methods import DOP853
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.results.effects import Effect
 from pipeline.track import F8
-from springmass.errors import USAGE, ProgramError
-
-if TYPE_CHECKING:
-    from pipeline.analysis import Analysis
+from springmass.errors import ProgramError
+from springmass.runs.json_results import picked
 
 DEFAULT_TOLERANCE = 1e-6
 FINE = 24.0  # states per radian; interpolation between them has an error of 1e-8 of the amplitude
@@ -103,10 +102,14 @@ class Check:
 class Simulation:
     """A solved problem, its measured error if that was requested, and the time spent on choosing method and step."""
 
-    problem: Problem
     solution: Solution
     check: Check | None = None
     choosing_s: float = 0.0
+
+    @property
+    def problem(self) -> Problem:
+        """The equation and its start."""
+        return self.solution.problem
 
     @property
     def trajectory(self) -> Trajectory:
@@ -119,7 +122,7 @@ def count_of(seconds: float, spacing_s: float) -> int:
     count = round(seconds / spacing_s) if spacing_s > 0 else 0
     if not 1 <= count <= MOST_SAMPLES:
         raise ProgramError(
-            f"--seconds {seconds:g} at --dt {spacing_s:g} makes {count} steps; allowed are 1 to {MOST_SAMPLES}", USAGE
+            f"--seconds {seconds:g} at --dt {spacing_s:g} makes {count} steps; allowed are 1 to {MOST_SAMPLES}"
         )
     return count
 
@@ -160,28 +163,22 @@ def default_tolerance(band: Band | None) -> float:
     return float(f"{min(max(BAND_SHARE * band.relative_u, DEFAULT_TOLERANCE), LARGEST_DEFAULT):.1g}")
 
 
-def demand_stable(problem: Problem, method: str, step_s: float | None, *, where: str) -> None:
-    """Refuse a step beyond the limit of its method; without a step it may take any that is short enough."""
-    if method == "auto":
-        return
-    integrator = get_integrator(method)
-    limit = integrator.stable_step(problem)
-    if limit > 0.0 and (step_s is None or step_s <= limit):
-        return
-    known, remedy = "it grows at any step without damping", "take "
+def instability(problem: Problem, method: str, step_s: float | None) -> tuple[str, str]:
+    """Say what is wrong with a step beyond the limit of its method, and return the limit, s, rounded down.
+
+    Both are empty if it is stable, and the limit if there is none. Without a step it may be as short as needed.
+    """
+    integrator = None if method == "auto" else get_integrator(method)
+    limit = math.inf if integrator is None else integrator.stable_step(problem)
+    if integrator is None or (limit > 0.0 and (step_s is None or step_s <= limit)):
+        return "", ""
+    known, rounded = "it grows at any step without damping", ""
     if limit > 0.0:
         power = 10.0 ** (math.floor(math.log10(limit)) - 2)
-        rounded = f"{math.floor(limit / power) * power:.3g}"  # down, so that it is stable
-        known, remedy = f"its limit here is {rounded} s", f"take --dt {rounded} or less, "
-    other = "auto" if integrator is STRANG else "strang"
-    if math.isinf(STRANG.stable_step(problem)):
-        other += ", which has no limit"
+        rounded = f"{math.floor(limit / power) * power:.3g}"
+        known = f"its limit here is {rounded} s"
     step = "a step" if step_s is None else f"a step of {step_s:g} s"
-    raise ProgramError(
-        f"{where}: {integrator.words} is unstable with {step}: {known}; {remedy}--method {other}, "
-        "or --force to run it all the same",
-        USAGE,
-    )
+    return f"{integrator.words} is unstable with {step}: {known}", rounded
 
 
 def simulated(
@@ -191,7 +188,7 @@ def simulated(
     started = time.perf_counter()
     solution = solve(problem, method, spacing_s, count, tolerance)
     choosing_s = time.perf_counter() - started - solution.running_s
-    return Simulation(problem, solution, _checked(problem, solution, spacing_s, count) if check else None, choosing_s)
+    return Simulation(solution, _checked(problem, solution, spacing_s, count) if check else None, choosing_s)
 
 
 def _checked(problem: Problem, solution: Solution, spacing_s: float, count: int) -> Check:
@@ -366,11 +363,8 @@ def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | Non
         "running_s": solution.running_s,
         "amplitude_m": found.problem.amplitude_m(),
         "prediction": prediction(found),
-        "equation": {name: getattr(found.problem.equation, name) for name in found.problem.equation.__slots__},
-        "effects": [
-            {key: getattr(effect, key) for key in ("name", "predicted", "measured", "unit", "included", "why")}
-            for effect in effects
-        ],
+        "equation": picked(found.problem.equation, found.problem.equation.__slots__),
+        "effects": [picked(each, ("name", "predicted", "measured", "unit", "included", "why")) for each in effects],
         "against": None,
         "band": None if band is None else _band_summary(band, found.trajectory.t),
     }

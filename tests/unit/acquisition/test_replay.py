@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from acquisition.block import Block, Flag
+from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
-from acquisition.source import SourceInfo
 
 INFO = SourceInfo("replay", "run", 100.0)
 
@@ -37,21 +36,11 @@ def test_a_slow_consumer_is_not_given_a_drift() -> None:
     assert clock.now_ns() == 990_000_000
 
 
-def test_seek_goes_on_behind_a_gap() -> None:
-    """Record time jumps, the index goes on, and the first sample carries a gap."""
-    whole = run()
-    replay = Replay([whole], VirtualClock(), info=INFO, block_samples=20)
-    blocks = iter(replay)
-    next(blocks)
-    replay.seek(0.5)
-    block = next(blocks)
-    assert (block.first, block.t[0]) == (20, 0.5)
-    assert block.flags.tolist() == [Flag.GAP_BEFORE] + [0] * 19
-    assert not whole.flags.any()
-    replay.seek(-3.0)
-    assert next(blocks).t[0] == 0.0
-    replay.seek(99.0)
-    assert list(blocks) == []
+def test_it_begins_at_a_time_of_the_recording() -> None:
+    """At once and without a gap; behind the end there is nothing."""
+    block = next(iter(Replay([run()], clock := VirtualClock(), info=INFO, block_samples=20, from_s=0.5)))
+    assert (block.first, block.t[0], clock.now_ns(), block.flags.any()) == (0, 0.5, 190_000_000, False)
+    assert list(Replay([run()], VirtualClock(), info=INFO, from_s=99.0)) == []
 
 
 def test_a_loop_has_a_gap_before_each_further_turn() -> None:

@@ -124,3 +124,24 @@ def test_the_amplitude_of_a_small_pendulum_is_corrected_for(degrees: int) -> Non
     gravity = analysis.estimates["gravity"]
     assert abs(gravity.value - 9.81) < 3.0 * gravity.u
     assert gravity.u < 2e-3
+
+
+@pytest.mark.parametrize("step", [0.2, 0.35, 0.5, 0.8])
+def test_steps_as_large_as_the_motion_are_part_of_the_uncertainties(step: float) -> None:
+    """Amplitude, rest position and damping rate hold, and no law is rejected, for steps up to 0.8 of the amplitude."""
+    t, amplitude, pulls = np.arange(3000) / 100, 0.03, []
+    for seed in range(12):
+        rng = np.random.default_rng([seed, 7])
+        step_m, period_s, rate = amplitude * step, rng.uniform(0.6, 1.1), rng.uniform(0.005, 0.03)
+        rest = 0.25 + rng.uniform(-0.5, 0.5) * step_m
+        swing = amplitude * np.exp(-rate * t) * np.cos(2.0 * math.pi * t / period_s + rng.uniform(-3.0, 3.0))
+        y = np.rint((rest + swing + 2e-4 * rng.standard_normal(t.size)) / step_m) * step_m
+        analysis = analyse(Track.from_arrays(t, y))
+        if "period" in analysis.estimates:
+            truth = {"amplitude": amplitude, "offset": rest, "damping_rate": rate}
+            pulls.append(
+                [abs(analysis.estimates[name].value - x) / analysis.estimates[name].u for name, x in truth.items()]
+            )
+            assert "no_law_fits" not in codes(analysis)
+    assert len(pulls) >= 4
+    assert np.quantile(pulls, 0.9, axis=0).max() < 2.8

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from storage.atomic import whole_folder
 from storage.errors import WriteFailed
-from storage.folder import whole_folder
 
 NAMES = {"page", "table", "old", "figures/a"}
 
@@ -70,5 +70,5 @@ def test_what_others_put_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     """A file stands where a folder above should be."""
     (tmp_path / "file").write_text("")
-    with pytest.raises(WriteFailed, match="folder for results"):
+    with pytest.raises(WriteFailed, match="could not be written"):
         make(tmp_path / "file" / "run.results", "1")

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.errors import AcquisitionError
-from acquisition.recordings.base import dialect_folder
-from acquisition.recordings.identify import formats, get_format, open_recording
+from acquisition.recordings.identify import dialect_folder, formats, get_format, open_recording
 
 LOG = """
 title = "height log of bench 12"

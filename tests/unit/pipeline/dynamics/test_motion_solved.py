@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.bench.added_mass import added_mass_kg
+from pipeline.bench.disc import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from pipeline.analyse import analyse
-from pipeline.bench.added_mass import added_mass_kg
+from pipeline.bench.disc import added_mass_kg
 from pipeline.bench.scene import Scene
 from pipeline.results.effects import Effect
 from pipeline.track import Track

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pytest
 import xarray as xr
 
 import springmass as sm
@@ -58,16 +57,10 @@ def test_a_stream_gives_the_estimates_so_far() -> None:
 
 
 def test_xarray_opens_every_recording_by_name(tmp_path: Path) -> None:
-    """A text as its dataset, a file of several channels as a tree; only run files are opened without a name."""
+    """A text as its dataset; only run files are opened without a name."""
     found = xr.open_dataset(str(PAIR[1]), engine="springmass", drop_variables="quality")
     assert sm.analyse(found)["T"].value == sm.analyse(PAIR[1])["T"].value
     assert found["time"].attrs["units"] == "s"
-    table = tmp_path / "two.csv"
-    t = np.arange(200) / 50
-    table.write_text("time (s),a (cm),b (cm)\n" + "".join(f"{x:.2f},{20 + x:.3f},{30 - x:.3f}\n" for x in t))
-    tree = xr.open_datatree(str(table), engine="springmass")
-    assert set(tree.children) == {"a", "b"}
-    assert float(tree["b"]["distance"][0]) == pytest.approx(0.3)
     engine = xr.backends.list_engines()["springmass"]
     run = sm.load(PAIR[0]).save(tmp_path / "run.h5")
     found.to_netcdf(tmp_path / "other.h5", engine="h5netcdf")

@@ -9,9 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition.block import Block
+from acquisition.block import Block, SourceInfo
 from acquisition.recordings.recording import Original
-from acquisition.source import SourceInfo
 from springmass.runs.loading import load
 from storage.errors import RunDamaged
 from storage.run_file.layout import CHUNK

@@ -94,8 +94,8 @@ def test_a_recovered_run_is_what_was_seen_live(tmp_path: Path) -> None:
         run.verify()
         assert columns(run.samples()) == columns(shown)
         assert run.originals()[0].data == log.read_bytes()
-        assert (run.info, run.title, run.scene) == (live.info("COM3", "simulated"), "Run 3", HEADER.scene)
-        assert (run.format, run.traps, run.malformed_rows) == ("wire", (), 0)
+        assert (run.info, run.header.title, run.header.scene) == (live.info("COM3", "simulated"), "Run 3", HEADER.scene)
+        assert (run.header.format, run.traps, run.header.malformed_rows) == ("wire", (), 0)
         reported = run.provenance
     assert (reported["software"], reported["recorded_with"], reported["reads"]) == ("springmass", "0.1.0", 201)
     assert reported["log"]["ended"]

@@ -9,8 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from acquisition.block import UNITS, Block
-from acquisition.source import SourceInfo
+from acquisition.block import UNITS, Block, SourceInfo
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
 

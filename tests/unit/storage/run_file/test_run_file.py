@@ -14,10 +14,9 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition.block import Block, concatenate
+from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.errors import PortError
 from acquisition.recordings.recording import Original, Trap
-from acquisition.source import SourceInfo
 from storage.errors import NotARun, RunClosed, RunDamaged, RunExists, RunOpen, WriteFailed
 from storage.run_file.layout import CHUNK, HEADER
 from storage.run_file.reading import open_run
@@ -96,7 +95,7 @@ def test_a_closed_run_says_so(path: Path) -> None:
         blocks = iter(run.blocks(100))
         next(blocks)
     run.close()
-    assert run.title == "Träger 3"
+    assert run.header.title == "Träger 3"
     for read in (run.samples, run.originals, run.verify):
         with pytest.raises(RunClosed, match="closed"):
             read()
@@ -161,7 +160,7 @@ def test_a_full_disk_is_one_line(tmp_path: Path, limit: int) -> None:
 import resource, signal, sys
 import numpy as np
 from acquisition.block import Block
-from acquisition.source import SourceInfo
+from acquisition.block import SourceInfo
 from storage.errors import WriteFailed
 from storage.run_file.writing import write_run
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Drag of a disc derived from its size and the air where a scene states no damping: vortices shed by the disc's edge.
+"""Disc: the air that it carries along, and its drag where a scene states no damping: vortices shed by its edge.
 
 Friction of the air along disc and bob, 3 % of this drag at a usual bench, is left out, as are losses in suspension and
 spring, which cannot be derived. Measured coefficients of a flat plate follow 8.0 KC^(-1/3) (J. M. R. Graham, J. Fluid
@@ -13,16 +13,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.bench.added_mass import added_mass_kg, scene_air_density
+from pipeline.bench.air import TYPICAL_HUMIDITY, TYPICAL_PRESSURE, TYPICAL_TEMPERATURE, air_density
 from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import SceneError
-from pipeline.numerics.estimate import Joint
+from pipeline.numerics.estimate import Estimate, Joint
 
-STEADY_DISC_DRAG = 1.17  # drag coefficient of a disc broadside on in steady flow, Re > 1000
+ADDED_MASS_SHAPE = 8.0 / 3.0  # of a thin disc over rho a^3: H. Lamb, "Hydrodynamics", 6th ed. (1932), art. 102
+
+
+def added_mass_kg(scene: Scene) -> float:
+    """Return the mass of air carried along by a thin disc that moves broadside on, :math:`(8/3)\\rho a^3`, kg."""
+    if scene.disc_diameter_m is None:
+        return 0.0
+    return ADDED_MASS_SHAPE * scene_air_density(scene) * (0.5 * scene.disc_diameter_m.value) ** 3
+
+
+def scene_air(scene: Scene) -> tuple[Estimate, Estimate, Estimate]:
+    """Return temperature, degC, pressure, Pa, and relative humidity of a scene's air, or typical values."""
+    return (
+        scene.air_temperature_c or TYPICAL_TEMPERATURE,
+        scene.air_pressure_pa or TYPICAL_PRESSURE,
+        scene.air_relative_humidity or TYPICAL_HUMIDITY,
+    )
+
+
+def scene_air_density(scene: Scene) -> float:
+    """Return the density of a scene's air, kg/m^3; unstated values are 20 degC, 101,325 Pa and 50 %."""
+    return air_density(*(each.value for each in scene_air(scene)))
+
+
+# Drag coefficient of a disc broadside on in steady flow, Re > 1000: S. F. Hoerner, "Fluid-Dynamic Drag" (1965).
+STEADY_DISC_DRAG = 1.17
 U_SHED = 0.2  # relative uncertainty: scatter of measured plates about the law, and its transfer to a disc
 SOURCES = "u 20 %; Graham 1980, de Bernardinis et al. 1981"
-DOWN_TO = 1e-3  # smallest amplitude at which the disc's law is matched, over the initial one
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +111,7 @@ def derive_drag(scene: Scene, amplitude_m: float, seconds: float) -> DerivedDrag
     values, first = np.zeros(2), 0.0
     if amplitude_m > 0.0:
         first = rate(amplitude_m)
-        left = max((1.0 + first * seconds / 1.5) ** -1.5, DOWN_TO)
+        left = (1.0 + first * seconds / 1.5) ** -1.5
         amplitudes = amplitude_m * np.geomspace(min(left, 0.9), 1.0, 40)
         rates = np.array([rate(each) for each in amplitudes.tolist()])
         columns = np.stack([np.ones(40), amplitudes / amplitude_m], axis=1) / rates[:, None]

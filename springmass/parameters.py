@@ -1,4 +1,4 @@
-"""The numeric types of options: each declares its range, and the command line rejects values outside it."""
+"""How the parameters of commands are declared, and their numeric types, whose ranges the command line demands."""
 
 from __future__ import annotations
 
@@ -8,7 +8,27 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter, Token
 
-from pipeline.registry.laws import law_names
+from pipeline.registry.laws import ANY_LAW, law_names
+
+
+def argument(name: str, words: str, *, required: bool | None = None) -> Parameter:
+    """Return the declaration of a positional argument."""
+    return Parameter(name=name, metavar=name, help=words, required=required)
+
+
+def option(metavar: str, words: str, *names: str) -> Parameter:
+    """Return the declaration of an option that takes a value."""
+    return Parameter(name=names, metavar=metavar, help=words)
+
+
+def output(metavar: str, words: str) -> Parameter:
+    """Return the declaration of the option that names the output."""
+    return option(metavar, words, "-o", "--output")
+
+
+def flag(words: str) -> Parameter:
+    """Return the declaration of an option without a value."""
+    return Parameter(help=words)
 
 
 def _where(holds: Callable[[float], bool], demand: str) -> Parameter:
@@ -34,16 +54,16 @@ def _whole(_: object, tokens: Sequence[Token]) -> int:
         raise ValueError("must be a whole number") from None
 
 
-ANY_LAW = "any"
-"""The value in place of a law's name that lets the recording choose, regardless of the scene."""
-
-
 def _one_of_the_laws(_: object, name: str | None) -> None:
     if name is not None and name not in (*law_names(), ANY_LAW):
         raise ValueError(f"It must be one of {', '.join((*law_names(), ANY_LAW))}.")
 
 
-LawName = Annotated[str, Parameter(validator=_one_of_the_laws)]
+LawName = Annotated[
+    str | None,
+    Parameter(validator=_one_of_the_laws),
+    option("NAME", "damping law, if known: linear, quadratic ...; any: choose from the data"),
+]
 Finite = Annotated[float, _where(lambda _: True, "")]
 Positive = Annotated[float, _where(lambda x: x > 0.0, "must be positive")]
 Share = Annotated[float, _where(lambda x: 0.0 <= x <= 1.0, "must lie in 0 to 1")]
