@@ -137,11 +137,6 @@ def cells(estimate: Estimate | None) -> str:
 LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
 
 
-def kept(estimate: Estimate) -> str:
-    """Write an estimate so that no line breaks inside it."""
-    return unbroken(pretty(estimate))
-
-
 def unbroken(text: str) -> str:
     """Let no line break in a text."""
     return text.replace(" ", "\u00a0")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -185,12 +184,6 @@ def line_of(label: str, x: F8, y: F8, role: Role = "law") -> Series:
 def band_of(label: str, x: F8, y: F8, u: F8) -> Series:
     """Return a band from y - u to y + u."""
     return Series(label, x, y, "band", line=True, u=u)
-
-
-def mark(label: str, x: Sequence[float], texts: Sequence[str]) -> Series:
-    """Return vertical lines with their texts."""
-    at = np.asarray(x, np.float64)
-    return Series(label, at, np.full(at.size, np.nan), "mark", why=tuple(texts))
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
-from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
+from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty
 
 REASONS: tuple[tuple[int, str], ...] = (
@@ -92,8 +92,8 @@ def _reason(flags: int, y: float) -> str:
 def _marks(notes: Sequence[Note]) -> list[Series]:
     """Marks of the recording, its trigger and its losses, as vertical lines."""
     chosen = [note for note in notes if note.kind in ("mark", "trigger", "lost", "reopened")]
-    texts = [note.text if note.kind == "mark" else note.kind for note in chosen]
-    return [mark("marks", [note.t_s for note in chosen], texts)] if chosen else []
+    at, texts = np.array([note.t_s for note in chosen]), (n.text if n.kind == "mark" else n.kind for n in chosen)
+    return [Series("marks", at, np.full(at.size, np.nan), "mark", why=tuple(texts))] if chosen else []
 
 
 def _fit_lines(a: Analysis, motion: Oscillation, factor: float) -> list[Series]:
