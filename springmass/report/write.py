@@ -51,8 +51,6 @@ def write_report(
     one the page contains it. If there are several runs, the names of figures and motions begin with the name of the
     run.
     """
-    if not runs:
-        raise ValueError("a report needs one run at least, got none")
     directory, stems = Path(directory), _stems([run.name for run in runs])
     pdf: tuple[Kind, ...] = ("pdf",) if template is not None else ()
     kinds = list(dict.fromkeys((*figures, *pdf)))

@@ -24,6 +24,7 @@ from storage.run_file.reading import open_run
 from storage.wire_log.appending import LogFile, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry
 from storage.wire_log.scanning import read_log
+from tests.faults.conftest import frame_of
 from tests.sampling import sampled
 from tests.wire import json_of
 
@@ -157,9 +158,8 @@ def demand_complete(put: list[tuple[int, bytes]], records: list[Record], channel
 
 
 def swinging(number: int) -> bytes:
-    """One frame of an A02YYUW, ten a second, over a bob of 0.9 s."""
-    high, low = divmod(round(400.0 + 50.0 * np.cos(2.0 * np.pi * number / 9.0)), 256)
-    return bytes([0xFF, high, low, (0xFF + high + low) % 256])
+    """One frame, ten a second, over a bob of 0.9 s."""
+    return frame_of(round(400.0 + 50.0 * np.cos(2.0 * np.pi * number / 9.0)))
 
 
 def test_what_did_not_fit_is_a_gap_with_its_time_and_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
