@@ -139,10 +139,7 @@ def visible_lines(text: str) -> str:
     return "\n".join(map(visible, text.splitlines()))
 
 
-NAME_WIDTH, LEAST_NAME_WIDTH = (
-    24,
-    12,
-)  # width of the column for the names of quantities, which wrap, for several runs and for one
+NAME_WIDTH, LEAST_NAME_WIDTH = 24, 12  # of the column of quantities, which wrap, for several runs and for one
 
 
 def text_table(names: Sequence[str], runs: Sequence[Analysis], style: TerminalStyle = PLAIN) -> str:
