@@ -74,8 +74,7 @@ def write_report(
         if kinds:
             (folder / "figures").mkdir()
             for stem, own in (("", several), *zip(stems, charts, strict=True)):
-                drawn = save(list(own.values()), folder / "figures", kinds, stem)
-                pictures |= {f"{stem}{name}": files["svg"] for name, files in drawn.items() if "svg" in files}
+                pictures |= save(own.values(), folder / "figures", kinds, stem)
         for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
             if not isinstance(smoothed, str):
                 write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))
