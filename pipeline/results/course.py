@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +11,14 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import FEWEST_FOR_LINE, NOTICEABLE, OUTLIER
+from pipeline.numerics.levels import NEGLIGIBLE, OUTLIER
 from pipeline.numerics.robust import mad_sigma
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 
+FEW = 4  # minimum number of runs in a group for a median
 LARGEST_BENCH = 50  # maximum number of runs compared as those of one bench; of a larger group only far runs are named
+LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
+MATES = 4  # good runs against which two far runs are exchanged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,11 +128,22 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
 
     A run with an implausible mass takes no part in the rest. Runs far from the median of their spring or disc are
     suspect. The runs of one spring at one bench are compared as in file mode, which names two that were exchanged; a
-    run without which the others agree is suspect too.
+    run without which the others agree is suspect too. Then far runs of different benches are exchanged in pairs, next
+    to good runs of their spring.
     """
     found = {run.name: Suspect(run.name, run.implausible) for run in runs if run.implausible}
     plausible = [run for run in runs if not run.implausible]
     found |= _far(plausible)
+    exchanged: set[str] = set()
+
+    def exchange(a: str, b: str, others: str) -> None:
+        exchanged.update((a, b))
+        message = (
+            f"with the masses (or the periods) of {a} and {b} exchanged, they come together with {others}: "
+            "check which record belongs to which bob"
+        )
+        found.update({name: Suspect(name, message) for name in (a, b)})
+
     benches: dict[tuple[str, str], list[CourseRun]] = {}
     for run in plausible:
         if run.on_spring is not None:
@@ -141,17 +156,13 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
         if comparison is None or comparison.agree:
             continue
         if comparison.exchanged:
-            others = "the runs of their bench" if len(every) > 2 else "each other"
-            message = (
-                f"with the masses (or the periods) of {' and '.join(comparison.exchanged)} exchanged, they come "
-                f"together with {others}: check which record belongs to which bob"
-            )
-            found |= {name: Suspect(name, message) for name in comparison.exchanged}
+            a, b = comparison.exchanged
+            exchange(a, b, "the runs of their bench" if len(every) > 2 else "each other")
             continue
         constants = [k.value for k in comparison.each]
         low, high = min(constants), max(constants)
         spread = high / low - 1.0
-        if spread > NOTICEABLE and (odd := _odd_one(rest)) is not None:
+        if spread > LITTLE and (odd := _odd_one(rest)) is not None:
             others = f"without it, the other {len(rest) - 1} runs of its bench and spring agree"
             found[odd.name] = Suspect(odd.name, f"{others}: look at its mass and its spring")
         else:
@@ -161,6 +172,22 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
                 "check masses and spring"
             )
             disagreements.append(Disagreement(bench, spring, comparison.names, spread, message))
+    good = [run for run in plausible if run.on_spring is not None and run.name not in found]
+    far = [run for run in plausible if run.on_spring is not None and run.name in found.keys() - exchanged]
+    for one, two in itertools.combinations(far, 2):
+        if (
+            one.spring == two.spring
+            and not exchanged & {one.name, two.name}
+            and _alike_exchanged(one.on_spring, two.on_spring)
+        ):
+            # Runs of the two benches come first.
+            mates = sorted(
+                (run for run in good if run.spring == one.spring),
+                key=lambda run: run.bench not in (one.bench, two.bench),
+            )
+            comparison = _compared([one, two, *mates[:MATES]])
+            if comparison is not None and set(comparison.exchanged) == {one.name, two.name}:
+                exchange(one.name, two.name, "the others")
     return tuple(found[run.name] for run in runs if run.name in found), tuple(disagreements)
 
 
@@ -175,13 +202,17 @@ def _compared(runs: Sequence[CourseRun]) -> Comparison | None:
 
 def _odd_one(runs: Sequence[CourseRun]) -> CourseRun | None:
     """Return the only run without which the others, three or more, agree."""
-    without = (
-        [_compared([other for other in runs if other is not run]) for run in runs]
-        if len(runs) >= FEWEST_FOR_LINE
-        else []
-    )
+    without = [_compared([other for other in runs if other is not run]) for run in runs] if len(runs) >= FEW else []
     odd = [run for run, others in zip(runs, without, strict=False) if others is not None and others.agree]
     return odd[0] if len(odd) == 1 else None
+
+
+def _alike_exchanged(a: SpringRun | None, b: SpringRun | None) -> bool:
+    """Return whether two runs give nearly one constant if each has the other's mass: a quick look before the test."""
+    if a is None or b is None:
+        return False
+    k_a, k_b = (x.angular_frequency.value**2 * y.mass_kg.value for x, y in ((a, b), (b, a)))
+    return abs(math.log(k_a / k_b)) < NEGLIGIBLE
 
 
 def _far(runs: Sequence[CourseRun]) -> dict[str, Suspect]:
@@ -208,7 +239,7 @@ def _far(runs: Sequence[CourseRun]) -> dict[str, Suspect]:
             scatter = max(mad_sigma(logs - middle), least)
             for (name, value), log in zip(group, logs.tolist(), strict=True):
                 away = (log - middle) / math.hypot(scatter, value.u / value.value)
-                if len(group) >= FEWEST_FOR_LINE and abs(away) > OUTLIER:
+                if len(group) >= FEW and abs(away) > OUTLIER:
                     ratio = math.exp(log - middle)
                     off = f"{ratio:.3g} times" if abs(log - middle) > 1.0 else f"{100.0 * (ratio - 1.0):+.3g} % off"
                     found.setdefault(name, Suspect(name, f"its {words} is {off} that of {others}: {advice}"))

@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import NOTICEABLE
+from pipeline.results.course import LITTLE
 from springmass.charts.chart import Chart
 from springmass.charts.drag_map import drag_map
 from springmass.charts.several import course
@@ -106,7 +106,7 @@ def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
     by_name = {line["name"]: line for line in lines}
     said = [(one.name, one.message, "error") for one in comparison.suspects]
     if comparison.bench != COURSE:  # without a column of benches, nobody says that runs belong together
-        apart = [one for one in comparison.disagreements if one.spread > NOTICEABLE]
+        apart = [one for one in comparison.disagreements if one.spread > LITTLE]
         said += [(name, one.message, "warning") for one in apart for name in one.names]
     for name, message, look in said:
         line = by_name[name]

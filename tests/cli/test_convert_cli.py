@@ -34,7 +34,7 @@ def test_the_original_comes_back_bit_for_bit(cli: Cli, data: Path, tmp_path: Pat
     with open_run(run) as file:
         file.verify()
         assert same_samples(file.samples(), springmass.load(old).loaded.samples)
-        assert (file.format, file.info.kind) == ("motion-sensor", "simulated")
+        assert (file.header.format, file.info.kind) == ("motion-sensor", "simulated")
 
 
 def test_a_pair_comes_back_into_a_folder(cli: Cli, data: Path, tmp_path: Path) -> None:
@@ -96,10 +96,10 @@ def test_a_run_file_converts_to_one_that_says_the_same(cli: Cli, data: Path, tmp
     assert cli("convert", first, second, "--scene", data / "undamped.scene.toml").code == 0
     with open_run(first) as a, open_run(second) as b:
         assert same_samples(a.samples(), b.samples())
-        assert (a.info, a.title, a.traps, a.format) == (b.info, b.title, b.traps, b.format)
+        assert (a.info, a.header.title, a.traps, a.header.format) == (b.info, b.header.title, b.traps, b.header.format)
         assert a.originals() == b.originals()
         assert dict(b.provenance) | dict(a.provenance) == b.provenance
-        assert b.scene == read_scene(data / "undamped.scene.toml").to_mapping()
+        assert b.header.scene == read_scene(data / "undamped.scene.toml").to_mapping()
 
 
 @pytest.mark.parametrize("suffix", [".txt", ".csv"])
