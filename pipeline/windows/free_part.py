@@ -24,8 +24,8 @@ from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, 
 MOST_BENT = 0.25
 
 # Share of the samples: if the bob stops before it, its rest is left out; if it stops before the end less this share,
-# only if the whole recording shows no oscillation. Its periods are then those measured by `pytest
-# tests/trials/test_stopping.py`; with an eighth, the rest hides some of them.
+# only if the whole recording shows no oscillation. With an eighth, rest long before the end is analysed, as measured
+# by `python -m tests.trials.troubles --only before`.
 EARLY = 0.25
 
 
