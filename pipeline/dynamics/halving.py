@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.dynamics.equation import Problem
-from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import MOST_STEPS, Integrator, Trajectory, demand_times
 from pipeline.dynamics.methods import LEAST_RTOL, SolveIvp
-from pipeline.dynamics.strang import STRANG
+from pipeline.dynamics.strang import EXACT, STRANG
 from pipeline.errors import DynamicsError
 
 LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
