@@ -123,8 +123,7 @@ def solved_once(
 ) -> Solution:
     """Solve a motion with the spacing as the step, and estimate the error from a second run with half this step.
 
-    With an error of :math:`c h^p` the error of the run with the longer step h is :math:`2^p / (2^p - 1)` times the
-    difference.
+    With an error of :math:`c h^p`, that of the longer step is :math:`2^p / (2^p - 1)` times the difference.
     """
     started = timer()
     run = integrator.run(problem, spacing_s, count)

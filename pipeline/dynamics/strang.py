@@ -1,12 +1,13 @@
-"""The exact flow of the linear oscillator, and Strang splitting: half a step of it, one of quadratic drag, another half.
+"""The exact flow of the linear oscillator, and Strang splitting: half a step of it, one of the drag, another half.
 
 The flow is accurate for any damping; scipy.linalg.expm takes 30 times as long and loses four digits at gamma = 1000
-omega. The splitting is here because drag is weak and the oscillation fast: at equal error it takes a hundredth of the time of
-scipy's DOP853 (``python benchmarks/dynamics.py``). Spring and viscous drag are advanced by their exact flow, so that a
-linear scene is solved exactly in steps of any length. The flow of quadratic drag is exact too, :math:`v/(1 + b|v|h)`,
-and cannot overflow. A cubic term gives half a kick before and after it. Between turning points friction is a constant
-force, which shifts the rest position of the oscillator. Turning points are located; there the bob sticks if the pull of
-the spring is not greater than the friction. (G. Strang, SIAM J. Numer. Anal. 5 (1968) 506, doi:10.1137/0705041.)
+omega. The splitting is here because drag is weak and the oscillation fast: at equal error it takes a hundredth of the
+time of scipy's DOP853 (``python benchmarks/dynamics.py``). Spring and viscous drag are advanced by their exact flow, so
+that a linear scene is solved exactly in steps of any length. The flow of quadratic drag is exact too, :math:`v/(1 +
+b|v|h)`, and cannot overflow. A cubic term gives half a kick before and after it. Between turning points friction is a
+constant force, which shifts the rest position of the oscillator. Turning points are located; there the bob sticks if
+the pull of the spring is not greater than the friction. (G. Strang, SIAM J. Numer. Anal. 5 (1968) 506,
+doi:10.1137/0705041.)
 """
 
 from __future__ import annotations
@@ -115,7 +116,7 @@ class Strang(Integrator):
 def _states(problem: Problem, h: float, every: int) -> Iterator[float]:
     """Yield displacement and velocity after the drag of every ``every``-th step, before its last half step.
 
-    The half steps of neighbouring steps are combined into whole ones, which halves the time.
+    Half steps of neighbours are combined into whole ones, which halves the time.
     """
     eq, y, v = problem.equation, problem.displacement_m, problem.velocity_m_per_s
     a, b, c, d = flow(eq.angular_frequency_per_s, eq.gamma_per_s, 0.5 * h)

@@ -95,8 +95,7 @@ def _considered(damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
 def _short(windows: Demodulated, damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
     """Return linear drag and no damping, which are all that a record of few periods can distinguish.
 
-    A built-in law that is stated is fitted as well, although the windows did not determine it, and the laws that fit
-    the windows if linear drag contradicts these.
+    A stated built-in law is fitted as well, and the laws that fit the windows if linear drag contradicts these.
     """
     amplitude, rate, t = float(windows.amplitude[0]), float(windows.decay[0]), windows.t - damping.t0
     start = amplitude * math.exp(rate * float(t[0]))
@@ -167,10 +166,7 @@ def _refined(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
 
 
 def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
-    """Select no damping or linear drag by BIC; the noise is unknown, so it uses the logarithm of the residuals.
-
-    A stated law is selected if it was fitted.
-    """
+    """Select a law by BIC from the logarithm of the residuals, as the noise is unknown, or the stated law."""
     found = {}
     for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
         one, law = fits[name], LAWS[name]

@@ -292,10 +292,9 @@ def _rows(samples: Conditioned, windows: Demodulated, damping: Damping) -> Rows:
 def _first_solution(models: Sequence[Solved], rows: Rows, windows: Demodulated, damping: Damping) -> F8:
     """Return the solution of the law with most parameters: the first acceptable one, or else the best.
 
-    If friction ends the motion, chi-square has a separate minimum for each whole number of swings. A solution is
-    unacceptable if its residual exceeds the noise or if a coefficient is negative. The first start is the best of
-    those from the amplitude laws. Each further start is the fit of one kind of damping alone, itself started from the
-    best point of a grid.
+    If friction ends the motion, chi-square has a separate minimum for each whole number of swings. A solution that
+    leaves more than noise, or has a negative coefficient, is not accepted. The first start is the best of those from
+    the amplitude laws; each further one is the fit of one kind of damping alone, started from the best point of a grid.
     """
     richest, ends = models[-1], []
     for alone in (None, *(model for model in models if len(model.law.powers) == 1)):
@@ -403,9 +402,8 @@ def _described(
 ) -> Fitted | str:
     """Return the oscillation by the solution, or what was fitted if no oscillation is left.
 
-    The squared frequency is that of the undamped :math:`\\omega_0` minus the mean decrease by drag over the whole time
-    (:func:`pipeline.damping.law_fit.mean_squared_rate`). To second order it is the frequency that a line through the
-    turning points gives.
+    Its squared frequency is :math:`\\omega_0^2` minus the mean decrease by drag over the whole time: to second order,
+    that of a line through the turning points.
     """
     theta, best, unit = model.full(own.values), damping.best, samples.track.unit
     still, y, v, natural = theta[: len(STATE)].tolist()

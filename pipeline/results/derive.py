@@ -76,7 +76,7 @@ class Derived:
     def parameters_of(self, fit: LawFit) -> dict[str, Estimate]:
         """Return the parameters of a law by name, in true seconds and metres, with all known contributions.
 
-        If the results are stated by this law, their values are returned. Coefficients that are not determined are upper
+        Those of the law of the results are the results themselves; coefficients that are not determined are upper
         limits.
         """
         from uncertainties import correlated_values
@@ -345,9 +345,8 @@ def _crest(phase: Phase, laws: _Laws, unit: str, inputs: Inputs) -> Any:
     """Return the largest angle of the first swing over the amplitude of its sinusoid.
 
     A stiffness that changes as the square of the amplitude by :math:`\\Delta\\omega/\\omega_0 = \\kappa A^2/\\omega_0`
-    gives a third harmonic of :math:`\\kappa A^2/12\\omega_0` of the amplitude: for a pendulum, whose period grows by
-    :math:`A^2/16`, a crest :math:`A^2/192` below that of the sinusoid. This is half of a per cent at 60 degrees. Half
-    of it is taken as its uncertainty, because the frequency may change for another reason.
+    gives a third harmonic of :math:`\\kappa A^2/12\\omega_0` of the amplitude: half of a per cent for a pendulum at 60
+    degrees. Half of it is its uncertainty, because the frequency may change for another reason.
     """
     if phase.backbone is None or phase.small_swings is None or unit != "rad":
         return 1.0
