@@ -76,7 +76,7 @@ class Band:
 
 
 def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
-    """Return the uncertain quantities of a scene that affect its motion; a joint estimate replaces the scene's own values."""
+    """Return the uncertain quantities of a scene that affect its motion; a joint estimate replaces the scene's own."""
     together = measured or Joint((), np.empty(0), np.empty((0, 0)), ())
     alone: dict[str, Estimate] = {}
     for name in (field.name for field in fields(scene)):
@@ -99,8 +99,8 @@ def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS,
     """Return an ensemble of problems: first that of the scene's values, then members drawn from its uncertainties.
 
     The quantities are normally distributed and drawn on a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover,
-    Technometrics 21 (1979) 239): each of as many intervals of equal probability as there are members is drawn once, so that
-    quantiles scatter less. Negative draws of a quantity that cannot be negative are set to 0.
+    Technometrics 21 (1979) 239): each of as many intervals of equal probability as there are members is drawn once, so
+    that quantiles scatter less. Negative draws of a quantity that cannot be negative are set to 0.
     """
     from scipy.special import ndtri
 

@@ -389,7 +389,7 @@ def _estimate(quantity: Any, unit: str) -> Estimate:
 
 
 def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
-    """Return :math:`k = \\omega_0^2 M` in N/m by name, M being the oscillating mass; empty without a mass of the bob."""
+    """Return :math:`k = \\omega_0^2 M` in N/m by name, M being the oscillating mass; empty without a bob's mass."""
     if scene.bob_mass_kg is None:
         return {}
     spring = scene.spring_mass_kg or unstated_spring_kg(scene)
