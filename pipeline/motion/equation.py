@@ -222,9 +222,8 @@ def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *
     periods = windows.angular_frequency / (2.0 * math.pi) * float(np.ptp(windows.t))
     if ratio <= NOTICEABLE and periods > MOST_PERIODS:
         return (
-            f"the bob stops within the record, and whether friction stopped it was not settled: over {periods:.0f} "
-            f"periods the equation of motion takes too long to solve (at most {MOST_PERIODS}); the averaged "
-            "law stands"
+            f"the bob stops within the record, but over {periods:.0f} periods the equation of motion takes too long to "
+            f"solve (at most {MOST_PERIODS}), so it is open whether friction stopped it: the averaged law stands"
         )
     words = f"the damping ratio is {ratio:.2g} at the start, where laws of the amplitude err"
     rows, size_m = _rows(samples, windows, damping), abs(float(damping.best.joint.values[0]))
@@ -233,18 +232,17 @@ def fit_equation(samples: Conditioned, windows: Demodulated, damping: Damping, *
     start = _first_solution(models, rows, windows, damping)
     found, rows = clipped(models[-1], rows, start, least_m=expected_m, rounds=3)
     left, count = rows.left(models[-1], found.values)[rows.used], models[-1].full(found.values).size
-    if left.size <= count:
-        return f"{words}, and no motion with {laws[-1].words} comes near the samples: the averaged law stands"
-    noise_m = max(math.sqrt(float(left @ left) / (left.size - count)), 0.01 * expected_m)
+    noise_m = math.sqrt(float(left @ left) / (left.size - count)) if left.size > count else math.inf
     if not noise_m <= MISFIT * expected_m:
         return (
-            f"{words}, and the equation of motion with {laws[-1].words} leaves {amount(noise_m, unit)} where samples "
-            f"scatter by {amount(expected_m, unit)}: the averaged law stands"
+            f"{words}, and the equation of motion with {laws[-1].words} leaves more than the noise of the samples, "
+            f"{amount(expected_m, unit)}: the averaged law stands"
         )
+    noise_m = max(noise_m, 0.01 * expected_m)
     correlation, rows = correlation_length(left), replace(rows, u=noise_m)
     chosen = _chosen(models, rows, found.values, correlation, damping, unit)
     if chosen is None:
-        return f"the damping ratio is {ratio:.2g} at the start, and no fit of the equation converged"
+        return f"{words}, and no fit of the equation of motion converged"
     damping, model, own = chosen
     fitted = _described(samples, windows, damping, model, rows, own)
     if damping.best.rate_at_start() < 0.0:

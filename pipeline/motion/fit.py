@@ -109,13 +109,7 @@ def fit(model: Model, rows: Rows, start: F8) -> Fit:
 
 
 def clipped(
-    model: Model,
-    rows: Rows,
-    start: F8,
-    *,
-    least_m: float,
-    noise_m: float = math.inf,
-    rounds: int = ROUNDS,
+    model: Model, rows: Rows, start: F8, *, least_m: float, noise_m: float = math.inf, rounds: int = ROUNDS
 ) -> tuple[Fit, Rows]:
     """Fit until the set of false echoes is stable; return the last fit and its rows.
 

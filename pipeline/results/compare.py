@@ -90,10 +90,7 @@ class Comparison:
 
 @one_thread
 def compare_springs(
-    runs: Sequence[SpringRun],
-    *,
-    spring_mass_kg: Estimate | None = None,
-    mass_correlation: float = 0.0,
+    runs: Sequence[SpringRun], *, spring_mass_kg: Estimate | None = None, mass_correlation: float = 0.0
 ) -> Comparison:
     """Test whether runs made with one spring give one spring constant.
 
@@ -137,10 +134,7 @@ def compare_springs(
 
 
 def _fit(
-    runs: Sequence[SpringRun],
-    masses: Sequence[Estimate],
-    stated: Estimate | None,
-    mass_correlation: float,
+    runs: Sequence[SpringRun], masses: Sequence[Estimate], stated: Estimate | None, mass_correlation: float
 ) -> Comparison:
     loads = np.array([mass.value for mass in masses])
     spring = _known_spring(masses, stated)
