@@ -72,7 +72,7 @@ def _survey(path: str, table: Table, column: Column) -> Survey:
     measured = column.measure or NUMBER
     try:
         rows = rows_of(path, table, column, measured)
-        samples = read_samples(path, rows, table, column, measured, None)
+        samples = read_samples(path, rows, table, column, measured)
     except NeedsAnswer:
         return Survey(table.run, column.name, column.unit, rows.value.size, None, ())
     except FormatError as error:
