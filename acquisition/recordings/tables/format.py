@@ -155,8 +155,7 @@ def tables_of_text(
 
 def _tables(path: str, text: Text | Sheet, begin: int, header: Header, stop: int | None) -> list[Table]:
     """Read the rows below a header that begins at a line."""
-    first, mark = begin + header.lines, header.delimiter
-    read = read_rows(path, text, first, mark, stop=stop, clock=header.clock, brackets=header.brackets)
+    read = read_rows(path, text, begin + header.lines, header.delimiter, stop=stop, clock=header.clock)
     stated = {each.name: getattr(header, each.name) for each in fields(Stated)}
     common = replace(read, **{**stated, "traps": (*header.traps, *read.traps)})
     tables = side_by_side(common, header.headings, header.run)

@@ -148,8 +148,6 @@ class Header(Stated):
         One for each column.
     clock : int or None
         A column of times of day.
-    brackets : bool
-        Whether rows are a matrix of MATLAB, in brackets and with semicolons at their ends.
     refused : tuple of str or None
         Why the rows cannot be read, and what to do.
     """
@@ -159,7 +157,6 @@ class Header(Stated):
     delimiter: str
     headings: Sequence[Heading]
     clock: int | None = None
-    brackets: bool = False
     refused: tuple[str, str] | None = None
 
 
