@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import tempfile
 import threading
 from pathlib import Path
 from typing import Any
 
+from acquisition.decoders.line_protocol import LineProtocolEncoder
 from storage.wire_log.appending import LogFile, WireLogWriter
 from storage.wire_log.records import Kind, Record
 from storage.wire_log.scanning import LogContents
@@ -32,6 +34,13 @@ def json_of(record: Record) -> dict[str, Any]:
     """Return the content of a record in JSON."""
     content: dict[str, Any] = json.loads(record.payload)
     return content
+
+
+def line(n: int, echo_us: float) -> bytes:
+    """Return what a sensor of the line protocol sends as reading ``n`` at 100 Hz; NaN for no echo."""
+    return LineProtocolEncoder().encode(
+        sequence=n, device_us=10_000 * n, echo_us=echo_us, distance_m=0.25, temperature_c=math.nan
+    )
 
 
 class Disk:
