@@ -16,7 +16,7 @@ from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve
 from pipeline.results.kinematics import Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
-from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
+from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty
 
 REASONS: tuple[tuple[int, str], ...] = (
@@ -92,8 +92,8 @@ def _reason(flags: int, y: float) -> str:
 def _marks(notes: Sequence[Note]) -> list[Series]:
     """Marks of the recording, its trigger and its losses, as vertical lines."""
     chosen = [note for note in notes if note.kind in ("mark", "trigger", "lost", "reopened")]
-    texts = [note.text if note.kind == "mark" else note.kind for note in chosen]
-    return [mark("marks", [note.t_s for note in chosen], texts)] if chosen else []
+    at, texts = np.array([note.t_s for note in chosen]), (n.text if n.kind == "mark" else n.kind for n in chosen)
+    return [Series("marks", at, np.full(at.size, np.nan), "mark", why=tuple(texts))] if chosen else []
 
 
 def _fit_lines(a: Analysis, motion: Oscillation, factor: float) -> list[Series]:
@@ -202,10 +202,8 @@ def frequency(a: Analysis) -> Chart | None:
     for part in np.array_split(order, min(MOST_STRETCHES, order.size // 2)):
         t, turned = windows.t[part], windows.phase[part]
         weight = 1.0 / np.maximum(windows.covariance[part, 1, 1] * max(phase.reduced_chi2, 1.0), 1e-30)
-        middle = np.average(t, weights=weight)
-        spread = float(np.sum(weight * (t - middle) ** 2))
-        slope = float(np.sum(weight * (t - middle) * turned)) / spread
-        points.append((float(np.mean(windows.amplitude[part])), slope, spread**-0.5))
+        (slope, _), covariance = np.polyfit(t - t.mean(), turned, 1, w=np.sqrt(weight), cov="unscaled")
+        points.append((float(np.mean(windows.amplitude[part])), slope, covariance[0, 0] ** 0.5))
     size, slope, u = np.array(sorted(points), np.float64).T
     factor, mean = SHOWN[a.track.unit].factor, phase.angular_frequency.value
     grid = np.linspace(float(size[0]), float(size[-1]), 100)
@@ -446,7 +444,7 @@ def spectrum_of(a: Analysis, motion: Oscillation) -> tuple[F8, F8, F8] | None:
     samples and gaps are filled with the fit in the recording, and with zero in the residuals.
     """
     track, waveform = a.track, motion.waveform
-    used = ((a.flags & UNUSABLE) == 0) & np.isfinite(track.y) & np.isfinite(waveform.residual)
+    used = _used(a) & np.isfinite(waveform.residual)
     start, end = float(track.t[used][0]), float(track.t[used][-1])
     count = max(round((end - start) * track.rate_hz) + 1, 8)
     grid = np.linspace(start, end, count)

@@ -13,9 +13,8 @@ from pipeline.results.compare import Comparison
 from pipeline.results.masses import Hooke, MassLine
 from pipeline.track import UNUSABLE
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of, value_label
+from springmass.charts.run import DETAIL_PERIODS
 from springmass.typeset import prefixed, pretty
-
-DETAIL_PERIODS = 8
 
 
 def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:

@@ -14,7 +14,7 @@ ASIDE = "discarded"
 """Folder next to the runs for discarded runs."""
 
 
-class Afterwards:
+class RunActions:
     """Works on one run; its path comes from the recorder or the command line, never from the network.
 
     ``ours`` is whether the run was recorded just now; no other run can be discarded. ``report`` is the path of the

@@ -9,7 +9,7 @@ from typing import Any
 
 from springmass.page.feeds import LogFeed
 from springmass.page.live_analysis import Watcher
-from springmass.page.run_actions import Afterwards
+from springmass.page.run_actions import RunActions
 from springmass.page.view import View
 from springmass.session.progress import free_bytes
 
@@ -41,7 +41,7 @@ class PageState:
         self.view: View | None = None
         self.watcher: Watcher | None = None
         self.bench: dict[str, Any] = {"phase": "replay" if controls is None else "waiting"}
-        self.after: Afterwards | None = None
+        self.after: RunActions | None = None
         self._feed: LogFeed | None = None
         self._log: Path | None = None
         self._folder: Path | None = None
@@ -51,7 +51,7 @@ class PageState:
         """Show a complete run."""
         self._folder = path.parent
         self._lay(view, scene)
-        self.after = Afterwards(path, ours=False, law=self._law)
+        self.after = RunActions(path, ours=False, law=self._law)
 
     def follow(self, log: Path) -> None:
         """Show a growing log; raises NotALog if the file is not a wire log."""
@@ -113,7 +113,7 @@ class PageState:
             except Exception as error:  # the recording goes on, even if the page cannot show it
                 self.bench["said"] = f"it cannot be shown ({error})"
         if message["phase"] == "built":
-            self.after = Afterwards(Path(message["run"]), ours=True, law=self._law)
+            self.after = RunActions(Path(message["run"]), ours=True, law=self._law)
             if self.watcher is not None:
                 self.watcher.complete(Path(message["run"]))
 

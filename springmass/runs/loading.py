@@ -31,7 +31,8 @@ from springmass.runs.options import READ, ReadOptions
 from springmass.runs.scenes import about_of
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
-from storage.run_file.reading import CHECKED, open_run
+from storage.run_file.layout import CHECKED
+from storage.run_file.reading import open_run
 
 UNVERIFIED = "unverified"
 NAMED = 5  # maximum number of differences that a message names
