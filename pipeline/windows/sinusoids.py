@@ -225,6 +225,8 @@ def _retune_short(windows: Windows, omega: float) -> Tuning:
     Frequency and decay are searched; rest position and amplitudes are solved for at each trial (variable projection).
     """
     inside = windows.usable > 0
+    if np.count_nonzero(inside) <= 5:  # rest position, two amplitudes, frequency and decay
+        return Tuning.constant(omega, len(windows.y))
     t, y = (windows.tau + windows.centre[:, None])[inside], windows.y[inside]
     tau = t - t.mean()
 
