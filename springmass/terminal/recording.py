@@ -46,7 +46,7 @@ class ProgressLine:
     def _lines(self, progress: Progress) -> list[str]:
         """Return the progress as far as it fits, the troubles, the keys and the last mark."""
         parts = _parts(progress, self._style)
-        while len(parts) > 2 and len(" | ".join(parts)) >= self._console.columns:
+        while len(parts) > 2 and len(" | ".join(parts)) >= self._style.width:
             parts.pop()
         lines, keys = [" | ".join(parts)], self._help
         if troubles := _troubles(progress):
