@@ -29,7 +29,7 @@ def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
         if not used.any():
             continue
         t, y, motion = a.track.t[used], a.track.y[used], a.motion
-        rest = np.mean(y)
+        rest = np.full(t.size, np.mean(y))
         if isinstance(motion, Oscillation):
             rest, fastest = motion.rest.at(t), max(fastest, motion.cycles.frequency_hz)
         series.append(line_of(visible(name), t - t[0], (y - rest) * SHOWN[unit].factor, "other"))
