@@ -68,10 +68,10 @@ def damping_sentence(analysis: Analysis) -> str:
             "instead of its coefficients."
         )
     if damping.best.rejected:
-        nearest = (
-            "nearest, but others are nearly as good: quote the damping rate or the amplitude against time, not their"
-        )
-        nearest = "by far the nearest, and u of its coefficients was increased" if quoted else f"{nearest} coefficients"
+        nearest = "by far the nearest, and u of its coefficients was increased"
+        if not quoted:
+            instead = "the damping rate or the amplitude against time, not their coefficients"
+            nearest = f"nearest, but others are nearly as good: quote {instead}"
         return f"No damping law fits to within the scatter; {chosen} is {nearest}."
     possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
     if damping.growth_rate:
