@@ -18,12 +18,9 @@ def visible(text: str) -> str:
     Titles, names and units come from files. A control sequence in them could clear the screen or fake a line, and
     a direction mark could reverse a name.
     """
-    return text if text.isprintable() else "".join(c if c.isprintable() else _escaped(c) for c in text)
-
-
-def _escaped(character: str) -> str:
     # Space characters other than " " are harmless; some files have them between a number and its unit.
-    return character if unicodedata.category(character) == "Zs" else character.encode("unicode_escape").decode()
+    shown = (c if c.isprintable() or unicodedata.category(c) == "Zs" else repr(c)[1:-1] for c in text)
+    return text if text.isprintable() else "".join(shown)
 
 
 class AcquisitionError(Error):

@@ -171,17 +171,17 @@ _TEXT = 'export time and position as text, tab separated, under a line "Time (s)
 _AS_CSV = "save the sheet as xlsx or CSV"
 
 
-def _is_hdf5(head: bytes) -> bool:
-    return any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048, 4096))
-
-
 def _begins(with_bytes: bytes) -> Callable[[bytes], bool]:
     return lambda head: head.startswith(with_bytes)
 
 
 _CONTENTS = (
     ("a MATLAB file", _begins(b"MATLAB 5.0 MAT"), 'in MATLAB writematrix([t x], "run.csv")'),
-    ("an HDF5 file", _is_hdf5, "if it is a run file of springmass, open it as a run file"),
+    (
+        "an HDF5 file",
+        lambda head: b"\x89HDF\r\n\x1a\n" in head,
+        "if springmass made it, open it as a run file",
+    ),
     ("an OpenDocument file", lambda head: b"application/vnd.oasis.opendocument" in head[:200], _AS_CSV),
     ("a TDMS index", _begins(b"TDSh"), "name the .tdms file next to it"),
     ("a numpy file", _begins(b"\x93NUMPY"), 'in Python numpy.savetxt("run.csv", array, delimiter=",")'),

@@ -50,7 +50,9 @@ class Strang(Integrator):
             return y, v
         radians = eq.angular_frequency_per_s * step_s
         if radians * steps > MOST_STEPS:
-            raise DynamicsError(f"strang with friction turns by {radians * steps:.3g} rad; take a shorter run")
+            raise DynamicsError(
+                f"strang with friction turns by {radians * steps:.3g} radians; take a shorter step or run"
+            )
         parts = max(1, math.ceil(radians))  # so that a step contains at most one turning point
         return kept(problem, _rubbing(problem, step_s / parts, every * parts), steps // every)
 

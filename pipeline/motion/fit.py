@@ -25,21 +25,16 @@ from pipeline.windows.demodulate import CLIP_SIGMAS
 
 Bools = NDArray[np.bool_]
 
-# Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
-# with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
+# Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas, and
+# with signs by chance, they move an estimate by 4 sqrt(1e-4) = 0.04 of its standard uncertainty.
 STEADY = 1e-4
 
 
 class Model(Protocol):
-    """A motion with named parameters."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each parameter."""
-        ...
+    """A motion with parameters."""
 
     def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
-        """Return the positions (n,) at t, and a function that gives their derivatives (n, p) by the parameters."""
+        """Return the positions (n,) at t, and a function that gives their derivatives (n, p) by them."""
         ...
 
 

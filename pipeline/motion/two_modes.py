@@ -17,7 +17,7 @@ from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by rounding
+ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by IEEE rounding
 # Minimum ratio of the weaker mode's amplitude to the stronger one's; below it only one oscillation counts.
 WEAKER = 1.0 / 3.0
 # Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
@@ -41,13 +41,6 @@ class TwoModes:
 @dataclass(frozen=True, slots=True)
 class Modes:
     """The model of some decaying modes: rest position, then a, b, omega and g of each."""
-
-    count: int
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each parameter."""
-        return ("rest", *(f"{name}{i}" for i in range(self.count) for name in ("a", "b", "omega", "g")))
 
     def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
         """Return the positions (n,) at t, and a function that gives their derivatives (n, p)."""
@@ -81,10 +74,10 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
         return None
     values = (y - y.mean()) / scale
     first = _strongest(tau, values)
-    second = _strongest(tau, values - Modes(1).at(tau, _linear(tau, values, (first,)))[0])
+    second = _strongest(tau, values - Modes().at(tau, _linear(tau, values, (first,)))[0])
     start = _linear(tau, values, (first, second))
     every = np.ones(y.size, np.bool_)
-    found = fit(Modes(2), Rows(tau, values, every, every), start)
+    found = fit(Modes(), Rows(tau, values, every, every), start)
     if not np.all(np.isfinite(found.covariance)) or not float(found.residual @ found.residual) < NEGLIGIBLE * y.size:
         return None
     places = sorted((1, 5), key=lambda i: -float(np.hypot(*found.values[i : i + 2])))

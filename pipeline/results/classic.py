@@ -51,20 +51,18 @@ class Classic:
 def classic(track: Track, scene: Scene | None = None) -> Classic:
     """Evaluate a run as in the report.
 
-    Period (eqs. 13, 18): time from one sampled maximum to the seventh after it, over seven, with
-    :math:`u = 0.01/7` s. Only two of about a thousand samples determine it, so its error is 58 to 183 times the bound.
+    Period (eqs. 13, 18): time from one sampled maximum to the seventh after it, over seven, with :math:`u = 0.01/7` s.
+    Only two of about a thousand samples determine it, so its error is 58 to 183 times the bound.
 
     Amplitude (eq. 17): :math:`(y_\\mathrm{max} - y_\\mathrm{min})/2`, with the uncertainty :math:`u/\\sqrt 2` for the
     stated error u of 2.39 mm. Extremes of noisy samples lie outside the motion: the bias is +0.56 mm at 0.3 mm noise
     and +5.4 mm at 2.39 mm, and false echoes enter it.
 
     Amplitude against time (eq. 22): half the range over 1.5 s, at the time of the window's start, for every sample. It
-    is about 1.2 sigma too large, and assigned to a time that is too early by part of a window. About 150 neighbouring
-    points share samples, so a fit to the points has a wrong interval.
+    is about 1.2 sigma too large and too early, and its neighbouring points share samples.
 
     Damping (eqs. 24, 27): unweighted fit of :math:`A_0 e^{-\\gamma t}` with :math:`A_0` fixed at the amplitude of the
-    first window. The error of this one point becomes an error of the slope, and the fit assumes an exponential although
-    drag is mixed. Together the bias is -12 % at 2.39 mm noise.
+    first window, although drag is mixed. The bias is -12 % at 2.39 mm noise.
     """
     track.demand_length("the classic method")
     scene = scene or Scene()

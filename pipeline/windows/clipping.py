@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, OUTLIER, normal_quantile
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, OUTLIER, ROUNDS, normal_quantile
 from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Conditioned, Cut
 from pipeline.track import F8, Quality
@@ -22,7 +22,6 @@ from pipeline.windows.sinusoids import Windows, refit, solve
 
 LEVELS = 40  # number of heights tried for the level, from the middle of the swing to its top
 SHARE_BEYOND = 0.05  # share of a plateau's samples below the level beyond which samples are left out
-SETTLING, ROUNDS = 8, 11  # fits until the cut crests no longer affect the middle of the swing; fits in all
 
 Bools = NDArray[np.bool_]
 MIDDLE = 0.5  # fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted
@@ -89,10 +88,10 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
     basis = windows.basis(np.full(decay.size, demodulated.angular_frequency), decay)
     inside = np.abs(whole.height(1.0)) < MIDDLE
     ends: list[_End] = []
-    for step in range(ROUNDS):
+    for step in range(2 * ROUNDS):
         fit, sigma = _fitted(windows, basis, inside, least)
         inside = np.abs(fit.height(1.0)) < MIDDLE
-        if step < SETTLING:
+        if step < ROUNDS:  # the cut crests still affect the middle of the swing
             continue
         ends = [end for sign in (1.0, -1.0) if (end := _end(fit, sign, sigma)) is not None]
         if not ends:

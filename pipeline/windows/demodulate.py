@@ -180,7 +180,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
     trial = _reweighted(part, usable, size, MINORITY, level, ROUNDS)
     after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])
-    solution.put(odd[better], trial.part(better))
+    solution.put(odd[better], trial, better)
     spread[odd[better]] = _spread(usable[better], trial.residual[better])
 
 

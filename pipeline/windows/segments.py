@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_CURVE, FEWEST_FOR_LINE, NEGLIGIBLE
 from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
-from pipeline.samples.stopping import moving_part
 from pipeline.track import F8, Quality, Track
 from pipeline.windows.change_points import find_changes, lone_points
 from pipeline.windows.demodulate import FINEST, Demodulated
@@ -115,20 +114,6 @@ def before_trigger(conditioned: Conditioned) -> Segments | None:
     if ranges[0] > HANGING * ranges[1]:
         return None
     return Segments(moment_s, math.inf, (Span(SpanKind.WAITING, float(t[before][0]), moment_s),))
-
-
-def long_after_stop(conditioned: Conditioned, share: float) -> Segments | None:
-    """Return the part to keep of a recording whose bob stops before a share of its samples; None otherwise.
-
-    Hours of rest would decide a fit to all samples.
-    """
-    moving = moving_part(conditioned, share)
-    if moving is None:
-        return None
-    t = conditioned.track.t[conditioned.used]
-    # An equal time at rest is kept, because it shows the rest position and the noise.
-    last_s = float(t[0] + 2.0 * (moving.track.t[-1] - t[0]))
-    return Segments(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, float(t[-1])),))
 
 
 def find_free_part(conditioned: Conditioned, windows: Demodulated) -> Segments | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,23 +106,12 @@ class Solution:
     @property
     def pair_variance(self) -> F8:
         """(w,): sum of the variances of a and b for samples of variance 1; 0 where the window is not good."""
-        count = np.where(self.good, self.normal[:, 0, 0], 1.0)
-        c, s = self.normal[:, 0, 1] / count, self.normal[:, 0, 2] / count
-        cc, cs = self.normal[:, 1, 1] / count - c * c, self.normal[:, 1, 2] / count - c * s
-        ss = self.normal[:, 2, 2] / count - s * s
-        determinant = np.where(self.good, cc * ss - cs * cs, 1.0)
-        return np.asarray(np.where(self.good, (cc + ss) / (count * determinant), 0.0))
+        return np.asarray(np.trace(self.inverse[:, 1:, 1:], axis1=1, axis2=2))
 
-    def put(self, rows: NDArray[np.int64], other: Solution) -> None:
-        """Replace the fits of some windows by those of another solution that contains only these windows."""
-        self.coefficients[rows], self.normal[rows] = other.coefficients, other.normal
-        self.residual[rows], self.good[rows] = other.residual, other.good
-        self.weights[rows] = other.weights
-
-    def part(self, which: NDArray[np.bool_]) -> Solution:
-        """Return the fits of the selected windows."""
-        coefficients, normal, residual = self.coefficients[which], self.normal[which], self.residual[which]
-        return Solution(coefficients, normal, residual, self.good[which], self.weights[which])
+    def put(self, rows: NDArray[np.int64], other: Solution, which: slice | NDArray[np.bool_] = slice(None)) -> None:
+        """Replace the fits of some windows by selected ones of another solution."""
+        for each in fields(self):
+            getattr(self, each.name)[rows] = getattr(other, each.name)[which]
 
 
 def solve(basis: F8, weights: F8) -> Solution:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
 from pipeline.analyse import Oscillation
+from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
@@ -95,6 +96,7 @@ def render_html(
         tables=list(_tables(runs)),
         several=overview,
         compared=compared,
+        of_reported={code for code, kind in kinds().items() if "reported" in kind.about},
         verdict="" if compared is None else typeset(" ".join([compared.comparison.message, *beside(compared)])),
         joint=() if compared is None else [laws_across(joint) for joint in compared.joint],
         provenance=list(_flattened(provenance)),

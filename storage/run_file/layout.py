@@ -33,11 +33,15 @@ NO_HOST_NS = -1
 
 
 class Column(NamedTuple):
-    """One array of the file with a value for each sample; ``fill`` stands in blocks that lack an optional column."""
+    """One array of the file with a value for each sample.
+
+    ``field`` is that of a :class:`Block` with the values; ``fill`` stands in blocks that lack an optional column.
+    """
 
     path: str
     dtype: str
     attributes: Mapping[str, Any]
+    field: str = ""
     fill: float | int = 0
 
     @property
@@ -57,15 +61,17 @@ _QUALITY = {
 _VELOCITY = {"units": "m/s", "long_name": "velocity as the recording states it", **_NAN}
 _HOST = {"units": "ns", "long_name": "host's monotonic clock at arrival; -1 where no host was there"}
 COLUMNS = (
-    Column(f"{SIGNAL}/time", "<f8", {"units": "s", "long_name": "time since the start of the run"}),
-    Column(f"{SIGNAL}/distance", "<f8", {"units": "m", "long_name": "distance from the sensor", **_NAN}),
+    Column(f"{SIGNAL}/time", "<f8", {"units": "s", "long_name": "time since the start of the run"}, "t"),
+    Column(f"{SIGNAL}/distance", "<f8", {"units": "m", "long_name": "distance from the sensor", **_NAN}, "distance"),
     Column(f"{SIGNAL}/distance_errors", "<f4", {**_ERRORS, "_FillValue": np.float32("nan")}),
-    Column(f"{SIGNAL}/quality", "|u1", _QUALITY),
-    Column(f"{SIGNAL}/velocity", "<f8", _VELOCITY, float("nan")),
-    Column("/raw/host_mono_ns", "<i8", _HOST, NO_HOST_NS),
+    Column(f"{SIGNAL}/quality", "|u1", _QUALITY, "flags"),
+    Column(f"{SIGNAL}/velocity", "<f8", _VELOCITY, "velocity", float("nan")),
+    Column("/raw/host_mono_ns", "<i8", _HOST, "host_ns", NO_HOST_NS),
 )
 BY_NAME = {column.name: column for column in (*COLUMNS, Column("/raw/sequence", "<u4", {}))}
 """The columns of files of all versions."""
+CHECKED = tuple(column.name for column in COLUMNS if column.field)
+"""The columns of a block, whose digests are checked when all blocks are read."""
 
 _NOISY = frozenset({"distance", "velocity"})
 
@@ -83,17 +89,10 @@ def filters(path: str) -> Mapping[str, Any]:
 
 def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None]:
     """Return a block's values by column name; None for a missing column."""
-    errors = None
+    values = {name: getattr(block, BY_NAME[name].field) for name in CHECKED}
     if sigma_m is not None:
-        errors = np.where(np.isnan(block.distance), np.nan, sigma_m).astype("<f4")
-    return {
-        "time": block.t,
-        "distance": block.distance,
-        "distance_errors": errors,
-        "quality": block.flags,
-        "velocity": block.velocity,
-        "host_mono_ns": block.host_ns,
-    }
+        values["distance_errors"] = np.where(np.isnan(block.distance), np.nan, sigma_m).astype("<f4")
+    return values
 
 
 def attributes(header: Header) -> dict[str, dict[str, Any]]:

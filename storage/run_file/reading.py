@@ -24,18 +24,9 @@ from storage.errors import NotARun, RunClosed, RunDamaged, one_line
 from storage.hdf5 import damaged, reading_h5
 from storage.run_file import layout
 from storage.run_file.header import FileEntry, Header
-from storage.run_file.layout import CHUNK
+from storage.run_file.layout import CHECKED, CHUNK
 from storage.schema import ValueRefused, plain
 
-_BLOCK_COLUMNS = {
-    "time": "t",
-    "distance": "distance",
-    "quality": "flags",
-    "host_mono_ns": "host_ns",
-    "velocity": "velocity",
-}
-CHECKED = tuple(_BLOCK_COLUMNS)
-"""The columns of a block, whose digests are checked when all blocks are read."""
 _PIECE = 16 * CHUNK
 
 
@@ -85,9 +76,6 @@ class Run:
     def __len__(self) -> int:
         """Return the number of samples."""
         return self.header.samples
-
-    def __repr__(self) -> str:
-        return f"<Run {os.fspath(self.path)!r}: {len(self)} samples, {self.info.kind}>"
 
     @property
     def info(self) -> SourceInfo:
@@ -259,6 +247,6 @@ def _demand_hdf5(path: Path) -> None:
 
 
 def _block(header: Header, start: int, values: Mapping[str, NDArray[Any]]) -> Block:
-    fields: dict[str, Any] = {_BLOCK_COLUMNS[name]: array for name, array in values.items()}
+    fields: dict[str, Any] = {layout.BY_NAME[name].field: array for name, array in values.items()}
     # Older files do not state the quantity; they contain lengths.
     return Block(header.first + start, **fields, quantity=header.quantity or "length", unit=header.unit or "m")

@@ -28,33 +28,20 @@ def write_run(
     info: SourceInfo,
     *,
     originals: Sequence[Original] = (),
-    scene: Mapping[str, Any] | None = None,
-    title: str = "",
-    channel: str = "distance",
-    traps: Sequence[Trap] = (),
-    malformed_rows: int = 0,
-    format: str = "",
     provenance: Mapping[str, Any] | None = None,
     overwrite: bool = False,
+    **header: Any,
 ) -> Path:
     """Write a run file whole.
 
     The blocks are written as they arrive, so at most a chunk of 65536 samples and one block are kept in memory.
+    ``header`` are further fields of :class:`storage.run_file.header.Header`, and the reader's ``traps``.
     """
     with run_writer(path, sigma_m=info.sigma_m, overwrite=overwrite) as run:
         for block in blocks:
             run.append(block)
         run.keep([(original.name, len(original.data), [original.data]) for original in originals])
-        run.finish(
-            info,
-            title=title,
-            channel=channel,
-            format=format,
-            scene=scene,
-            traps=traps,
-            malformed_rows=malformed_rows,
-            provenance=provenance or {},
-        )
+        run.finish(info, provenance=provenance or {}, **header)
     return Path(path)
 
 
@@ -163,7 +150,7 @@ class RunWriter:
     def _write(self, block: Block, *, growing: bool) -> None:
         values = layout.arrays(block, self._sigma_m)
         for column in layout.COLUMNS:
-            array = values[column.name]
+            array = values.get(column.name)
             if array is None and column.name not in self._digests:
                 continue
             if array is None:

@@ -52,6 +52,7 @@ _EXPORT = 'in Logger Pro "File", "Export As", "CSV"; in Graphical Analysis "Expo
 _CASSY_EXPORT = "save it again, or export it as text in CASSY Lab"
 
 _PANEL = b"org.opensourcephysics.cabrillo.tracker.TrackerPanel"
+_BLANKS = b"\xef\xbb\xbf \r\n\t"
 _LOST = math.nan, math.nan
 _MOST_FRAMES = 10**6
 _SAVE = "save it again, or export the table of the mass in Tracker"
@@ -61,7 +62,7 @@ def _read_markup(path: str, data: bytes, remedy: str) -> Element:
     """Return the root of an XML file without a document type, which may name other files or expand without limit."""
     from xml.etree import ElementTree
 
-    if not data.lstrip(b"\xef\xbb\xbf \r\n").startswith(b"<?xml"):
+    if not data.lstrip(_BLANKS).startswith(b"<?xml"):
         data = decode(data).encode()  # XML without a declaration must be UTF-8, but old programs use other codes
 
     if len(data) > _MOST_BYTES:
@@ -87,10 +88,6 @@ def _tables_of(columns: Sequence[tuple[Heading, F8]], run: str = "") -> list[Tab
 
 def _begins(head: bytes, root: re.Pattern[str]) -> bool:
     return bool(root.match("\n".join(head_lines(head))))
-
-
-def _phyphox_evidence(head: bytes) -> str:
-    return "it is XML with the root <phyphox>" if _begins(head, _PHYPHOX) else ""
 
 
 def _phyphox_tables(path: str, data: bytes) -> list[Table]:
@@ -233,11 +230,6 @@ def _described(path: str, above: Sequence[str], width: int) -> list[Heading]:
     return [_heading(*each) for each in described]
 
 
-def _tracker_evidence(head: bytes) -> str:
-    markup = _PANEL in head and head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<")
-    return "it is XML of Tracker's panel" if markup else ""
-
-
 def _tracker_tables(path: str, data: bytes) -> list[Table]:
     root = _read_markup(path, data, _SAVE)
     unit = next(iter(_texts(root, "length_unit")), "")
@@ -314,6 +306,16 @@ LOGGER_PRO = replace(
     evidence=lambda head: _vernier_evidence(head) or _TEXT.evidence(head),
     tables=lambda path, data: (_vernier_tables if _vernier_evidence(data[:HEAD_BYTES]) else _TEXT.tables)(path, data),
 )
-PHYPHOX = ColumnFormat("phyphox", "phyphox: saved state as XML", _phyphox_evidence, _phyphox_tables)
-TRACKER = ColumnFormat("tracker", "Tracker: saved as trk (XML)", _tracker_evidence, _tracker_tables)
+PHYPHOX = ColumnFormat(
+    "phyphox",
+    "phyphox: saved state as XML",
+    lambda head: "it is XML with the root <phyphox>" if _begins(head, _PHYPHOX) else "",
+    _phyphox_tables,
+)
+TRACKER = ColumnFormat(
+    "tracker",
+    "Tracker: saved as trk (XML)",
+    lambda head: "it is XML of Tracker's panel" if _PANEL in head and head.lstrip(_BLANKS)[:1] == b"<" else "",
+    _tracker_tables,
+)
 CASSY = ColumnFormat("cassy", "CASSY Lab: saved as labx (XML) or lab (text)", _cassy_evidence, _cassy_tables)

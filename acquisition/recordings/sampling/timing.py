@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -58,7 +57,9 @@ def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[f
         return float(np.mean(snap(probe, grid, resolution)[1]))
 
     for origin in (0.0, float(times[0])):
-        shares = {grid: share(grid) for grid in (Grid(rate, origin) for rate in rates) if _every_point(times, grid)}
+        grids = [Grid(rate, origin) for rate in rates]
+        # Consecutive times must usually lie at consecutive grid points.
+        shares = {grid: share(grid) for grid in grids if median(np.diff(grid.nearest(times[:_PROBE]))) == 1.0}
         best = max(shares, key=lambda grid: shares[grid], default=None)
         if best is not None and shares[best] > _SHARE_ON_GRID:
             beside = (Grid(rate, origin) for rate in (best.rate_hz - 1.0, best.rate_hz + 1.0) if rate > 0)
@@ -79,11 +80,6 @@ def _probe(apart: F8) -> F8:
     if apart.size <= 4 * _PROBE:
         return apart
     return np.concatenate((apart[:_PROBE], apart[:: apart.size // _PROBE], apart[-_PROBE:]))
-
-
-def _every_point(apart: F8, grid: Grid) -> bool:
-    """Return whether consecutive times usually lie at consecutive grid points."""
-    return median(np.diff(grid.nearest(apart[:_PROBE]))) == 1.0
 
 
 def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
@@ -158,36 +154,18 @@ class Rows:
         return np.cumsum(~self.remark) - 1
 
 
-class Bursts(NamedTuple):
-    """Samples that were stamped in bursts of ``size`` on average, one every ``interval_s``.
-
-    Spread evenly, they are ``step_s`` apart and begin at ``first_s``. They are ``complete`` if the last stamp of every
-    burst lies within one interval of its evenly spaced time; otherwise samples are missing somewhere.
-    """
-
-    size: float
-    interval_s: float
-    step_s: float
-    first_s: float
-    complete: bool
-
-
 class Timing(NamedTuple):
     """Rate and grid of a file's times; no grid if the times fit none and are used as printed.
 
-    The rate is ``certain`` if the times or a header determine it, and ``given`` if the user gave it. ``steps_s`` is
-    the range of the time steps (5th to 95th percentile) if the times fit no grid but jitter little about one step.
-    ``by_row`` says that times computed from row numbers are better than the printed times.
+    ``by_row`` says that times computed from row numbers are better than the printed times. ``traps`` say how the times
+    were obtained.
     """
 
     rate_hz: float
     grid: Grid | None
     resolution_s: float
-    certain: bool
-    given: bool = False
-    steps_s: tuple[float, float] | None = None
     by_row: bool = False
-    bursts: Bursts | None = None
+    traps: tuple[Trap, ...] = ()
 
 
 def check_rate(path: str, rate_hz: float | None) -> None:
@@ -201,49 +179,7 @@ def rate_needed(instead: MissingItem | None = None) -> MissingItem:
     return MissingItem(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
 
 
-def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
-    """Infer the rate from the printed times (s) of valid rows; ask for it if they do not show it."""
-    if (bursts := find_bursts(printed)) is not None:
-        return _spread(path, bursts, resolution, rate_hz)
-    found = find_rate(printed, resolution, rate_hz)
-    if found is None:
-        if rate_hz is None:
-            reason = f"expected different times, got {printed.size} rows at one time"
-            raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
-        origin = float(printed[0]) if printed.size else 0.0
-        return Timing(rate_hz, Grid(rate_hz, origin), resolution, certain=False, given=True)
-    rate, relative_u, grid, certain = found
-    steps = _jitter(printed) if grid is None else None
-    if rate_hz is not None:
-        allowed = rate_hz * (1.5 * relative_u + 1e-6 + (0.01 if steps else 0.0))
-        if abs(rate - rate_hz) > allowed:
-            problem = f"rate_hz must agree with the times, {rate:.6g} Hz, got {rate_hz:g}"
-            raise FormatError(path, problem, "leave the rate out or correct it")
-        return Timing(rate_hz, grid, resolution, certain=True, given=True, steps_s=steps)
-    return Timing(rate, grid, resolution, certain, steps_s=steps)
-
-
-def _spread(path: str, bursts: Bursts, resolution: float, rate_hz: float | None) -> Timing:
-    """Return a timing with evenly spaced times for samples that were stamped in bursts."""
-    if rate_hz is None and not bursts.complete:
-        each = f"{bursts.size:.3g} samples every {1e3 * bursts.interval_s:.3g} ms"
-        raise NeedsAnswer(Question(path, (rate_needed(),), reason=f"the times come in bursts of {each}, some missing"))
-    rate = rate_hz or 1.0 / bursts.step_s
-    grid = Grid(rate, bursts.first_s)
-    return Timing(rate, grid, resolution, certain=True, given=rate_hz is not None, by_row=True, bursts=bursts)
-
-
-def _jitter(printed: F8) -> tuple[float, float] | None:
-    """Return the 5th and 95th percentiles of the time steps if these differ little; else None."""
-    steps = np.diff(printed)
-    steps = steps[steps > 0]
-    if steps.size < 2:
-        return None
-    low, middle, high = (float(x) for x in np.percentile(steps, (5, 50, 95)))
-    return (low, high) if high - low <= _SHARE_OF_JITTER * middle else None
-
-
-def find_timing(path: str, rows: Rows, formula: Formula | None, rate_hz: float | None) -> tuple[Timing, list[Trap]]:
+def find_timing(path: str, rows: Rows, formula: Formula | None, rate_hz: float | None) -> Timing:
     """Return the rate and the grid of the times: those of the header if no column contradicts it, or of the column.
 
     Without any times the user must give the rate.
@@ -257,23 +193,28 @@ def find_timing(path: str, rows: Rows, formula: Formula | None, rate_hz: float |
             traps.append(Trap("stale_header", message, abs(samples - count)))
         timing = _by_formula(path, formula, rows, rate_hz)
         if formula.step_s == _PLACEHOLDER_S and rate_hz is None and rows.printed is None:
-            message = (
-                "the header states steps of 1 s, as LabVIEW does if no rate was set; if they are not, state the rate"
-            )
-            traps.append(Trap("rate_assumed", message))
+            steps = "the header states steps of 1 s, as LabVIEW does if no rate was set"
+            traps.append(Trap("rate_assumed", f"{steps}; if they are not, state the rate"))
         if timing is None:
             stated = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
             what = "which are impossible" if rows.printed is None else "but the column of times differs and is used"
             size = 1 if rows.printed is None else rows.printed.size
             traps.append(Trap("stale_header", f"{stated}, {what}", size))
     if timing is None and rows.printed is not None:
-        timing = _by_column(path, rows.printed[~rows.unread], rows.time_resolution, rate_hz)
+        known = rows.printed[~rows.unread]
+        timing = _in_bursts(path, known, rows.time_resolution, rate_hz)
+        timing = timing or _by_column(path, known, rows.time_resolution, rate_hz)
     if timing is None:
         if rate_hz is None:
             reason = "no column of times and no sampling interval"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
-        timing = Timing(rate_hz, Grid(rate_hz), 0.0, certain=True, given=True, by_row=True)
-    return timing, traps
+        timing = Timing(rate_hz, Grid(rate_hz), 0.0, by_row=True, traps=_nominal(rate_hz))
+    given = () if rate_hz is None else (Trap("rate_given", f"you stated the sampling rate: {rate_hz:g} Hz"),)
+    return timing._replace(traps=(*traps, *timing.traps, *given))
+
+
+def _nominal(rate_hz: float) -> tuple[Trap]:
+    return (Trap("nominal_clock", f"times are row numbers over a nominal {rate_hz:g} Hz, not measured times"),)
 
 
 def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) -> Timing | None:
@@ -286,46 +227,57 @@ def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) 
         slack = 0.5001 * rows.time_resolution + 1e-9 * np.maximum(np.abs(expected), step_s)
         if ((np.abs(rows.printed - expected) > slack) & ~rows.unread).any():  # the comparison is false for a NaN
             return None
-    if rate_hz is not None and step_s == _PLACEHOLDER_S:
-        return Timing(rate_hz, Grid(rate_hz, start_s), 0.0, certain=True, given=True, by_row=True)
     rate = 1.0 / step_s
     rounded = float(f"{rate:.9g}")
     rate = rounded if math.isclose(rounded, rate, rel_tol=1e-12) else rate
+    if rate_hz is not None and step_s == _PLACEHOLDER_S:
+        rate = rate_hz
     if rate_hz is not None and abs(rate - rate_hz) > 1e-6 * rate:
         problem = f"rate_hz must agree with the header, {rate:.6g} Hz, got {rate_hz:g}"
         raise FormatError(path, problem, "leave the rate out or correct it")
-    return Timing(rate, Grid(rate, start_s), 0.0, certain=True, by_row=True)
+    return Timing(rate, Grid(rate, start_s), 0.0, by_row=True, traps=_nominal(rate))
 
 
-def clock_traps(timing: Timing) -> Iterator[Trap]:
-    """Report how the times were obtained."""
-    if timing.bursts is not None:
-        size, interval_ms = timing.bursts.size, 1e3 * timing.bursts.interval_s
-        bursts = f"bursts of {size:.3g} samples every {interval_ms:.4g} ms"
-        message = f"the times come in {bursts}; the samples were spread evenly, at {timing.rate_hz:.6g} Hz"
-        yield Trap("times_in_bursts", message)
-    elif timing.grid is not None:
-        message = f"times are row numbers over a nominal {timing.rate_hz:g} Hz, not measured times"
-        yield Trap("nominal_clock", message)
-    if timing.given:
-        yield Trap("rate_given", f"you stated the sampling rate: {timing.rate_hz:g} Hz")
-    elif timing.steps_s is not None:
-        low, high = (1e3 * step for step in timing.steps_s)
-        digits = min(max(4, 1 - math.floor(math.log10((high - low) / high))), 9) if high > low else 4
-        steps = f"{low:.{digits}g} to {high:.{digits}g} ms ({timing.rate_hz:.6g} Hz on average)"
-        message = f"the times are measured: their steps vary from {steps}"
-        yield Trap("jittered_time", message)
-    elif not timing.certain:
-        if timing.grid is None:
-            message = f"the times fit no regular grid and are used as printed ({timing.rate_hz:.6g} Hz on average)"
-            yield Trap("jittered_time", message)
-        else:
-            message = f"the rate of {timing.rate_hz:g} Hz is the most likely one: there are too few rows to be certain"
-            yield Trap("rate_assumed", message)
+def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
+    """Infer the rate from the printed times (s) of valid rows; ask for it if they do not show it."""
+    found = find_rate(printed, resolution, rate_hz)
+    if found is None:
+        if rate_hz is None:
+            reason = f"expected different times, got {printed.size} rows at one time"
+            raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
+        origin = float(printed[0]) if printed.size else 0.0
+        return Timing(rate_hz, Grid(rate_hz, origin), resolution, traps=_nominal(rate_hz))
+    rate, relative_u, grid, certain = found
+    jitter = None if grid is not None else _jitter(printed)
+    if rate_hz is not None:
+        allowed = rate_hz * (1.5 * relative_u + 1e-6 + (0.01 if jitter else 0.0))
+        if abs(rate - rate_hz) > allowed:
+            problem = f"rate_hz must agree with the times, {rate:.6g} Hz, got {rate_hz:g}"
+            raise FormatError(path, problem, "leave the rate out or correct it")
+        return Timing(rate_hz, grid, resolution, traps=_nominal(rate_hz) if grid else ())
+    if grid is None:
+        measured = f"are measured: their steps vary from {jitter}"
+        times = measured if jitter else "fit no regular grid and are used as printed"
+        traps = (Trap("jittered_time", f"the times {times} ({rate:.6g} Hz on average)"),)
+        return Timing(rate, None, resolution, traps=traps)
+    likely = f"the rate of {rate:g} Hz is the most likely one: there are too few rows to be certain"
+    assumed = () if certain else (Trap("rate_assumed", likely),)
+    return Timing(rate, grid, resolution, traps=(*_nominal(rate), *assumed))
 
 
-def find_bursts(t: F8) -> Bursts | None:
-    """Find bursts in the printed times of a recording (s); None for times that do not come in regular bursts.
+def _jitter(printed: F8) -> str:
+    """Return the 5th and 95th percentiles of the time steps if these differ little; else an empty text."""
+    steps = np.diff(printed)
+    steps = steps[steps > 0]
+    if steps.size < 2:
+        return ""
+    low, middle, high = (1e3 * float(x) for x in np.percentile(steps, (5, 50, 95)))
+    digits = min(max(4, 1 - math.floor(math.log10((high - low) / high))), 9) if high > low else 4
+    return f"{low:.{digits}g} to {high:.{digits}g} ms" if high - low <= _SHARE_OF_JITTER * middle else ""
+
+
+def _in_bursts(path: str, t: F8, resolution: float, rate_hz: float | None) -> Timing | None:
+    """Return evenly spaced times for times (s) that come in regular bursts; None for other times.
 
     A computer that polls a sensor, or gets its samples in packets, stamps each sample when it arrives. The stamps of
     one packet lie close together and contain no information on when its samples were taken. The stamps of the last
@@ -351,5 +303,10 @@ def find_bursts(t: F8) -> Bursts | None:
     if size < _SAME_TIME and not steps[within].any():
         return None
     step, start = (float(each) for each in np.polyfit(last, t[last], 1))
-    late = np.abs(t[last] - (start + step * last))
-    return Bursts(size, interval, step, start, bool(late.max() < interval))
+    bursts = f"bursts of {size:.3g} samples every {1e3 * interval:.4g} ms"
+    # Samples are missing if the last stamp of a burst is further than one interval from its evenly spaced time.
+    if rate_hz is None and np.abs(t[last] - (start + step * last)).max() >= interval:
+        raise NeedsAnswer(Question(path, (rate_needed(),), reason=f"the times come in {bursts}, some missing"))
+    rate = rate_hz or 1.0 / step
+    message = f"the times come in {bursts}; the samples were spread evenly, at {rate:.6g} Hz"
+    return Timing(rate, Grid(rate, start), resolution, by_row=True, traps=(Trap("times_in_bursts", message),))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import math
 import re
@@ -10,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.block import B1, F8, I8
+from acquisition.block import B1, F8
 
 I1 = NDArray[np.int8]
 NAN, EMPTY, UNREAD = -1, -2, -3
@@ -26,9 +27,6 @@ for _kind, _characters in ((0, b"\0"), (_DIGIT, b"0123456789"), (_SIGN, b"+-"), 
     _KINDS[list(_characters)] = _kind
 _DAMAGE = bytes.maketrans(b"\0\x0b\x0c\x1c\x1d\x1e\x1f", b"?" * 7)
 """Control characters that numpy or ``split`` would ignore: a number next to one may have lost digits."""
-_BLOCK = 65536
-_MOST_EXACT, _MOST_TENS = 1e15, 22  # whole numbers and powers of ten up to here are exact in binary
-_TENS = np.array([float(f"1e{power}") for power in range(_MOST_TENS + 1)])
 CLOCK = re.compile(
     r"'?(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ,]*)?"
     r"(?:(?P<h>\d{1,2}):(?P<m>\d{1,2}):(?P<s>\d{1,2})(?:[.,](?P<part>\d{1,9})|::?(?P<ms>\d{1,3}))?"
@@ -140,59 +138,29 @@ def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
     raw[comma] = ord(".")
     values[fixed] = text[fixed].astype(np.float64)
     rest = ~fixed & (lengths > 0)
-    if rest.any() and not (kinds[rest] == _OTHER).any() and _exponents(text, kinds, places, rest, values, decimals):
-        return values, decimals, comma.any(axis=1)
+    # A mantissa with a mark, and an exponent of up to two digits.
+    letters = kinds == _E
+    exponent = lengths - letters.argmax(axis=1)  # the length of it with its letter
+    scientific = rest & (letters.sum(axis=1) == 1) & (marked == 1) & (places >= exponent) & (exponent <= len("e-99"))
+    if (scientific == rest).all() and not (kinds[rest] == _OTHER).any():
+        with contextlib.suppress(ValueError):
+            values[rest] = text[rest].astype(np.float64)
+            decimals[rest] = np.minimum(places - exponent, EXPONENT - 1)[rest] + EXPONENT
+            rest &= ~np.isfinite(values)
     for row in np.flatnonzero(rest).tolist():
         values[row], decimals[row] = cell(cells[row].decode("latin-1"))
     return values, decimals, comma.any(axis=1)
 
 
-def _exponents(
-    text: NDArray[np.bytes_], kinds: NDArray[np.uint8], places: I8, rows: B1, values: F8, decimals: I1
-) -> bool:
-    """Read the numbers in some rows, if all have a mantissa with a mark, and an exponent of up to three digits."""
-    letters = kinds[rows] == _E
-    exponent = np.count_nonzero(kinds[rows], axis=1) - letters.argmax(axis=1)  # with its letter
-    own = places[rows] - exponent
-    if not ((letters.sum(axis=1) == 1) & (own >= 0) & (own < EXPONENT) & (exponent <= len("e-99"))).all():
-        return False
-    try:
-        read = text[rows].astype(np.float64)
-    except ValueError:
-        return False
-    if not np.isfinite(read).all():
-        return False
-    values[rows], decimals[rows] = read, own + EXPONENT
-    return True
-
-
 def scaled(values: F8, decimals: I1 | None, power: int) -> F8:
-    """Return printed numbers times ten to a power, each rounded only once; binary numbers are only multiplied.
+    """Return numbers times ten to a power, rounded only once if they are printed without exponents.
 
-    A number printed with d decimals is a whole number over 10**d, so it is divided once by 10**(d - power).
+    A number printed with d decimals is a whole number over 10**d, so its product is one over 10**(d - power).
     """
-    if decimals is None:
-        result: F8 = values / 10.0**-power if power else values.copy()
+    result: F8 = values * 10.0**power if power >= 0 else values / 10.0**-power
+    if decimals is None or not power or decimals.max(initial=0) >= EXPONENT:
         return result
-    scaled_values = values.copy()
-    for start in range(0, values.size if power else 0, _BLOCK):  # blocks take little memory
-        rows = slice(start, start + _BLOCK)
-        _scale(scaled_values[rows], decimals[rows], power)
-    return scaled_values
-
-
-def _scale(values: F8, decimals: I1, power: int) -> None:
-    places = np.clip(decimals, 0, _MOST_TENS).astype(np.int64)
-    net = places - power
-    near = np.minimum(np.abs(net), _MOST_TENS)
-    with np.errstate(over="ignore", invalid="ignore"):  # these numbers are not exact, and are scaled below
-        whole = np.rint(values * _TENS[places])
-        exact = (decimals >= 0) & (decimals <= _MOST_TENS) & (np.abs(net) <= _MOST_TENS) & (np.abs(whole) < _MOST_EXACT)
-        result = np.where(net >= 0, whole / _TENS[near], whole * _TENS[near])
-    for row in np.flatnonzero(~exact & np.isfinite(values)).tolist():
-        mantissa, _, exponent = repr(float(values[row])).partition("e")
-        result[row] = float(f"{mantissa}e{int(exponent or 0) + power}")
-    values[:] = np.where(np.isfinite(values), result, np.nan)
+    return np.round(result, int(decimals.max(initial=0)) - power)
 
 
 def usual_decimals(decimals: I1) -> tuple[int, bool]:

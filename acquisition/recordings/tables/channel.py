@@ -12,7 +12,7 @@ from acquisition.block import B1, F8, I8, U8, Block, ClockKind, Flag, Kind, Sour
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.samples import flags_of, line_of, place, row_traps, sample_traps, value_traps
-from acquisition.recordings.sampling.timing import Rows, Timing, check_rate, clock_traps, find_timing
+from acquisition.recordings.sampling.timing import Rows, Timing, check_rate, find_timing
 from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
@@ -97,10 +97,10 @@ def read_samples(
     difference: bool = False,
 ) -> Samples:
     """Return the samples in the rows of a channel."""
-    timing, found = find_timing(path, rows, table.formula, rate_hz)
+    timing = find_timing(path, rows, table.formula, rate_hz)
+    found = list(timing.traps)
     if table.formula is None and table.times is not None and not table.times.unit:
-        found.append(Trap("time_unit_assumed", "the times have no unit: read as seconds"))
-    found.extend(clock_traps(timing))
+        found.insert(0, Trap("time_unit_assumed", "the times have no unit: read as seconds"))
     unread, t = rows.unread, place(rows, timing)
     timed = np.isfinite(t)
     where = _rows_in(timed)

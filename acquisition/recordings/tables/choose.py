@@ -70,7 +70,10 @@ def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Chan
     sizes = {run: max(_rows(table) for table in tables if table.run == run) for run in runs}
     run = max(runs, key=lambda each: sizes[each])  # the first of the longest
     if answers.run is not None:
-        run = _run_of_name(path, runs, answers.run)
+        if runs == ("",) and answers.run:
+            problem = f'the file has one run without a name, got run "{answers.run}"'
+            raise FormatError(path, problem, "leave run out")
+        run = runs[_index_of_name(path, Missing.RUN, [(each,) for each in runs], answers.run)]
     elif len(runs) > 1:
         needs.append(MissingItem(Missing.RUN, runs, run))
     channels = [(table, column) for table in tables if table.run == run for column in table.columns]
@@ -181,12 +184,6 @@ def _some_of(column: Column) -> F8:
     """Return numbers from all over a column."""
     some = column.values[:: max(1, column.values.size // _SOME)]
     return some[np.isfinite(some)]
-
-
-def _run_of_name(path: str, runs: Sequence[str], run: str) -> str:
-    if runs == ("",) and run:
-        raise FormatError(path, f'the file has one run without a name, got run "{run}"', "leave run out")
-    return runs[_index_of_name(path, Missing.RUN, [(each,) for each in runs], run)]
 
 
 def _index_of_name(path: str, what: Missing, names: Sequence[tuple[str, ...]], wanted: str) -> int:

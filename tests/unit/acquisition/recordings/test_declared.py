@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.errors import AcquisitionError
+from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.recordings.identify import dialect_folder, formats, get_format, open_recording
 
 LOG = """
@@ -47,6 +47,8 @@ def test_a_declared_dialect_is_a_family(declare: Callable[[str, str], Path], tmp
     path = declare("height-log.toml", LOG)
     assert path.parent == dialect_folder()
     assert formats()[0].name == get_format("height-log").name == "height-log"
+    with pytest.raises(UnknownFormat, match="nonsense"):
+        get_format("nonsense")
     (tmp_path / "run.txt").write_text(DATA, encoding="utf-8")
     recording = open_recording(tmp_path / "run.txt")
     assert (recording.format, recording.channel, recording.info.rate_hz) == ("height-log", "height", 50.0)

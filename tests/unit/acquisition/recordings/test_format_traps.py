@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import io
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition.recordings.identify import get_format
+from acquisition.block import F8
+from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.recordings.identify import get_format, open_recording
 from acquisition.recordings.recording import Recording
+from tests.sampling import sampled
 
 HEAD = ["LabVIEW Measurement", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tOne"]
 END = "***End_of_Header***"
@@ -109,3 +113,96 @@ def test_capstone_decides_decimal_mark_and_exponent_cell_by_cell() -> None:
     data = f'\ufeff"Time (s) Run #1";"Position (m) Run #1"\r\n{rows}'.encode()
     recording = get_format("capstone").read("run.csv", data)
     assert recording.samples.distance.tolist() == [0.10, -8.90e-4, 0.12, 0.13, 0.14]
+
+
+TRUE = 0.01 * np.arange(3000)
+
+
+def polled(interval_s: float, apart_s: float = 1e-4) -> F8:
+    """Stamps of a computer that asks every so often, up to 2 ms late, and reads all that is waiting."""
+    burst = np.floor(TRUE / interval_s).astype(np.int64)
+    late = 0.002 * np.random.default_rng(4).random(burst[-1] + 1)
+    within = np.arange(TRUE.size) - np.searchsorted(burst, burst)
+    return np.asarray((burst + 1) * interval_s + late[burst] + apart_s * within)
+
+
+def written(folder: Path, t: F8, decimals: int) -> Path:
+    """Return a recording with these times."""
+    path = folder / "times.csv"
+    y = 0.4 + 0.03 * np.cos(9.52 * np.arange(t.size) * 0.01)
+    rows = (f"{a:.{decimals}f},{b:.5f}" for a, b in zip(t, y, strict=True))
+    path.write_text("\n".join(["time (s),distance (m)", *rows, ""]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("decimals", [6, 3])
+@pytest.mark.parametrize("interval_s", sampled([0.1, 0.035, 0.05, 0.04, 0.16]))
+def test_bursts_are_spread_evenly(tmp_path: Path, interval_s: float, decimals: int) -> None:
+    """The rate is right to the lateness of the stamps over 30 s, and every sample is kept; a finding says so."""
+    found = open_recording(written(tmp_path, polled(interval_s), decimals))
+    t = found.samples.t
+    assert found.info.rate_hz == pytest.approx(100.0, rel=1e-4)
+    assert np.diff(t) == pytest.approx(np.full(2999, 0.01), rel=1e-3)
+    assert not found.samples.flags.any()
+    assert [trap.code for trap in found.traps if trap.code in ("times_in_bursts", "nominal_clock")] == [
+        "times_in_bursts"
+    ]
+
+
+def test_bursts_with_missing_samples_are_asked_about(tmp_path: Path) -> None:
+    """Where half a second is missing nobody knows which samples: the rate must be given."""
+    t = np.delete(polled(0.05), np.s_[1000:1050])
+    path = written(tmp_path, t, 6)
+    with pytest.raises(NeedsAnswer):
+        open_recording(path)
+    assert open_recording(path, rate_hz=100.0).info.rate_hz == 100.0
+
+
+@pytest.mark.parametrize(
+    "t",
+    [TRUE, TRUE + 0.003 * np.random.default_rng(1).random(TRUE.size), np.delete(TRUE, np.s_[500:1500])],
+    ids=["even", "late", "gap"],
+)
+def test_other_times_are_no_bursts(tmp_path: Path, t: F8) -> None:
+    """Even times, late times and a gap are not spread."""
+    found = open_recording(written(tmp_path, t, 6))
+    assert "times_in_bursts" not in {trap.code for trap in found.traps}
+    np.testing.assert_allclose(found.samples.t, t, rtol=0, atol=1e-6)
+
+
+_VALUES = 1500 + 700 * np.cos(np.arange(200) * 0.1)
+
+
+def _printed(value: float, group: str, point: str) -> str:
+    return f"{value:,.1f}".replace(",", "\0").replace(".", point).replace("\0", group)
+
+
+@pytest.mark.parametrize(
+    ("group", "point"), [(",", "."), (".", ","), (" ", ","), ("'", "."), ("\xa0", ","), ("\u202f", ",")]
+)
+@pytest.mark.parametrize("heading", sampled(["Zeit (s);Weg (mm)\n", "", "t;x\n"]))
+def test_marks_of_thousands_are_refused(tmp_path: Path, group: str, point: str, heading: str) -> None:
+    """No way to set thousands apart gives numbers, whichever family reads them."""
+    path = tmp_path / "run.csv"
+    times = [f"{i / 100:.2f}".replace(".", point) for i in range(_VALUES.size)]
+    rows = (f"{t};{_printed(x, group, point)}\n" for t, x in zip(times, _VALUES, strict=True))
+    path.write_text(heading + "".join(rows), encoding="utf-8")
+    with pytest.raises(FormatError):
+        open_recording(path, unit=None if "(" in heading else "mm")
+
+
+def test_thousands_in_quotes_are_refused_next_to_separating_commas(tmp_path: Path) -> None:
+    """Excel writes 1328 mm as "1,328" between quotes: read as a decimal it would be a thousand times too small."""
+    path = tmp_path / "run.csv"
+    path.write_text("t (s),x (mm)\n" + "".join(f'{i / 50:.2f},"{x:,.0f}"\n' for i, x in enumerate(_VALUES)))
+    with pytest.raises(FormatError):
+        open_recording(path)
+
+
+def test_a_comma_that_may_be_either_in_all_numbers_is_decimal_and_reported(tmp_path: Path) -> None:
+    """Where semicolons separate and no other mark stands in the file."""
+    path = tmp_path / "run.csv"
+    path.write_text("".join(f"{i};1,{501 + i}\n" for i in range(40)), encoding="utf-8")
+    recording = open_recording(path, unit="m", rate_hz=20.0)
+    np.testing.assert_allclose(recording.samples.distance, 1.501 + 1e-3 * np.arange(40))
+    assert "decimal_comma" in {trap.code for trap in recording.traps}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -268,3 +269,19 @@ def test_a_run_that_another_program_writes_is_not_called_damaged(path: Path) -> 
         second.communicate("")
     with open_run(path) as run:
         run.verify()
+
+
+def test_a_file_from_before_holds_a_length(path: Path) -> None:
+    """A header and attributes without a quantity read as metres, verify, and keep their digest."""
+    with h5py.File(path, "r+") as file:
+        header = json.loads(file["/entry/provenance/header"][()])
+        del header["quantity"], header["unit"], file["/entry/signal/distance"].attrs["quantity"]
+        header["implied"] = {"quality": {"value": 0}}  # a formula of a column, which some files hold
+        text = json.dumps(header, sort_keys=True, separators=(",", ":")).encode()
+        del file["/entry/provenance/header"]
+        digest = hashlib.sha256(text).hexdigest()
+        file.create_dataset("/entry/provenance/header", data=np.bytes_(text)).attrs["sha256"] = np.bytes_(digest)
+    with open_run(path) as run:
+        run.verify()
+        samples = run.samples()
+        assert (samples.quantity, samples.unit, run.sha256) == ("length", "m", digest)
