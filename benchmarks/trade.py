@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.tiers import QUANTITIES, Kind, Motion, bounds, record
 from pipeline.analyse import analyse
 from pipeline.errors import AnalysisError
 from pipeline.options import TIERS, options_for
 from pipeline.results.classic import classic
 from pipeline.track import F8, Track
+from springmass.trade import QUANTITIES, Kind, Motion, bounds, record
 
 FIGURE = Path(__file__).resolve().parents[1] / "docs" / "figures" / "trade.svg"
 MOTION = Motion(seconds=120.0)

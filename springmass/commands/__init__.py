@@ -38,6 +38,7 @@ FURTHER = {
     "convert": "Convert a recording, or extract the original from a run file.",
     "formats": "List the formats of recordings, or identify that of a file.",
     "simulate": "Solve the equation of motion of a scene.",
+    "trade": "Measure what accuracy costs on this machine, in two tables.",
     "firmware": "Wire and set the 100 Hz rangefinder; how to flash it.",
     "doctor": "Check this installation.",
 }

@@ -47,6 +47,9 @@ LINES: list[tuple[tuple[str, ...], str]] = [
     ((*SIMULATE, "--seconds", "1e9"), "steps"),
     ((*SIMULATE, "--seconds", "0.001"), "steps"),
     ((*SIMULATE, "--dt", "1e-200", "--seconds", "1e-199"), "1e-200"),
+    (("trade", "--seeds", "0"), "--seeds"),
+    (("trade", "--seconds", "-1"), "--seconds"),
+    (("trade", "--seconds", "1"), "--seconds"),
 ]
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from tests.cli.conftest import Cli
 
-COMMANDS = ("analyse", "convert", "replay", "simulate", "compare", "formats")
+COMMANDS = ("analyse", "convert", "replay", "trade", "simulate", "compare", "formats")
 
 
 @pytest.fixture
@@ -30,6 +30,7 @@ def arguments(command: str, path: Path, out: Path, data: Path) -> list[Any]:
         "analyse": ["analyse", "--json", path],
         "convert": ["convert", path, out],
         "replay": ["replay", path, "--speed", "max"],
+        "trade": ["trade", path],
         "simulate": ["simulate", "--scene", scene, "--json", "--against", path],
         "compare": ["compare", path, path, "--scene", scene, "--json"],
         "formats": ["formats", path],

@@ -1,24 +1,20 @@
 """What accuracy costs on this machine: errors over their lower bound and times, of the tiers and of the integrators.
 
 Records are simulated from one motion, clean and spoilt in ways that benches know; each tier evaluates each of them.
-The integrators solve the equation of the same motion. ``python -m benchmarks.tiers RECORDING`` takes the motion from a
-recording, with ``--scene FILE`` alone that of the scene, and prints both as tables.
+The integrators solve the equation of the same motion.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-import springmass
 from pipeline.analyse import Analysis, analyse
 from pipeline.analysis import Oscillation
 from pipeline.damping.laws import Law, find_law
@@ -28,8 +24,7 @@ from pipeline.dynamics.methods import SolveIvp
 from pipeline.errors import DynamicsError, PipelineError
 from pipeline.options import TIERS, options_for
 from pipeline.track import F8, Track
-from springmass.runs.scenes import read_scene
-from springmass.runs.simulating.simulation import prepare, reference
+from springmass.runs.simulating.simulation import reference
 
 QUANTITIES = ("frequency", "amplitude", "damping_rate")
 DRAGS = {"gamma": ("linear", "gamma_per_s"), "beta": ("quadratic", "beta_per_m_s"), "mu": ("friction", "mu_m_per_s")}
@@ -239,71 +234,3 @@ def measure_integrators(problem: Problem, spacing_s: float, count: int) -> Itera
         spent_s = time.perf_counter() - start
         setting = f"{best.integrator.name}, step {best.step_s:.3g} s"
         yield row(f"auto {tolerance:g}", setting, best.trajectory.y, best.parts * count, spent_s)
-
-
-def main(words: Sequence[str] | None = None) -> int:
-    """Print both tables, or their JSON."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.tiers", description=__doc__.partition("\n")[0])
-    parser.add_argument("recording", nargs="?", help="take the motion from this recording")
-    parser.add_argument("--scene", help="scene of the recording, or take the motion from it")
-    parser.add_argument("--law", help="damping law of the recording, if it is known")
-    parser.add_argument("--seeds", type=int, default=20, help="simulated records of each kind (default: 20)")
-    parser.add_argument("--seconds", type=float, default=60.0, help="length without a recording, s (default: 60)")
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    asked = parser.parse_args(words)
-    motion = _motion(asked)
-    tiers = [row for rows in measure_tiers(motion, asked.seeds) for row in rows]
-    problem = motion.problem()
-    solved = [] if problem is None else [*measure_integrators(problem, 1.0 / motion.rate_hz, motion.t.size)]
-    if asked.json:
-        truth = {**motion.truth(), "law": motion.law.name, "noise_m": motion.noise_m, "rate_hz": motion.rate_hz}
-        facts = {"motion": {**truth, "seconds": motion.seconds}, "seeds": asked.seeds}
-        print(json.dumps({**facts, "tiers": tiers, "integrators": solved}))
-        return 0
-    print(
-        f"{asked.seeds} records of {motion.seconds:.3g} s at {motion.rate_hz:.4g} Hz: {motion.frequency_hz:.5g} Hz, "
-        f"{motion.theta[0] * 1e3:.3g} mm, noise {motion.noise_m * 1e3:.2g} mm, damping {motion.law.name}\n"
-    )
-    heads = ["record", "tier", "f / bound", "A / bound", "damping / bound", "time / ms", "failed"]
-    print(f"{_table(heads, [_tier(row) for row in tiers])}\n")
-    heads = ["integrator", "setting", "error / amplitude", "steps", "time / ms"]
-    print(_table(heads, [[r["method"], _setting(r), f"{r['error']:.1e}", str(r["steps"]), _ms(r)] for r in solved]))
-    return 0
-
-
-def _motion(asked: argparse.Namespace) -> Motion:
-    if asked.recording is not None:
-        run = springmass.analyse(asked.recording, asked.scene, law=asked.law)
-        if not isinstance(run.analysis.motion, Oscillation):
-            raise SystemExit(f"{asked.recording}: {run.why}; name a run that oscillates")
-        return motion_of(run.analysis, run.analysis.motion)
-    if asked.scene is None:
-        return Motion(seconds=asked.seconds)
-    ready = prepare(read_scene(asked.scene), asked.seconds, where=asked.scene)
-    sigma = ready.stated.sensor_sigma_m
-    return motion_of_problem(ready.problem, None if sigma is None else sigma.value, asked.seconds)
-
-
-def _tier(row: Mapping[str, Any]) -> list[str]:
-    found = row["error_over_bound"]
-    errors = [f"{found[each]:.3g}" if each in found else "-" for each in QUANTITIES]
-    return [row["record"], row["tier"], *errors, _ms(row), str(row["failed"] or "-")]
-
-
-def _setting(row: Mapping[str, Any]) -> str:
-    return f"{row['setting']}{', unstable' if row['unstable'] else ''}"
-
-
-def _ms(row: Mapping[str, Any]) -> str:
-    return "-" if row["time_s"] is None else f"{1e3 * row['time_s']:.3g}"
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return rows in columns: the first two to the left, numbers to the right."""
-    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
-    form = "  ".join(f"{{:{'<' if i < 2 else '>'}{width}}}" for i, width in enumerate(widths))
-    return "\n".join(form.format(*row).rstrip() for row in [heads, *rows])
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
