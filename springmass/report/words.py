@@ -68,15 +68,11 @@ def damping_sentence(analysis: Analysis) -> str:
             "instead of its coefficients."
         )
     if damping.best.rejected:
-        if quoted:
-            return (
-                f"No damping law fits to within the scatter; {chosen} is by far the nearest, and u of its coefficients "
-                "was increased."
-            )
-        return (
-            f"No damping law fits to within the scatter; {chosen} is nearest, but others are nearly as good: quote the "
-            "damping rate or the amplitude against time, not their coefficients."
-        )
+        nearest = "by far the nearest, and u of its coefficients was increased"
+        if not quoted:
+            instead = "the damping rate or the amplitude against time, not their coefficients"
+            nearest = f"nearest, but others are nearly as good: quote {instead}"
+        return f"No damping law fits to within the scatter; {chosen} is {nearest}."
     possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
     if damping.growth_rate:
         text = "The amplitude grows exponentially"
