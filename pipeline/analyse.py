@@ -15,11 +15,9 @@ from pipeline.checks.echoes import echoes_by_chance, find_clusters
 from pipeline.checks.judge import judge
 from pipeline.closed import overdamped, still, two_modes, without_period
 from pipeline.damping.select import Damping, fit_laws
-from pipeline.findings.damping import damping_findings
 from pipeline.findings.finding import worded
-from pipeline.findings.motion import fit_findings, motion_findings
-from pipeline.findings.parts import part_findings
-from pipeline.findings.samples import clock_findings, sample_findings
+from pipeline.findings.motion import damping_findings, fit_findings, motion_findings
+from pipeline.findings.samples import clock_findings, part_findings, sample_findings
 from pipeline.findings.scene import scene_findings
 from pipeline.motion.averaged import Fitted, check_coherence, fit_windows, typical_miss
 from pipeline.motion.by_samples import FEW_WINDOWS, fit_samples
@@ -32,13 +30,11 @@ from pipeline.results.derive import derive
 from pipeline.results.effects import tabulate
 from pipeline.samples.condition import Conditioned, condition
 from pipeline.track import Track
-from pipeline.windows.clipping import find_cuts
 from pipeline.windows.cycles import NoOscillation
-from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated, demodulate
+from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.disturbances import Disturbances, separate
-from pipeline.windows.free_part import FreePart, free_part, start_of
+from pipeline.windows.free_part import check_sinusoid, free_part, start_of
 from pipeline.windows.rounding import rounded
-from pipeline.windows.sinusoid import check_sinusoid
 
 __all__ = ["Analysis", "Oscillation", "Overdamped", "Still", "analyse"]
 
@@ -66,11 +62,10 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
     part = free_part(samples)
     if isinstance(part, NoOscillation):
         return without_period(samples, part, scene, options)
-    samples, windows = _uncut(part)
-    track = samples.track
-    if (why := check_sinusoid(samples, windows)) is not None:
+    samples, track = part.samples, part.samples.track
+    if (why := check_sinusoid(samples, part.windows)) is not None:
         return without_period(samples, why, scene, options)
-    windows, disturbances = separate(samples, part.cycles, windows, modes=options.modes)
+    windows, disturbances = separate(samples, part.cycles, part.windows, modes=options.modes)
     windows = rounded(windows, samples.quantum_m)
     laws = fit_laws(windows, start_of(samples, windows.angular_frequency), options.laws, options.known_law, track.unit)
 
@@ -104,20 +99,13 @@ def analyse(track: Track, scene: Scene | None = None, options: Options | None = 
             windows.noise_m,
             find_clusters(track, windows, fitted.phase),
             swing_m,
-            by_chance=echoes_by_chance(samples.flags, windows, CLIP_SIGMAS),
+            by_chance=echoes_by_chance(samples.flags, windows),
         ),
         fit_findings(fitted, solved if isinstance(solved, str) else ""),
         clock_findings(track),
     )
     motion = Oscillation.of(fitted, part.cycles, derived)
     return Analysis(track, scene, options, samples, motion, effects, findings, derived.estimates)
-
-
-def _uncut(part: FreePart) -> tuple[Conditioned, Demodulated]:
-    """Return the samples without the crests that are cut off, and their windows."""
-    if (cut := find_cuts(part.samples, part.cycles, part.windows)) is None:
-        return part.samples, part.windows
-    return cut, demodulate(cut, part.cycles)
 
 
 def _averaged(

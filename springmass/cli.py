@@ -67,7 +67,7 @@ def _call(words: Sequence[str]) -> int:
     from springmass.commands import call
 
     try:
-        with STOPS.raised():
+        with STOPS.raising(True):
             return call(words)
     except CycloptsError as error:
         what = " ".join(str(error).split()).rstrip(".")

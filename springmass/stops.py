@@ -41,7 +41,7 @@ class Stops:
     """Whether a command runs, ends or leaves. Signals ignored before stay ignored: ``nohup`` keeps a recording alive.
 
     It runs while ``by`` is None. It ends, for the reason ``by``, after the first signal or a request of the page: the
-    signal raises KeyboardInterrupt within :meth:`raised`, or waits for the next :meth:`raised`. It leaves at the second
+    signal raises KeyboardInterrupt within :meth:`raising`, or waits for its next context. It leaves at the second
     signal, on a thread, because the main thread may wait for a disk: it calls ``leaving`` and prints ``last_words``,
     which must not wait for a disk.
     """
@@ -81,24 +81,15 @@ class Stops:
             signal.signal(number, signal.SIG_IGN if program else handler)  # type: ignore[arg-type]
 
     @contextlib.contextmanager
-    def counted(self) -> Iterator[None]:
-        """Defer signals until the waits inside this context, and forget those that come after the last of them."""
-        with self._raising(False):
-            yield
+    def raising(self, now: bool) -> Iterator[None]:
+        """Raise KeyboardInterrupt for signals in this context and requests before it, or defer them until the next.
 
-    @contextlib.contextmanager
-    def raised(self) -> Iterator[None]:
-        """Raise KeyboardInterrupt for a request that was deferred, or for a signal that arrives in this context."""
-        deferred = not self._raises
-        with self._raising(True):
-            if self.by and deferred:
-                raise KeyboardInterrupt
-            yield
-
-    @contextlib.contextmanager
-    def _raising(self, now: bool) -> Iterator[None]:
+        A context that defers forgets the signals that come after the last one in it that raises.
+        """
         before, self._raises = self._raises, now
         try:
+            if now and not before and self.by:
+                raise KeyboardInterrupt
             yield
         finally:
             self._raises = before

@@ -27,6 +27,7 @@ from pipeline.track import F8, Track
 from springmass.runs.simulating.simulation import reference
 
 QUANTITIES = ("frequency", "amplitude", "damping_rate")
+DRAGS = {"gamma": ("linear", "gamma_per_s"), "beta": ("quadratic", "beta_per_m_s"), "mu": ("friction", "mu_m_per_s")}
 PARTS, RTOLS, TOLERANCES = (1, 4, 16), (1e-6, 1e-9, 1e-12), (1e-3, 1e-6, 1e-9, 1e-12)
 LONGEST_ADAPTIVE = 2e4  # rad; a longer motion takes adaptive methods minutes
 
@@ -57,11 +58,10 @@ class Motion:
 
     def problem(self) -> Problem | None:
         """Return the equation of the motion and its start; None if its law is no sum of drags."""
-        names = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
         drags = dict(zip([*self.law.parameters][1:], self.theta[1:].tolist(), strict=True))
-        if not drags.keys() <= names.keys():
+        if not drags.keys() <= DRAGS.keys():
             return None
-        found = {names[name]: max(value, 0.0) for name, value in drags.items()}
+        found = {DRAGS[name][1]: max(value, 0.0) for name, value in drags.items()}
         return Problem(Equation.from_laws(2.0 * math.pi * self.frequency_hz, **found), float(self.theta[0]))
 
 
@@ -81,10 +81,8 @@ def motion_of(analysis: Analysis, oscillation: Oscillation) -> Motion:
 
 def motion_of_problem(problem: Problem, noise_m: float | None, seconds: float) -> Motion:
     """Return the motion of an equation, released at its greatest displacement."""
-    drags = {"mu": 0.0, "gamma": 0.0, "beta": 0.0}
-    drags["gamma"], drags["beta"], drags["mu"] = problem.equation.laws()
-    names = {"gamma": "linear", "beta": "quadratic", "mu": "friction"}
-    law = find_law("+".join(names[each] for each in names if drags[each]) or "none")
+    drags = dict(zip(DRAGS, problem.equation.laws(), strict=True))
+    law = find_law("+".join(words for name, (words, _) in DRAGS.items() if drags[name]) or "none")
     theta = np.array([problem.amplitude_m(), *(drags[each] for each in list(law.parameters)[1:])])
     frequency_hz = problem.equation.angular_frequency_per_s / (2.0 * math.pi)
     return Motion(frequency_hz=frequency_hz, law=law, theta=theta, noise_m=noise_m or 3e-4, seconds=seconds)

@@ -111,11 +111,10 @@ def law_status(damping: Damping, name: str) -> str:
 def _typeset(number: str) -> str:
     mantissa, mark, power = number.replace("+-", "±").partition("e")
     mantissa = mantissa.replace("-", "−")
-    return f"{mantissa} × 10{raised(int(power))}" if mark else mantissa
+    return f"{mantissa} × 10{_superscript(int(power))}" if mark else mantissa
 
 
-def raised(power: int) -> str:
-    """Return an exponent in superscript digits."""
+def _superscript(power: int) -> str:
     return str(power).translate(_SUPERSCRIPT)
 
 
@@ -137,11 +136,6 @@ def cells(estimate: Estimate | None) -> str:
 LETTERS = {"A0": "A₀", "gamma": "γ", "beta": "β", "mu": "μ"}
 
 
-def kept(estimate: Estimate) -> str:
-    """Write an estimate so that no line breaks inside it."""
-    return unbroken(pretty(estimate))
-
-
 def unbroken(text: str) -> str:
     """Let no line break in a text."""
     return text.replace(" ", "\u00a0")
@@ -159,7 +153,7 @@ def equation(name: str, estimate: Estimate) -> str:
 
 _SUBSTITUTES = (
     (re.compile(r"(?<=[\d)] )(1/\(m s\)|1/s|m/s\^2|degC)(?!\w)"), lambda found: page_unit(found[1])),
-    (re.compile(r"(?<=[\d)])e([+-]\d+)\b"), lambda found: f" × 10{raised(int(found[1]))}"),
+    (re.compile(r"(?<=[\d)])e([+-]\d+)\b"), lambda found: f" × 10{_superscript(int(found[1]))}"),
     (re.compile(r"\+-"), "±"),
     (re.compile(r"(?<![\w.+-])-(?=\d)"), "−"),
     (re.compile(r"\b(gamma|beta|mu)(?= = )"), lambda found: LETTERS[found[1]]),

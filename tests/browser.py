@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-__all__ = ["chromium", "headless"]
-
 OPTIONS = (
     "--no-sandbox --disable-gpu --disable-background-networking --disable-component-update --disable-sync "
     "--no-first-run --disable-dev-shm-usage"
@@ -19,13 +17,7 @@ OPTIONS = (
 
 
 def chromium() -> str:
-    """Return the path of Chromium.
-
-    Raises
-    ------
-    FileNotFoundError
-        If it is not installed.
-    """
+    """Return the path of Chromium; FileNotFoundError if it is not installed."""
     path = shutil.which("chromium")
     if path is None:
         raise FileNotFoundError("chromium is not on the PATH; Debian: apt-get install chromium")

@@ -38,20 +38,15 @@ class Instrument:
     def of(cls, track: Track) -> Instrument:
         """Return the clock and scale that a track states for its sensor.
 
-        A clock that was not compared with another is known only to its crystal's specification. A comparison of the
-        sensor's clock with the host's gives their difference but not which of them is right. So it changes nothing as
-        long as both can meet their specifications. If the difference exceeds three standard uncertainties, the host is
-        the reference (a ceramic resonator is off by thousands of ppm). Frequencies are then multiplied by
-        1 + r. The remaining uncertainty is that of the host's crystal and of the comparison.
+        A comparison of the sensor's clock with the host's gives their difference but not which of them is right. So it
+        changes nothing as long as both can meet their specifications. Beyond three standard uncertainties the host is
+        the reference (a ceramic resonator is off by thousands of ppm): frequencies are multiplied by 1 + r, and the
+        uncertainty is that of the host's crystal and of the comparison.
 
-        If the drift between the clocks within the record is less than the possible change of a host's delays (20 ms), a
-        wrong clock cannot be distinguished from a host that became busy. Then nothing is corrected, and the difference
-        counts as the half-width of a rectangular distribution.
-
-        A difference beyond the limit of the sensor's clock plus 500 ppm for the host's cannot come from the clocks.
-        Then nothing is corrected either, and the difference counts as such a half-width. Where readings were delayed,
-        the comparison cannot exclude a clock at its limit. Its own uncertainty is then added, up to that of the limit;
-        without any comparison, the limit itself counts as the half-width.
+        A drift within the record below the possible change of a host's delays (20 ms), and a difference beyond the
+        limits of both clocks, are not corrected: they count as the half-width of a rectangular distribution. Where
+        readings were delayed, the comparison's own uncertainty is added, up to that of the limit; without any
+        comparison, the limit counts.
 
         >>> track = Track.from_arrays([0.0, 0.01], [0.2, 0.2])
         >>> print(Instrument.of(track).clock_rate)

@@ -128,7 +128,7 @@ class Scene:
         """Check every value, and take a number or a pair (value, u) for the estimate that it states."""
         for (table, key), quantity in _QUANTITIES.items():
             if (given := getattr(self, quantity.attribute)) is not None:
-                found = _quantity(table, key, _stated(given, quantity), "scene")
+                found = _quantity(table, key, given, "scene")
                 if not isinstance(given, Estimate):
                     object.__setattr__(self, quantity.attribute, found)
         for (table, key), (attribute, texts) in _CHOICES.items():
@@ -223,32 +223,22 @@ def _choice(table: str, key: str, value: object, texts: tuple[str, ...], where: 
     return str(value)
 
 
-def _stated(given: Any, quantity: _Quantity) -> Any:
-    """Return a value of a keyword as in a scene file: a number, a pair (value, u), or a value with uncertainty."""
-    if isinstance(given, tuple) and len(given) == 2:
-        return {"value": given[0], "u": given[1]}
-    if isinstance(given, Estimate):
-        given, u, unit = given.value, given.u, given.unit
-    else:
-        u, unit = getattr(given, "std_dev", 0.0), getattr(given, "unit", None)
-        given = getattr(given, "nominal_value", given)
-    if unit and unit != quantity.unit:
-        raise SceneError(f"scene: {quantity.attribute} must be in {quantity.unit or 'no unit'}, got {unit}")
-    return {"value": given, "u": u}
-
-
-def _quantity(table: str, key: str, given: object, where: str) -> Estimate:
+def _quantity(table: str, key: str, given: Any, where: str) -> Estimate:
     quantity = _QUANTITIES[table, key]
     name = f"{where}: [{table}] {key}"
-    value: object = given
-    u: object = 0.0
+    value, u, unit = given, 0.0, ""
     if isinstance(given, Mapping):
-        unknown = sorted(set(given) - {"value", "u"})
-        if unknown or "value" not in given:
+        if "value" not in given or set(given) - {"value", "u"}:
             raise SceneError(f"{name} must be a number or {{ value = ..., u = ... }}, got {_short(dict(given))}")
         value, u = given["value"], given.get("u", 0.0)
     elif isinstance(given, tuple) and len(given) == 2:  # as in Scene(bob_mass_kg=(0.2, 0.0001))
         value, u = given
+    elif isinstance(given, Estimate):
+        value, u, unit = given.value, given.u, given.unit
+    elif hasattr(given, "nominal_value"):  # a UFloat, or a quantity with a unit
+        value, u, unit = given.nominal_value, given.std_dev, getattr(given, "unit", "")
+    if unit and unit != quantity.unit:
+        raise SceneError(f"{name} must be in {quantity.unit or 'no unit'}, got {unit}")
     number, spread = _number(value, name), _number(u, f"{name}, its u")
     if not quantity.least <= number <= quantity.greatest:
         raise SceneError(f"{name} must be {quantity.allowed()}, got {number:g}")

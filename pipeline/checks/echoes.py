@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.motion.averaged import Phase
 from pipeline.numerics.levels import FALSE_ALARM, normal_quantile
 from pipeline.track import U8, UNUSABLE, Quality, Track
-from pipeline.windows.demodulate import Demodulated
+from pipeline.windows.demodulate import CLIP_SIGMAS, Demodulated
 
 # Minimum number of false echoes in a cluster, and maximum distance between neighbours. Independent echoes on one sample
 # in a thousand form a cluster at a given one with a probability of 1e-5.
@@ -44,7 +44,7 @@ def count_quality(flags: U8) -> dict[str, int]:
     return {**found, "used": sum(count for value, count in held if not value & int(UNUSABLE))}
 
 
-def echoes_by_chance(before: U8, demodulated: Demodulated, clip_sigmas: float) -> bool:
+def echoes_by_chance(before: U8, demodulated: Demodulated) -> bool:
     """Return whether normal noise explains both the number and the size of the false echoes.
 
     The number of n samples of normal noise beyond c standard deviations has a Poisson distribution with the mean
@@ -59,7 +59,7 @@ def echoes_by_chance(before: U8, demodulated: Demodulated, clip_sigmas: float) -
     rows = np.flatnonzero(demodulated.flags & echo)
     n = int(np.count_nonzero((demodulated.flags & UNUSABLE) == 0)) + rows.size
     farthest = float(np.max(np.abs(demodulated.residual[rows]), initial=0.0))
-    expected = 2.0 * n * 2.0 * float(ndtr(-clip_sigmas))
+    expected = 2.0 * n * 2.0 * float(ndtr(-CLIP_SIGMAS))
     return bool(
         farthest < normal_quantile(1.0 - FALSE_ALARM / n) * demodulated.noise_m
         and pdtrc(rows.size - 1, expected) > FALSE_ALARM

@@ -17,7 +17,8 @@ from pipeline.damping.laws import Drag, Law
 from pipeline.damping.select import Damping
 from pipeline.track import F8
 
-SPREAD_OF_POWER = 1.4  # prior u of the power of the drag about 1: 0 of friction and 2 of quadratic drag are well inside
+# Prior u of the power of the drag about 1: friction and quadratic drag have 0.77 times the probability of linear drag.
+SPREAD_OF_POWER = 1.4
 OUTSIDE = 4.0  # BIC added to laws outside the family, which are a seventh as probable beforehand (tests/trials)
 
 

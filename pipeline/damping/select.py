@@ -12,13 +12,14 @@ from pipeline.damping.law_fit import NEGATIVE, LawFit, choose, fit_law, least_ch
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import FALSE_ALARM, STRONG
+from pipeline.numerics.levels import STRONG
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 
 FEW_LAWS = ("none", "linear", "quadratic", "linear+quadratic")  # those of the tier "fast"
+DOUBT = 0.01  # probability with which a record that follows one of the few laws still causes all to be tried
 LOOSEST_POWER = 3.0  # maximum standard uncertainty of a free power that is stated: known powers lie between 0 and 2
 
 
@@ -26,9 +27,8 @@ LOOSEST_POWER = 3.0  # maximum standard uncertainty of a free power that is stat
 class Damping:
     """The damping laws fitted to a record, and which of them it admits.
 
-    The selected law is the admissible law with the lowest BIC, or the law that fits best if all are rejected
-    (:func:`choose`). If the BIC differs by less than 2 ("not worth more than a bare mention"), it is the law with fewer
-    parameters, then the law listed first. A stated law is always selected if it could be fitted.
+    The selected law is the admissible one with the lowest BIC, or the law that fits best if all are rejected. Among
+    differences of BIC below 2 it is the law with fewest parameters. A stated law is always selected if it has a fit.
     """
 
     t0: float  # time at which the analysed part starts, s; laws count time from here
@@ -73,10 +73,7 @@ class Damping:
         return next(fits, None)
 
     def squared_rate(self, t: F8) -> float:
-        """Return the mean decrease of the squared angular frequency by drag, 1/s^2, at times t (n,) in s.
-
-        See :func:`pipeline.damping.law_fit.mean_squared_rate`.
-        """
+        """Return :func:`pipeline.damping.law_fit.mean_squared_rate` of the selected law at times t (n,) in s."""
         return mean_squared_rate(self.best, self.best.amplitude(t - self.t0))
 
 
@@ -92,18 +89,14 @@ def fit_laws(
     A stated law is tried in addition to ``laws`` and selected however well other laws fit; the record may still
     contradict it. An :class:`AnalysisError` says that no law can be fitted.
 
-    Real amplitudes scatter more than their noise, for example because of beats with a sideways mode or clusters of
-    false echoes. The excess scatter is measured about a smooth curve that is independent of all laws, so that a
-    wrong law cannot hide its misfit in it. If few windows decay fast, or friction stops the motion, no smooth curve
-    follows the decay. A law whose residuals are less than half as large then replaces the curve. Correlated points
-    count as fewer points: chi-square, BIC and degrees of freedom are divided by the correlation length, and the
-    covariance is multiplied by it. If chi-square rejects a law, its covariance comes from its own residuals: it is
-    multiplied by the reduced chi-square, and the correlation length is that of the residuals.
+    Real amplitudes scatter more than their noise, for example because of beats. The excess is measured about a smooth
+    curve that is independent of all laws, so that a wrong law cannot hide its misfit in it; where no smooth curve
+    follows the decay, a law whose residuals are less than half as large replaces it. Correlated points count as fewer
+    points. If chi-square rejects a law, its covariance comes from the size and the correlation length of its own
+    residuals.
 
-    Drag coefficients are not negative, but their estimates may be by chance; only unbounded estimates are unbiased and
-    have correct intervals. So the fits are unbounded. A law is rejected if a coefficient is negative by more than two
-    standard uncertainties. The BIC is that of the law's best fit without negative coefficients, which is that of one
-    of its special cases.
+    Only unbounded estimates of drag coefficients are unbiased and have correct intervals. So the fits are unbounded,
+    and a coefficient that is negative by more than two standard uncertainties rejects its law.
     """
     t, amplitude = windows.t - t0, windows.amplitude
     noise = np.sqrt(windows.covariance[:, 0, 0])
@@ -121,10 +114,7 @@ def fit_laws(
 
 
 def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> tuple[str, tuple[str, ...]]:
-    """Return the selected law and the admissible laws, for a record of ``last_s`` seconds.
-
-    A stated law is selected if it has a fit. It is then the only admissible law, or no law is if the record rejects it.
-    """
+    """Return the selected and the admissible laws, for a record of ``last_s`` seconds; a stated one stands alone."""
     if known in fits:
         return known, () if fits[known].rejected else (known,)
     ends = np.array([0.0, last_s])
@@ -134,11 +124,11 @@ def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> tuple[s
 def _curved(damping: Damping) -> bool:
     """Return whether the decay has a curvature that neither linear nor quadratic drag explains alone."""
     mixed, best = damping.of_powers(1, 2), damping.best
-    if best is mixed or (best.dof > 0 and best.reduced_chi2 * best.dof > chi2_quantile(1.0 - FALSE_ALARM, best.dof)):
+    if best is mixed or (best.dof > 0 and best.reduced_chi2 * best.dof > chi2_quantile(1.0 - DOUBT, best.dof)):
         return True
     if mixed is None:
         return False
-    below = math.sqrt(chi2_quantile(1.0 - FALSE_ALARM, 1.0))
+    below = math.sqrt(chi2_quantile(1.0 - DOUBT, 1.0))
     return any(term.value < -below * term.u for term in list(mixed.joint.estimates().values())[1:])
 
 

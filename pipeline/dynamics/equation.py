@@ -19,8 +19,8 @@ from pipeline.numerics.estimate import Estimate
 
 Real = Any  # a float, or an array of floats for several states
 
-LARGEST = 1e30  # of any number, so that no product of a few of them leaves the range of double precision
-_AMPLITUDE_TO_DRAG = 3.0 * math.pi / 4.0  # b = (3 pi / 4) beta / omega, from the energy loss per cycle
+LARGEST = 1e30  # of any number, so that no product of a few of them leaves the range of IEEE 754 doubles
+_AMPLITUDE_TO_DRAG = 3.0 * math.pi / 4.0  # b = (3 pi / 4) beta / omega, from the loss per cycle: arXiv:2502.07458
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -14,6 +14,7 @@ from pipeline.dynamics.equation import LARGEST, Problem
 from pipeline.errors import DynamicsError
 from pipeline.track import F8
 
+RANAWAY = math.sqrt(math.sqrt(np.finfo(np.float64).max))  # m or m/s, whose fourth power is still a number
 MOST_STEPS = 2**25  # of one run; measured: about ten seconds, and the finest of step halving takes half of its time
 
 
@@ -71,7 +72,7 @@ class Integrator(ABC):
                 y, v = self.march(problem, step_s, steps, every)
             except (OverflowError, ZeroDivisionError) as error:
                 raise DynamicsError(f"{ran_away} ({error}); {remedy}") from error
-        fine = (np.abs(y) < LARGEST) & (np.abs(v) < LARGEST)
+        fine = (np.abs(y) < RANAWAY) & (np.abs(v) < RANAWAY)
         if not fine.all():
             raise DynamicsError(f"{ran_away} by t = {step_s * every * int(np.argmin(fine)):g} s; {remedy}")
         return Trajectory(problem, step_s * every, y, v)

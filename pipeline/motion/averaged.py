@@ -37,9 +37,15 @@ from pipeline.windows.disturbances import Disturbances
 Table = tuple[F8, F8]  # values at ascending times, s
 
 BACKBONE = Unit(-2, -1, radian=1)  # of the coefficient by which the frequency depends on the squared amplitude
-POINTS = 2049  # number of points in the tables of the lag and of the integral of the amplitude
-MOST_LAG = 0.75  # maximum lag in rad, that of friction which halves the amplitude within one radian
-NODES = 8  # nodes of the quadrature of the decay rate over amplitudes; exact for friction, linear and quadratic drag
+# Number of points in the tables of the lag and of the integral of the squared amplitude. If that falls by e^10 within a
+# table, the trapezoidal rule errs by h^2/12 = 2e-6: P. J. Davis, P. Rabinowitz, "Methods of Numerical Integration"
+# (1984).
+POINTS = 2049
+# Nodes of the quadrature of the decay rate over amplitudes, exact up to the power 15 (the same book, (1984)).
+NODES = 8
+# Maximum lag in rad by averaging (Bogoliubov and Mitropolsky (1961)): that of friction which halves the amplitude
+# within one radian.
+MOST_LAG = 0.75
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,12 +153,6 @@ class Averaged:
     area: Table | None
     lag: Table | None
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each parameter."""
-        turning = ("phase", "angular_frequency", "backbone")[: 2 if self.area is None else 3]
-        return (*self.law.parameters, *turning, *(f"rest{k}" for k in range(self.degree + 1)))
-
     def split(self, values: F8) -> tuple[F8, F8, F8]:
         """Return the parameters of law, phase and rest position."""
         first = len(self.law.parameters)
@@ -222,12 +222,9 @@ def fit_phase(windows: Demodulated, damping: Damping, last: float) -> Phase:
     """Fit a constant frequency to the windows' phases and test it against one that depends on amplitude.
 
     The reported frequency is the record's mean, whether or not the frequency varies. If the residuals of the straight
-    line are not white, its uncertainty is multiplied by the square root of the correlation length and, if chi-square
-    is too large, of the reduced chi-square. The interval then covers a curvature of the phase.
-
-    The frequency of an ideal spring is constant. A nonlinear spring shifts it in proportion to the square of the
-    amplitude. The delay of a period's fitted sinusoid (:func:`lag_of`) follows from the damping law and is removed
-    first.
+    line are not white, its covariance is widened, so that the interval covers a curvature of the phase. A nonlinear
+    spring shifts the frequency in proportion to the square of the amplitude. The delay of a period's fitted sinusoid
+    (:func:`lag_of`) follows from the damping law and is removed first.
     """
     t, t0 = windows.t, damping.t0
     noise = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
@@ -338,11 +335,7 @@ def lag_of(fit: LawFit, t0: float, windows: Demodulated) -> Table | None:
 
 
 def area_of(law: Law, theta: F8, t0: float, middle: float, last: float) -> Table:
-    """Return the integral of A^2 from the middle, from t0 to the last time.
-
-    The trapezoidal rule and linear interpolation between its points have a relative error below 1e-5 if A^2 decays
-    by a factor of e^10 within the table.
-    """
+    """Return the integral of A^2 from the middle, from t0 to the last time."""
     from scipy.integrate import cumulative_trapezoid
 
     grid = np.linspace(t0, max(last, t0 + 1e-9), POINTS)
@@ -376,9 +369,8 @@ def wrapped(angle: float) -> float:
 def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
     """Return why a motion is no oscillation, although single periods look like one; None if it is one.
 
-    Amplitude and phase of a window form a phasor, which the damping law and the fit of the phase predict. Random
-    phasors differ from the prediction by more than their own length. Weighted by length, half of the phasors must
-    differ from it by less, ``typical``.
+    Amplitude and phase of a window form a phasor. Weighted by length, half of the phasors must differ from what the fit
+    predicts by less than their own length, ``typical``, as random phasors do not.
     """
     if typical < 1.0 or fitted.demodulated.t.size < FEWEST_FOR_LINE:
         return None
@@ -388,10 +380,7 @@ def check_coherence(fitted: Fitted, typical: float) -> NoOscillation | None:
 
 
 def typical_miss(fitted: Fitted) -> float:
-    """Return the weighted median difference of windows from the fitted oscillation, over their amplitudes.
-
-    The weights are the amplitudes of the windows.
-    """
+    """Return the median difference of windows from the fitted oscillation, over their amplitudes, weighted by these."""
     windows, phase = fitted.demodulated, fitted.phase
     expected = fitted.damping.best.amplitude(windows.t - phase.t0) * np.exp(1j * phase.total(windows.t))
     own = windows.amplitude * np.exp(1j * windows.phase)

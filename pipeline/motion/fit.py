@@ -25,21 +25,16 @@ from pipeline.windows.demodulate import CLIP_SIGMAS
 
 Bools = NDArray[np.bool_]
 
-# Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas and
-# with random signs they move an estimate by 4 sqrt(steady) = 0.04 of its standard uncertainty.
+# Maximum share of the samples that may still enter or leave the fit in the last round. At the limit of 4 sigmas, and
+# with signs by chance, they move an estimate by 4 sqrt(1e-4) = 0.04 of its standard uncertainty.
 STEADY = 1e-4
 
 
 class Model(Protocol):
-    """A motion with named parameters."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each parameter."""
-        ...
+    """A motion with parameters."""
 
     def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
-        """Return the positions (n,) at t, and a function that gives their derivatives (n, p) by the parameters."""
+        """Return the positions (n,) at t, and a function that gives their derivatives (n, p) by them."""
         ...
 
 
@@ -114,19 +109,13 @@ def fit(model: Model, rows: Rows, start: F8) -> Fit:
 
 
 def clipped(
-    model: Model,
-    rows: Rows,
-    start: F8,
-    *,
-    least_m: float,
-    noise_m: float = math.inf,
-    rounds: int = ROUNDS,
+    model: Model, rows: Rows, start: F8, *, least_m: float, noise_m: float = math.inf, rounds: int = ROUNDS
 ) -> tuple[Fit, Rows]:
-    """Fit until the set of false echoes is stable; return the fit and its rows.
+    """Fit until the set of false echoes is stable; return the last fit and its rows.
 
     Residuals below ``least_m`` times :data:`CLIP_SIGMAS` are never false echoes. If the residuals contain more than
-    noise, no more samples are excluded and none returns. The fit is the last one also if it has not converged; it has
-    not if hardly any sample lies on the model.
+    noise, no more samples are excluded and none returns. The fit has not converged if hardly any sample lies on the
+    model.
     """
     for left_rounds in range(rounds, 0, -1):
         found = fit(model, rows, start)

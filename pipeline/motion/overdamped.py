@@ -42,7 +42,6 @@ class Relaxing:
     """A model that is linear in its first parameters; the others are logarithms of rates."""
 
     shape: Shape  # columns (n, k) of the linear parameters at times (n,), for the logarithms
-    names: tuple[str, ...]
     linear: int
 
     def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
@@ -106,9 +105,8 @@ def damped(t: F8, logarithms: F8) -> F8:
     return np.stack([np.ones(t.size), cosine + rate * sine, sine], axis=1)
 
 
-FREE = Relaxing(damped, ("rest", "displacement", "velocity", "ln_rate", "ln_stiffness"), 3)
-CRITICAL = Relaxing(damped, ("rest", "displacement", "velocity", "ln_rate"), 3)
-LONE = Relaxing(exponential, ("rest", "displacement", "ln_rate"), 2)
+DAMPED = Relaxing(damped, 3)
+LONE = Relaxing(exponential, 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,23 +146,22 @@ class Decay:
 
 def best_decay(rows: Rows, rate_hz: float) -> Decay | None:
     """Return the best of the fits from a grid of start values; None if no fit converged."""
-    ends = [FREE.fit(rows, start) for start in _grid(rows, rate_hz)]
+    ends = [DAMPED.fit(rows, start) for start in _grid(rows, rate_hz)]
     # If the record determines only one of two rates, chi-square has an open valley, possibly with a minimum beside it.
     minima = [end for end in ends if end.converged]
-    return _described(FREE, rows, min(minima, key=lambda end: end.cost)) if minima else None
+    return _described(DAMPED, rows, min(minima, key=lambda end: end.cost)) if minima else None
 
 
 def critical_decay(rows: Rows, near: Decay) -> Decay | None:
     """Return the critically damped fit started from another fit; None if it did not converge."""
-    end = CRITICAL.fit(rows, near.values[3:4])
-    return _described(CRITICAL, rows, end) if end.converged else None
+    end = DAMPED.fit(rows, near.values[3:4])
+    return _described(DAMPED, rows, end) if end.converged else None
 
 
 def lone_exponential(rows: Rows, rate: float) -> tuple[float, float]:
     """Fit :math:`o + p e^{-rt}` from a start value of the rate (in 1/s), and return r and chi-square.
 
-    If the record shows no such rate the search diverges. The rate returned is therefore limited to a factor of e to
-    the power :data:`FAR` above or below the start value.
+    If the record shows no such rate the search diverges; r is limited to a factor of :data:`FAR`.
     """
     start = math.log(rate)
     end = LONE.fit(rows, np.array([start]))
@@ -210,10 +207,7 @@ LEAST_DAMPING = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Overdamped:
-    """A motion that damping ends within a few cycles or before the first one.
-
-    It relaxes with two rates or with one, or it is an oscillation whose damping ratio is large.
-    """
+    """A motion that relaxes with two rates or with one, or an oscillation whose damping ratio is large."""
 
     why: str  # one sentence that states the rates or the damping ratio
     kind: Kind
@@ -229,12 +223,10 @@ def find_overdamped(conditioned: Conditioned) -> Overdamped | NoOscillation | No
     The result is :class:`NoOscillation` if the record is a single exponential, which a drift can resemble. It is None
     if the record is no relaxation but noise, a drift, a step, a ramp or a weakly damped oscillation.
 
-    :func:`pipeline.motion.overdamped.best_decay` covers all strengths of damping. A relaxation is accepted if its
-    residual is at most 1.5 times the noise, also in its moving part alone, and if it ends within the record
-    (:math:`gT > 2`). Its BIC must also be lower by ten than that of every polynomial up to degree three, every step and
-    every ramp. Critical damping and the free fit (two rates or an oscillation) are compared by BIC; the better one must
-    have a BIC lower by six than a single exponential. If a record begins before the release, the fit begins where the
-    displacement begins to fall.
+    A relaxation must leave no more than noise, also in its moving part alone, and end within the record (:math:`gT >
+    2`). The evidence for it against every polynomial up to degree three, every step and every ramp must be very strong,
+    and that against a single exponential strong. Critical damping and the free fit are compared by BIC. If a record
+    begins before the release, the fit begins where the displacement begins to fall.
     """
     used = conditioned.used
     t, y = conditioned.track.t[used], conditioned.track.y[used]
@@ -290,7 +282,7 @@ def _follow(t: F8, y: F8, noise: float, samples: Conditioned) -> Overdamped | No
 
 def _misses(rows: Rows, found: Decay) -> bool:
     """Return whether the residual is too large over the whole record or over its moving part."""
-    squares = (rows.left(FREE, found.values) / rows.u) ** 2
+    squares = (rows.left(DAMPED, found.values) / rows.u) ** 2
     count = max(int(np.searchsorted(rows.t, 4.0 / found.slowest)), 12)
     return bool(max(float(np.mean(squares)), float(np.mean(squares[:count]))) > MISFIT**2)
 
@@ -299,7 +291,7 @@ def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
     """Return whether the relaxation explains the record better than any polynomial, step or ramp does."""
     size = max(1, rows.t.size // POINTS)
     whole = rows.t.size // size * size
-    each = (rows.t, rows.y, rows.left(FREE, found.values))
+    each = (rows.t, rows.y, rows.left(DAMPED, found.values))
     t, values, left = (x[:whole].reshape(-1, size).mean(axis=1) for x in each)
     sigma = rows.u / math.sqrt(size)
     mine = float(np.sum(left**2)) / sigma**2 + 5.0 * math.log(t.size)
@@ -308,10 +300,7 @@ def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
 
 
 def _other_shapes(t: F8, y: F8) -> Iterator[tuple[float, int]]:
-    """Fit polynomials up to degree three, the best step and a grid of ramps.
-
-    Yield the residual sum of squares and the number of parameters of each shape.
-    """
+    """Yield squared residuals and number of parameters of polynomials up to degree three, the best step, and ramps."""
     x = 2.0 * t / t[-1] - 1.0
     for degree in range(4):
         yield _left(np.polynomial.legendre.legvander(x, degree), y), degree + 1
@@ -336,8 +325,7 @@ def _left(design: F8, y: F8) -> float:
 def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[Kind, Decay] | NoOscillation | None:
     """Return the kind of damping with the lowest BIC and its fit, unless a single exponential suffices.
 
-    Return None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, where a
-    relaxation cannot be distinguished from a step.
+    None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, like a step.
     """
     price = math.log(rows.t.size)
     rate, left = lone_exponential(rows, fit.slowest)
@@ -401,11 +389,7 @@ def _estimate(quantity: Any, unit: str) -> Estimate:
 
 
 def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
-    """Return the spring constant (in N/m) by name; empty if the scene gives no bob mass.
-
-    :math:`k = \\omega_0^2 M` with the undamped frequency and the oscillating mass M: the bob, the air that a disc
-    carries along, and the spring's share (:func:`pipeline.bench.spring.oscillating_mass_kg`).
-    """
+    """Return :math:`k = \\omega_0^2 M` in N/m by name, M being the oscillating mass; empty without a bob's mass."""
     if scene.bob_mass_kg is None:
         return {}
     spring = scene.spring_mass_kg or unstated_spring_kg(scene)

@@ -17,7 +17,7 @@ from pipeline.numerics.regression import correlation_length
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by rounding
+ROUNDING = 64.0 * float(np.finfo(np.float64).eps)  # relative scatter of a motionless record by IEEE rounding
 # Minimum ratio of the weaker mode's amplitude to the stronger one's; below it only one oscillation counts.
 WEAKER = 1.0 / 3.0
 # Minimum numbers of beats and of periods of the slower mode in the record; with fewer, two modes cannot be
@@ -28,11 +28,7 @@ MOST = 100_000  # maximum number of median spacings; longer records are not fitt
 
 @dataclass(frozen=True, slots=True)
 class TwoModes:
-    """Two simultaneous oscillations.
-
-    The estimates are ``first_mode_period`` and ``first_mode_amplitude`` (at the first sample), and likewise for the
-    second mode. The first mode is the stronger one.
-    """
+    """The period and the amplitude, at the first sample, of the stronger ("first") and of the other mode."""
 
     why: str  # one sentence that states the periods and amplitudes of both modes
     estimates: dict[str, Estimate]
@@ -41,13 +37,6 @@ class TwoModes:
 @dataclass(frozen=True, slots=True)
 class Modes:
     """The model of some decaying modes: rest position, then a, b, omega and g of each."""
-
-    count: int
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each parameter."""
-        return ("rest", *(f"{name}{i}" for i in range(self.count) for name in ("a", "b", "omega", "g")))
 
     def at(self, t: F8, values: F8) -> tuple[F8, Callable[[], F8]]:
         """Return the positions (n,) at t, and a function that gives their derivatives (n, p)."""
@@ -64,10 +53,9 @@ class Modes:
 def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     """Return the two modes that a record consists of; None if two modes do not describe it.
 
-    :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted by least squares to all samples
-    used. It starts from the strongest line of the spectrum and from the strongest line of the residual of the first.
-    Covariances are scaled by the residuals, including their correlation. Records above the limits in length or mean
-    spacing are not searched.
+    :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted to all samples used, started
+    from the strongest line of the spectrum and the strongest line of the residual of the first. Covariances are scaled
+    by the residuals, including their correlation.
     """
     used = conditioned.used & np.isfinite(conditioned.track.t)
     t, y, unit = conditioned.track.t[used], conditioned.track.y[used], conditioned.track.unit
@@ -81,10 +69,10 @@ def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
         return None
     values = (y - y.mean()) / scale
     first = _strongest(tau, values)
-    second = _strongest(tau, values - Modes(1).at(tau, _linear(tau, values, (first,)))[0])
+    second = _strongest(tau, values - Modes().at(tau, _linear(tau, values, (first,)))[0])
     start = _linear(tau, values, (first, second))
     every = np.ones(y.size, np.bool_)
-    found = fit(Modes(2), Rows(tau, values, every, every), start)
+    found = fit(Modes(), Rows(tau, values, every, every), start)
     if not np.all(np.isfinite(found.covariance)) or not float(found.residual @ found.residual) < NEGLIGIBLE * y.size:
         return None
     places = sorted((1, 5), key=lambda i: -float(np.hypot(*found.values[i : i + 2])))

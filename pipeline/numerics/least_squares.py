@@ -1,11 +1,10 @@
 """Non-linear least squares by MINPACK, with certified convergence.
 
-The search is the Levenberg-Marquardt algorithm of ``scipy.optimize.leastsq``. Its own convergence tests ask how small a
-step or a gain is. On NIST's reference data, fitters with such tests report success at a wrong end for up to 23 of
-54 starts (docs/decisions/0012-scipy-least-squares.md). Here a fit has converged only if Bates and Watts' relative
-offset shows a minimum and the singular values of the Jacobian show that the data determine every parameter.
-``tests/reference/test_nist.py`` shows six correct digits from 53 of the 54 starts and no false success. A second
-search, by a trust region, solved the remaining start as well but took twice the code.
+The convergence tests of ``scipy.optimize.leastsq`` ask how small a step or a gain is. On NIST's reference data, fitters
+with such tests report success at a wrong end for up to 23 of 54 starts (docs/decisions/0012-scipy-least-squares.md).
+Here a fit has converged only if Bates and Watts' relative offset shows a minimum and the singular values of the
+Jacobian show that the data determine every parameter: ``tests/reference/test_nist.py`` shows six correct digits from 53
+of the 54 starts and no false success.
 """
 
 from __future__ import annotations
@@ -56,16 +55,16 @@ def minimise(
 ) -> Fit:
     """Find the parameters that minimise the sum of squared residuals.
 
-    Check ``converged`` before using the numbers. ``residuals`` gives the difference of model and data over the standard
-    uncertainty, at least as many as parameters. It may return non-finite values where the model has no value; such
-    steps are not taken. ``jacobian`` is by central differences if there is none, which are accurate to about ten
-    digits. The search stops when the remaining step is ``precision`` of the parameters' standard uncertainties, as
-    estimated from the residuals; 1e-8 is for reference values.
+    Check ``converged`` before using the numbers. ``residuals`` gives at least as many differences of model and data
+    over the standard uncertainty as parameters; where the model has no value it may be non-finite. ``jacobian`` is by
+    central differences, accurate to about ten digits, if there is none. The search stops when the remaining step is
+    ``precision`` of the parameters' standard uncertainties, as estimated from the residuals; 1e-8 is for reference
+    values.
 
     Where the relative offset is ``precision``, the remaining step lowers the sum of squares by the fraction
     :math:`\\mathrm{precision}^2 p/(n-p)`, which is the search's tolerance. The end is judged by the offset itself [1]_:
-    the length of the residuals' projection on the columns of the Jacobian, relative to the length of the residuals.
-    It does not depend on the units or scales of the parameters. An offset within rounding error is accepted too.
+    the length of the residuals' projection on the columns of the Jacobian, relative to the length of the residuals,
+    which does not depend on the units of the parameters. An offset within rounding error is accepted too.
 
     .. [1] D. M. Bates, D. G. Watts, "A relative offset orthogonality convergence criterion for nonlinear least
        squares", Technometrics 23 (1981) 179, doi:10.1080/00401706.1981.10486257.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
@@ -34,23 +33,6 @@ class Scatter:
     excess: float  # scatter of the points beyond their own noise: beats, sideways swing, steps
     kept: NDArray[np.bool_]  # (n,) False for single points more than five standard uncertainties from the curve
     correlation: float  # number of points that count as one, :math:`1 + 2\\sum\\rho_k \\ge 1`
-
-
-def smooth_columns(t: F8, degree: int) -> F8:
-    """Return the Legendre polynomials (n, degree + 1) over ascending times (n,) as a read-only array.
-
-    There must be at least two times. Amplitudes, phases and rest positions share their times, so the polynomials are
-    calculated once.
-    """
-    return _smooth_columns(t.tobytes(), degree)
-
-
-@functools.lru_cache(4)
-def _smooth_columns(times: bytes, degree: int) -> F8:
-    t = np.frombuffer(times, np.float64)
-    columns = np.asarray(np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, degree))
-    columns.flags.writeable = False
-    return columns
 
 
 def beyond(basis: F8, columns: F8) -> F8:
@@ -89,10 +71,7 @@ def decompose(matrix: F8, least: float = 1e-13) -> tuple[F8, F8, bool]:
 
 
 def covariance_of(jacobian: F8) -> F8:
-    """Return :math:`(J^T J)^{-1}`, the covariance of a least-squares solution.
-
-    Infinite where the points do not determine every parameter; a pseudo-inverse would be finite there.
-    """
+    """Return the covariance :math:`(J^T J)^{-1}` of a least-squares solution; infinite if one is undetermined."""
     unknown = np.full((jacobian.shape[1],) * 2, np.inf)
     if not np.all(np.isfinite(np.linalg.norm(jacobian, axis=0))):
         return unknown
@@ -112,7 +91,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = DEGREE) -> Scatter:
     everything = np.ones(n, np.bool_)
     if degree < 1:
         return Scatter(u, 0.0, everything, 1.0)
-    design = smooth_columns(t, degree)
+    design = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, degree)
     share = math.sqrt(n / (n - degree - 1))
     total, excess, kept = u, 0.0, everything
     for _ in range(4):

@@ -18,8 +18,12 @@ from pipeline.numerics.robust import median
 from pipeline.track import F8
 
 AR_ORDER = 4  # highest order of the autoregression that describes the residual's correlation
-OVERSAMPLING = 4  # of the spectrum; between two of its points a line loses at most 5 % of its power
-CONTINUUM = 2.5  # independent trials per natural bin, because frequencies between bins are searched too
+# Oversampling of the spectrum: between two of its points a line loses at most 2 % of its power under a Hann window
+# (F. J. Harris, Proc. IEEE 66 (1978) 51).
+OVERSAMPLING = 4
+# Independent trials per natural bin, because frequencies between bins are searched too; measured by the rate of false
+# alarms (tests/trials/test_disturbances.py).
+CONTINUUM = 2.5
 NEAR, FAR = 2, 7  # distances from a line, in natural bins, between which the noise power is measured
 VARYING = 3  # degree of the polynomials for a line's amplitude and phase while the noise beside it is measured
 FREEDOM = 6.0  # complex degrees of freedom of the noise power: twelve bins, halved by the taper
@@ -197,10 +201,7 @@ def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band, smo
 
 
 def smooth_density(y: F8, turns: float) -> float:
-    """Return the spectral density, at a frequency in cycles per step, of an autoregression fitted to y (n,).
-
-    Its mean over all frequencies is the variance, so the density of white noise equals its variance everywhere.
-    """
+    """Return the spectral density, at a frequency in cycles per step, of an autoregression fitted to y (n,)."""
     return float(_density(*_autoregression(y, AR_ORDER), np.asarray(turns)))
 
 

@@ -45,11 +45,10 @@ class Ambient:
     def scale(self, instrument: Instrument) -> Any:
         """Return the factor on all distances: 1, with the uncertainty of the speed of sound or of a calibration.
 
-        A calibrated scale has only the uncertainty of the calibration. Otherwise the uncertainty of the speed of sound
-        comes from temperature, pressure, humidity and its formula. If the record used another speed of sound than that
-        of the scene's air, the difference is not corrected; it is the half-width of a rectangular distribution. If the
-        scene states no air temperature, that of a room is used, 20 +- 3 degC. If neither the record is that of a
-        rangefinder nor the scene has a sensor, the distances need not come from echoes, and their scale is exact.
+        If the record used another speed of sound than that of the scene's air, the difference is not corrected; it is
+        the half-width of a rectangular distribution. If the scene states no air temperature, that of a room is used, 20
+        +- 3 degC. If neither record nor scene tells of a rangefinder, the distances need not come from echoes, and
+        their scale is exact.
         """
         if instrument.u_scale > 0:
             return self._inputs.add("calibrated_scale", Estimate(1.0, instrument.u_scale), "B")

@@ -90,28 +90,21 @@ class Comparison:
 
 @one_thread
 def compare_springs(
-    runs: Sequence[SpringRun],
-    *,
-    spring_mass_kg: Estimate | None = None,
-    mass_correlation: float = 0.0,
+    runs: Sequence[SpringRun], *, spring_mass_kg: Estimate | None = None, mass_correlation: float = 0.0
 ) -> Comparison:
     """Test whether runs made with one spring give one spring constant.
 
-    The constant k and the mass s of the spring are fitted by generalised least squares to
-    :math:`k = \\omega_i^2 M(s, m_i)`, where M is the oscillating mass
-    (:func:`pipeline.bench.spring.oscillating_mass_kg`). The covariance of the right-hand sides is
-    :math:`V_{ij} = \\delta_{ij} u_i^2 + 4 u_{c,i} u_{c,j} k^2 + r\\,\\omega_i^2\\omega_j^2 u(m_i) u(m_j)`.
-    The clock's term applies only to runs with the same clock. Errors that runs share, of the clock and of the balance,
-    are in its off-diagonal elements; they change all constants together and so hardly affect the test.
+    The constant k and the mass s of the spring are fitted by generalised least squares to :math:`k = \\omega_i^2 M(s,
+    m_i)`, where M is the oscillating mass (:func:`pipeline.bench.spring.oscillating_mass_kg`). The covariance of the
+    right-hand sides is :math:`V_{ij} = \\delta_{ij} u_i^2 + 4 u_{c,i} u_{c,j} k^2 + r\\,\\omega_i^2\\omega_j^2 u(m_i)
+    u(m_j)`. The clock's term applies only to runs with the same clock. Errors that runs share change all constants
+    together and so hardly affect the test. A stated mass of the spring is one more observation; if it is not stated,
+    the observation is :func:`pipeline.bench.spring.unstated_spring_kg` for the lightest bob, so uncertain that runs
+    with different masses outweigh it. The mass then takes one degree of freedom, so two runs determine it but do not
+    test it.
 
-    A stated mass of the spring is one more observation. If it is not stated, the observation is
-    :func:`pipeline.bench.spring.unstated_spring_kg` for the lightest bob. This is so uncertain that runs with different
-    masses outweigh it. The mass then takes one degree of freedom, so two runs determine it but do not test it. Spring
-    constants do not depend on the scale of the distances.
-
-    If the runs disagree, the eight runs farthest from the mean are exchanged pair by pair. A pair is reported if
-    its exchange makes all runs agree, or reduces their tension to a hundredth, because exchanged records need not agree
-    to the last digit.
+    If the runs disagree, the eight runs farthest from the mean are exchanged pair by pair. A pair is reported if its
+    exchange makes all runs agree, or reduces their tension to a hundredth.
 
     The numbers of the report, with its two periods exchanged as printed:
 
@@ -125,7 +118,6 @@ def compare_springs(
         raise ValueError(f"a comparison needs two runs at least, got {len(runs)}")
     if not 0.0 <= mass_correlation <= 1.0:
         raise ValueError(f"mass_correlation must lie in 0 to 1, got {mass_correlation}")
-    _check(runs, spring_mass_kg)
     masses = [run.mass_kg for run in runs]
     fit = _fit(runs, masses, spring_mass_kg, mass_correlation)
     best, exchanged = fit, tuple[str, ...]()
@@ -141,36 +133,20 @@ def compare_springs(
     return replace(fit, exchanged=exchanged, exchanged_chi2=best.chi2 if exchanged else None, message=message)
 
 
-def _check(runs: Sequence[SpringRun], spring: Estimate | None) -> None:
-    for run in runs:
-        for what, x in (("angular frequency", run.angular_frequency), ("mass", run.mass_kg)):
-            if not (math.isfinite(x.value) and x.value > 0):
-                raise AnalysisError(f"{run.name}: its {what} must be positive, got {x.value:g} {x.unit}".rstrip())
-            if not (math.isfinite(x.u) and x.u >= 0):
-                raise AnalysisError(f"{run.name}: the uncertainty of its {what} must not be negative, got {x.u:g}")
-        if not (math.isfinite(run.u_clock) and run.u_clock >= 0):
-            raise AnalysisError(f"{run.name}: the clock's uncertainty must not be negative, got {run.u_clock:g}")
-    if spring is not None and not all(math.isfinite(x) and x >= 0 for x in (spring.value, spring.u)):
-        raise AnalysisError(f"the spring's mass must not be negative, nor its uncertainty, got {spring}")
-
-
 def _fit(
-    runs: Sequence[SpringRun],
-    masses: Sequence[Estimate],
-    stated: Estimate | None,
-    mass_correlation: float,
+    runs: Sequence[SpringRun], masses: Sequence[Estimate], stated: Estimate | None, mass_correlation: float
 ) -> Comparison:
     loads = np.array([mass.value for mass in masses])
     spring = _known_spring(masses, stated)
     squared = np.array([run.angular_frequency.value**2 for run in runs])
-    covariance, own = _covariance(runs, masses, squared * _oscillating(spring.value, loads), mass_correlation)
-    line = _line(squared, loads, covariance, spring)
+    covariance, own = shared_covariance(runs, masses, squared * _oscillating(spring.value, loads), mass_correlation)
+    line = spring_line(squared, loads, covariance, spring)
     solved = stated is None and line.spring.u < SOLVED * spring.u
     constant, found = line.constant, line.spring
     if stated is None and not solved:
         # If the bobs are too similar, the prior mass of the spring is used, and its uncertainty enters that of k.
         of_spring = float(np.mean(line.slope)) * spring.u
-        line = _line(squared, loads, covariance, Estimate(spring.value, 0.0, "kg"))
+        line = spring_line(squared, loads, covariance, Estimate(spring.value, 0.0, "kg"))
         constant = Estimate(line.constant.value, math.hypot(line.constant.u, of_spring), "N/m")
         found = spring
     chi2 = float(line.residual @ np.linalg.solve(covariance, line.residual))
@@ -208,7 +184,7 @@ def _fit(
 
 
 @dataclass(frozen=True, slots=True)
-class _Line:
+class SpringLine:
     """The weighted line through the runs: constant, mass of the spring, and the residual of each run, N/m."""
 
     constant: Estimate
@@ -218,7 +194,7 @@ class _Line:
     u_residual: F8
 
 
-def _line(squared: F8, loads: F8, covariance: F8, spring: Estimate) -> _Line:
+def spring_line(squared: F8, loads: F8, covariance: F8, spring: Estimate) -> SpringLine:
     """Fit constant and mass of the spring by least squares, with the prior mass as one observation."""
     factor, prior = np.linalg.cholesky(covariance), np.array([spring.value])
 
@@ -236,7 +212,7 @@ def _line(squared: F8, loads: F8, covariance: F8, spring: Estimate) -> _Line:
     design = np.column_stack([np.ones_like(squared), -slope])[:, : start.size]
     u = np.sqrt(np.diag(fit.covariance)).tolist()
     of_residual = np.diag(covariance - design @ fit.covariance @ design.T)
-    return _Line(
+    return SpringLine(
         Estimate(float(fit.values[0]), u[0], "N/m"),
         Estimate(float(mass[0]), u[1] if spring.u > 0 else 0.0, "kg"),
         slope,
@@ -255,7 +231,7 @@ def _oscillating(spring_kg: float, loads: F8) -> F8:
     return np.array([oscillating_mass_kg(spring_kg, float(load)) for load in loads])
 
 
-def _covariance(
+def shared_covariance(
     runs: Sequence[SpringRun], masses: Sequence[Estimate], each: F8, mass_correlation: float
 ) -> tuple[F8, F8]:
     """Return the covariance (n, n) of the runs' constants, and the standard uncertainties (n,) that are not shared."""

@@ -28,8 +28,10 @@ from pipeline.track import Track
 from pipeline.windows.disturbances import Disturbances
 
 SPEED_OF_SOUND_OF_RECORD = 344.0  # m/s, fixed in MotionSensor.vi
-STEEL_KG_PER_M3 = 7850.0
-SOFTER_PER_K = 2.6e-4  # relative decrease of the modulus of spring steel with temperature, 1/K
+STEEL_KG_PER_M3 = 7850.0  # EN 1993-1-2 (2005), 3.2.2
+# Relative decrease of the modulus of rigidity of steel with temperature, 1/K: G. H. Keulegan, M. R. Houseman, J. Res.
+# NBS 10 (1933) 289.
+SOFTER_PER_K = 2.6e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,12 +71,7 @@ def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
     )
 
 
-def simulated_effects(
-    scene: Scene,
-    problem: Problem,
-    seconds: float,
-    drag: DerivedDrag | None,
-) -> tuple[Effect, ...]:
+def simulated_effects(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | None) -> tuple[Effect, ...]:
     """Return the effects table of a simulation, which solves all terms of the equation.
 
     Leaving out a share s of the mass shifts the
@@ -211,7 +208,7 @@ def _modes(disturbances: Disturbances, unit: str) -> Iterator[Effect]:
         elif not members:
             yield Effect(name, None, None, unit, False, f"no {what} stands out of what the main oscillation leaves")
         else:
-            size = math.sqrt(sum(mode.amplitude.value**2 for mode in members))
+            size = math.sqrt(sum(mode.amplitude_m**2 for mode in members))
             verdict = "more" if disturbances.modelled else "less"
             why = (
                 f"{len(members)} times a {what}, together of this amplitude; the strongest line would leave up to "

@@ -12,7 +12,7 @@ from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.levels import COVERAGE, NEGLIGIBLE, SIGNIFICANT, normal_quantile
-from pipeline.results.compare import SpringRun
+from pipeline.results.compare import SpringRun, shared_covariance, spring_line
 from pipeline.track import F8
 
 GRAVITY = Estimate(9.81, 0.015, "m/s^2")  # 9.780 at the equator to 9.832 at the poles, uniformly distributed
@@ -42,42 +42,27 @@ class MassLine:
 
 
 def mass_line(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> MassLine | None:
-    """Fit the line by generalised least squares; None for fewer than three runs or bobs of nearly one mass.
-
-    The uncertainty of a mass counts as one of the squared period, by the slope. A common clock changes the slope alone.
-    """
-    mass = np.array([run.mass_kg.value for run in runs])
+    """Fit the line as in a comparison, but without a prior mass; None for fewer than three runs or nearly one mass."""
+    masses = [run.mass_kg for run in runs]
+    mass = np.array([each.value for each in masses])
     if len(runs) < 3 or mass.max() < (1.0 + NEGLIGIBLE) * mass.min():
         return None
-    omega = np.array([run.angular_frequency.value for run in runs])
-    squared = (2.0 * math.pi / omega) ** 2
-    of_period = 2.0 * squared * np.array([run.angular_frequency.u for run in runs]) / omega
-    of_clock = 2.0 * squared * np.array([run.u_clock for run in runs])
-    one_clock = np.array([[a.clock == b.clock for b in runs] for a in runs])
-    of_mass = np.polyfit(mass, squared, 1)[0] * np.array([run.mass_kg.u for run in runs])
-    shared = one_clock * np.outer(of_clock, of_clock) + mass_correlation * np.outer(of_mass, of_mass)
-    own = of_period**2 + (1.0 - mass_correlation) * of_mass**2
-    covariance = np.diag(np.maximum(own, 1e-24 * squared**2)) + shared
-    design = np.column_stack([np.ones_like(mass), mass])
-    weighted = np.linalg.solve(covariance, design)
-    state = np.linalg.inv(design.T @ weighted)
-    bend = np.zeros_like(mass)
-    for _ in range(4):  # the bend depends on the mass of the spring, which the line gives
-        start, slope = state @ (weighted.T @ (squared - bend))
-        spring_kg = max(3.0 * start / slope, 0.0)
-        swinging = np.array([oscillating_mass_kg(spring_kg, load) for load in mass.tolist()])
-        bend = slope * (swinging - mass - spring_kg / 3.0)
-    residual = squared - bend - design @ np.array([start, slope])
-    ratio = start / slope
-    gradient = np.array([1.0, -ratio]) / slope
+    stiffness = np.array([run.angular_frequency.value**2 for run in runs])
+    squared = 4.0 * math.pi**2 / stiffness
+    about = np.full_like(mass, 4.0 * math.pi**2 / np.polyfit(mass, squared, 1)[0])  # N/m
+    covariance, _ = shared_covariance(runs, masses, about, mass_correlation)
+    line = spring_line(stiffness, mass, covariance, Estimate(0.0, 1e6 * float(mass.max()), "kg"))
+    slope, spring_kg = 4.0 * math.pi**2 / line.constant.value, line.spring.value
+    swinging = np.array([oscillating_mass_kg(spring_kg, load) for load in mass.tolist()])
+    bend = slope * (swinging - mass - spring_kg / 3.0)
     return MassLine(
-        Estimate(4.0 * math.pi**2 / slope, 4.0 * math.pi**2 / slope**2 * math.sqrt(state[1, 1]), "N/m"),
-        Estimate(float(ratio), math.sqrt(gradient @ state @ gradient), "kg"),
-        float(residual @ np.linalg.solve(covariance, residual)),
+        line.constant,
+        Estimate(spring_kg / 3.0, line.spring.u / 3.0, "kg"),
+        float(line.residual @ np.linalg.solve(covariance, line.residual)),
         len(runs) - 2,
         mass,
         squared,
-        np.sqrt(np.diag(covariance)),
+        np.sqrt(np.diag(covariance)) * squared / line.constant.value,
         bend,
     )
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, OUTLIER, normal_quantile
+from pipeline.numerics.levels import FALSE_ALARM, FEWEST_FOR_MEDIAN, OUTLIER, ROUNDS, normal_quantile
 from pipeline.numerics.robust import mad_sigma
 from pipeline.samples.condition import Conditioned, Cut
 from pipeline.track import F8, Quality
@@ -20,12 +20,17 @@ from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 from pipeline.windows.sinusoids import Windows, refit, solve
 
-LEVELS = 40  # number of heights tried for the level, from the middle of the swing to its top
-SHARE_BEYOND = 0.05  # share of a plateau's samples below the level beyond which samples are left out
-SETTLING, ROUNDS = 8, 11  # fits until the cut crests no longer affect the middle of the swing; fits in all
+# Number of heights tried for the level, from the middle of the swing to its top. With 80, amplitudes of clipped records
+# move by up to 0.05 u, as measured by `python -m tests.trials.troubles --only clipped`.
+LEVELS = 40
+# Share of a plateau's samples below the level beyond which samples are left out. With 0.1, amplitudes of clipped
+# records of `python -m tests.golden` move by up to 0.1 u.
+SHARE_BEYOND = 0.05
 
 Bools = NDArray[np.bool_]
-MIDDLE = 0.5  # fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted
+# Fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted: a sample lies
+# there with a probability of 1/3.
+MIDDLE = 0.5
 # Fraction of the amplitude beyond which the crest lies: within 30 degrees of the turning point.
 CREST = math.cos(math.pi / 6.0)
 
@@ -89,10 +94,10 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
     basis = windows.basis(np.full(decay.size, demodulated.angular_frequency), decay)
     inside = np.abs(whole.height(1.0)) < MIDDLE
     ends: list[_End] = []
-    for step in range(ROUNDS):
+    for step in range(2 * ROUNDS):
         fit, sigma = _fitted(windows, basis, inside, least)
         inside = np.abs(fit.height(1.0)) < MIDDLE
-        if step < SETTLING:
+        if step < ROUNDS:  # the cut crests still affect the middle of the swing
             continue
         ends = [end for sign in (1.0, -1.0) if (end := _end(fit, sign, sigma)) is not None]
         if not ends:

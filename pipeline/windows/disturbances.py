@@ -100,6 +100,6 @@ def _leak(sideways: Sideways) -> float:
     carrier = sideways.carrier
     main, seconds = carrier.angular_frequency / (2.0 * math.pi), float(carrier.t[-1] - carrier.t[0])
     return max(
-        (mode.amplitude.value / (math.pi * abs(mode.frequency.value - main) * seconds) for mode in sideways.modes),
+        (mode.amplitude_m / (math.pi * abs(mode.frequency_hz - main) * seconds) for mode in sideways.modes),
         default=0.0,
     )

@@ -8,19 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.numerics.levels import FEWEST_FOR_CURVE, NEGLIGIBLE, ROUNDS
+from pipeline.numerics.quantity import amount, noun
 from pipeline.samples.condition import Conditioned, condition
 from pipeline.samples.stopping import moving_part
 from pipeline.track import Quality
+from pipeline.windows.clipping import find_cuts
 from pipeline.windows.cycles import Cycles, NoOscillation, find_cycles
 from pipeline.windows.demodulate import Demodulated, demodulate, follow
 from pipeline.windows.gaps import longest_part
 from pipeline.windows.lost_rows import LostRows, find_lost_rows
-from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part, long_after_stop
-from pipeline.windows.sinusoid import check_sinusoid
+from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part
+
+# Maximum residual of an oscillation over its amplitude: parabolas leave 0.20 and square waves 0.34, as measured on one
+# period of each.
+MOST_BENT = 0.25
 
 # Share of the samples: if the bob stops before it, its rest is left out; if it stops before the end less this share,
-# only if the whole recording shows no oscillation. Its periods are then those measured by `pytest
-# tests/trials/test_stopping.py`; with an eighth, the rest hides some of them.
+# only if the whole recording shows no oscillation. With an eighth, rest long before the end is analysed, as measured
+# by `python -m tests.trials.troubles --only before`.
 EARLY = 0.25
 
 
@@ -48,11 +53,9 @@ def free_part(samples: Conditioned) -> FreePart | NoOscillation:
     conditioned again after each step, because the part left out may have hidden the noise of the rest.
     """
     segments: Segments | None = None
-    for outside in (before_trigger(samples), long_after_stop(samples, EARLY)):
-        if outside is not None:
+    for find in (before_trigger, _long_after_stop, longest_part):
+        if (outside := find(samples)) is not None:
             samples, segments = condition(outside.flagged(samples.track)), outside.within(segments)
-    if (part := longest_part(samples)) is not None:
-        samples, segments = condition(part.flagged(samples.track)), part.within(segments)
     cycles, stopped = _cycles(samples)
     if isinstance(cycles, NoOscillation):
         # A long time in the hand hides the motion after it, which the later half may show.
@@ -66,10 +69,8 @@ def free_part(samples: Conditioned) -> FreePart | NoOscillation:
         if isinstance(trimmed, NoOscillation):
             return cycles
         windows = demodulate(trial, trimmed)
-        if (
-            windows.noise_m > NEGLIGIBLE * float(np.max(windows.amplitude))
-            or check_sinusoid(trial, windows) is not None
-        ):
+        unclear = windows.noise_m > NEGLIGIBLE * float(np.max(windows.amplitude))
+        if unclear or check_sinusoid(trial, windows) is not None:
             return cycles
         samples, segments = trial, later.within(segments)
         cycles = trimmed
@@ -98,7 +99,23 @@ def free_part(samples: Conditioned) -> FreePart | NoOscillation:
         windows = demodulate(samples, cycles)
     if (followed := follow(cycles, windows, samples.track.t)) is not cycles:
         cycles, windows = followed, demodulate(samples, followed)
+    if (cut := find_cuts(samples, cycles, windows)) is not None:
+        samples, windows = cut, demodulate(cut, cycles)
     return FreePart(samples, segments, cycles, windows, stopped, lost)
+
+
+def _long_after_stop(samples: Conditioned) -> Segments | None:
+    """Return the part to keep of a recording whose bob stops early; None otherwise.
+
+    Hours of rest would decide a fit to all samples.
+    """
+    moving = moving_part(samples, EARLY)
+    if moving is None:
+        return None
+    t = samples.track.t[samples.used]
+    # An equal time at rest is kept, because it shows the rest position and the noise.
+    last_s = float(t[0] + 2.0 * (moving.track.t[-1] - t[0]))
+    return Segments(-math.inf, last_s, (Span(SpanKind.AT_REST, last_s, float(t[-1])),))
 
 
 def _cycles(samples: Conditioned, early: float = EARLY) -> tuple[Cycles | NoOscillation, bool]:
@@ -108,6 +125,32 @@ def _cycles(samples: Conditioned, early: float = EARLY) -> tuple[Cycles | NoOsci
     if moving is None or isinstance(trimmed := find_cycles(moving), NoOscillation):
         return cycles, False
     return trimmed, True
+
+
+def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOscillation | None:
+    """Return why the motion is no oscillation, although its spectrum has a peak; None if it is one.
+
+    A step or a ramp has a peak in its spectrum too.
+    """
+    most = demodulated.amplitude.size * 9 // 10
+    size = float(np.partition(demodulated.amplitude, most)[most])
+    left, unit = demodulated.noise_m, conditioned.track.unit
+    if not size > 1e-12 * float(np.max(np.abs(demodulated.offset))):
+        return NoOscillation(f"the {noun(unit)} does not follow the period of its spectrum")
+    # Correlated noise, a drift or a random walk makes neighbouring samples more similar than white noise does.
+    noise = max(conditioned.noise_m, (conditioned.quantum_m or 0.0) / math.sqrt(12.0))
+    # Both noises are estimated from the same n samples. For white noise the ratio of their squares has a variance of
+    # 8.5/n. Five standard deviations are allowed: the largest difference in 2,000 records at -10 dB is 4.3.
+    chance = 5.0 * math.sqrt(8.5 / max(float(np.sum(demodulated.count)), 1.0))
+    excess = math.sqrt(max(left**2 - (1.0 + chance) * noise**2, 0.0))
+    if left <= 0.15 * size or (left <= 4.0 * conditioned.noise_m and excess <= MOST_BENT * size):
+        return None
+    if left > MOST_BENT * size or demodulated.t.size < FEWEST_FOR_CURVE:
+        return NoOscillation(
+            f"the {noun(unit)} changes, but a sinusoid of {amount(size, unit, '.3g')} leaves "
+            f"{amount(left, unit, '.3g')}"
+        )
+    return None
 
 
 def start_of(samples: Conditioned, omega: float) -> float:

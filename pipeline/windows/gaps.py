@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,43 +65,34 @@ def _stretches(samples: Conditioned, t: F8) -> list[tuple[float, float]]:
     return [*_stretches(samples, t[: k + 1]), *_stretches(samples, t[k + 1 :])]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Side:
-    """The straight line through the phases on one side of a gap; ``covariance`` is that of level and slope."""
+def _phase_line(samples: Conditioned, rows: NDArray[np.bool_]) -> tuple[float, F8, F8] | None:
+    """Fit a straight line to the phases of some samples; None if they do not show enough periods.
 
-    middle_s: float
-    values: F8
-    covariance: F8
-
-    @classmethod
-    def of(cls, samples: Conditioned, rows: NDArray[np.bool_]) -> _Side | None:
-        """Fit the phases of some samples; None if they do not show enough periods."""
-        if (found := _oscillation(samples, rows)) is None:
-            return None
-        try:
-            windows = demodulate(*found)
-        except AnalysisError:
-            return None
-        if windows.t.size < FEWEST_FOR_MEDIAN:
-            return None
-        u = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
-        middle_s = float(np.mean(windows.t))
-        line = solve_weighted(np.stack([np.ones(u.size), windows.t - middle_s], axis=1), windows.phase, u)
-        widening = max(1.0, line.chi2 / (u.size - 2)) * correlation_length(line.residual / u)
-        return cls(middle_s, line.values, line.covariance * widening)
-
-    def phase(self, t: float) -> tuple[float, float]:
-        """Return the phase at a time and its standard uncertainty, rad."""
-        at = np.array([1.0, t - self.middle_s])
-        return float(at @ self.values), math.sqrt(float(at @ self.covariance @ at))
+    It is returned as its middle, s, its level and slope there, and their covariance.
+    """
+    if (found := _oscillation(samples, rows)) is None:
+        return None
+    try:
+        windows = demodulate(*found)
+    except AnalysisError:
+        return None
+    if windows.t.size < FEWEST_FOR_MEDIAN:
+        return None
+    u = np.maximum(np.sqrt(windows.covariance[:, 1, 1]), ROUNDING)
+    middle_s = float(np.mean(windows.t))
+    line = solve_weighted(np.stack([np.ones(u.size), windows.t - middle_s], axis=1), windows.phase, u)
+    widening = max(1.0, line.chi2 / (u.size - 2)) * correlation_length(line.residual / u)
+    return middle_s, line.values, line.covariance * widening
 
 
 def _continues(samples: Conditioned, last_s: float, next_s: float) -> bool:
     """Return whether the oscillation goes on across a gap with a known number of turns."""
-    t = samples.track.t
-    sides = [side for side in (_Side.of(samples, t <= last_s), _Side.of(samples, t >= next_s)) if side is not None]
-    if not sides or (next_s - last_s) * max(side.values[1] for side in sides) < 2.0 * math.pi:
+    t, gap_s = samples.track.t, 0.5 * (last_s + next_s)
+    lines = [line for rows in (t <= last_s, t >= next_s) if (line := _phase_line(samples, rows)) is not None]
+    if not lines or (next_s - last_s) * max(values[1] for _, values, _ in lines) < 2.0 * math.pi:
         return True
-    phases, u = zip(*(side.phase(0.5 * (last_s + next_s)) for side in sides), strict=True)
+    ahead = [(np.array([1.0, gap_s - middle_s]), values, covariance) for middle_s, values, covariance in lines]
+    phases = [float(at @ values) for at, values, _ in ahead]
+    u = math.sqrt(max(float(at @ covariance @ at) for at, _, covariance in ahead))
     apart = math.remainder(phases[-1] - phases[0], 2.0 * math.pi)
-    return bool(max(SIGNIFICANT * max(u), abs(apart)) <= NEGLIGIBLE * math.pi)
+    return max(SIGNIFICANT * u, abs(apart)) <= NEGLIGIBLE * math.pi

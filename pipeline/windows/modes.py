@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
@@ -90,15 +88,6 @@ def _smooth(powers: F8, y: F8) -> F8:
     return np.asarray(powers @ values)
 
 
-@lru_cache(maxsize=16)
-def _powers_of_legendre(degree: int) -> F8:
-    """Return the power series (degree + 1, degree + 1) of Legendre polynomials, in columns; numpy takes 0.2 ms each."""
-    series = np.zeros((degree + 1, degree + 1))
-    for k, row in enumerate(np.eye(degree + 1)):
-        series[: k + 1, k] = np.polynomial.legendre.leg2poly(row[: k + 1])
-    return series
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Mode:
     """One oscillation beside the main one: :math:`\\mathrm{Re}\\,E(t) w(t)`.
@@ -108,50 +97,34 @@ class Mode:
     """
 
     turns: int  # power of the main wave; 0 for an independent mode
-    frequency: Estimate  # mean frequency, Hz
-    amplitude: Estimate  # root mean square of :math:`|E w|` over the record, m
-    decay: Estimate  # logarithmic decay rate of an independent mode's wave, 1/s; 0 for harmonics
-    false_alarm: float  # probability that this mode is found in a record without it
-    # (float, float), first and last time used, s. Outside this span, envelope and decay factor keep their values at its
-    # ends.
+    frequency_hz: float
+    # First and last time used, s. Outside this span, envelope and decay factor keep their values at its ends.
     span: tuple[float, float]
     coefficients: C16  # (degree + 1,) m, coefficients of the envelope, in Legendre polynomials over ``span``
+    decay: float = 0.0  # logarithmic decay rate of an independent mode's wave, 1/s
+    amplitude_m: float = 0.0  # root mean square of :math:`|E w|` over the record
 
     @property
     def kind(self) -> Literal["mode", "harmonic"]:
         """Kind of the mode: independent, or a multiple of the main frequency."""
         return "harmonic" if self.turns else "mode"
 
-    @property
-    def degree(self) -> int:
-        """Degree of the envelope's polynomial."""
-        return self.coefficients.size - 1
-
     def wave(self, t: F8, main: C16) -> C16:
         """Return w at times t (n,), given the wave (n,) of the main oscillation."""
         if self.turns:
             return np.asarray(math.prod([main] * (self.turns - 1), start=main))
-        reach, angle = 0.5 * (self.span[1] - self.span[0]), 2.0 * math.pi * self.frequency.value * (t - self.span[0])
-        return rotating(np.exp(-self.decay.value * reach * self._x(t)), angle)
+        reach, angle = 0.5 * (self.span[1] - self.span[0]), 2.0 * math.pi * self.frequency_hz * (t - self.span[0])
+        return rotating(np.exp(-self.decay * reach * self._x(t)), angle)
 
     def envelope(self, t: F8) -> C16:
         """Return E at times t (n,), m."""
-        if not self.degree:
-            return np.broadcast_to(self.coefficients, t.shape)
-        x, powers = self._x(t), _powers_of_legendre(self.degree) @ self.coefficients
-        envelope = np.full(t.shape, powers[-1])
-        for coefficient in powers[-2::-1]:
-            envelope *= x
-            envelope += coefficient
-        return envelope
+        return np.asarray(np.polynomial.legendre.legval(self._x(t), self.coefficients))
 
     def columns(self, t: F8, wave: C16) -> F8:
         """Return the columns (n, 2 (degree + 1)) that belong to the coefficients' real and imaginary parts."""
-        powers = np.polynomial.legendre.legvander(self._x(t), self.degree).T if self.degree else np.ones((1, 1))
-        rows = np.empty((self.degree + 1, 2, t.size))
-        np.multiply(powers, wave.real, out=rows[:, 0])  # Re (x + iy) w = x Re w - y Im w
-        np.multiply(powers, -wave.imag, out=rows[:, 1])
-        return rows.reshape(-1, t.size).T
+        powers = np.polynomial.legendre.legvander(self._x(t), self.coefficients.size - 1)
+        # Re (x + iy) w = x Re w - y Im w
+        return np.stack([powers * wave.real[:, None], -powers * wave.imag[:, None]], axis=2).reshape(t.size, -1)
 
     def _x(self, t: F8) -> F8:
         start, end = self.span

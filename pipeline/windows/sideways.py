@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.numerics.estimate import Estimate
+from pipeline.numerics.levels import SIGNIFICANT
 from pipeline.numerics.regression import beyond
 from pipeline.numerics.robust import mad_sigma
 from pipeline.numerics.spectrum import (
@@ -16,7 +16,6 @@ from pipeline.numerics.spectrum import (
     Blocks,
     Peak,
     evidence_for,
-    false_alarm,
     smooth_density,
     spectral_density,
     strongest,
@@ -27,7 +26,8 @@ from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.modes import C16, Carrier, Mode, Sideways
 
-HARMONICS = (2, 3)  # multiples of the main frequency
+# Multiples of the main frequency that bent scales and springs cause; they share half of the probability FALSE_ALARM.
+HARMONICS = (2, 3)
 FALSE_ALARM = 0.01  # probability that a mode or a harmonic is found in a record without any; each has half of it
 MOST = 4  # maximum number of modes, not counting harmonics
 ENVELOPE = 4  # maximum degree of the polynomial for a mode's amplitude and phase
@@ -85,7 +85,6 @@ class _Search:
         self.basis, self.left = self.columns, self.data
         self.add(_main_columns(carrier, self.t) * blocks.weight[:, None])
         self.found = list[Mode]()
-        self.waves = dict[tuple[int, float, float], C16]()
 
     def run(self) -> Sideways:
         """Return the modes, strongest first, then the harmonics, all fitted together."""
@@ -97,11 +96,11 @@ class _Search:
             if peak is None or peak.false_alarm > 0.5 * FALSE_ALARM:
                 break
             mode, columns = self.free(peak)
-            if not self.band.inside(np.array([mode.frequency.value]))[0]:
+            if not self.band.inside(np.array([mode.frequency_hz]))[0]:
                 break  # the fit drifted to a frequency that the model already contains
             self.add(columns)
             self.found.append(mode)
-            self.hole((mode.frequency.value, width))
+            self.hole((mode.frequency_hz, width))
         return Sideways(tuple(sorted(self.together(), key=lambda mode: mode.turns > 0)), self.carrier)
 
     def together(self) -> Iterator[Mode]:
@@ -111,17 +110,8 @@ class _Search:
         envelopes: C16 = values[values.size - 2 * ends[-1] :].view(np.complex128)
         for mode, start, end in zip(self.found, ends[:-1], ends[1:], strict=True):
             refitted = replace(mode, coefficients=envelopes[start:end])
-            yield replace(refitted, amplitude=replace(mode.amplitude, value=self.size(refitted)))
-
-    def size(self, mode: Mode) -> float:
-        """Return the root mean square of the mode's amplitude over the record, m."""
-        return _rms(mode.envelope(self.t) * self.wave(mode))
-
-    def wave(self, mode: Mode) -> C16:
-        key = (mode.turns, mode.frequency.value, mode.decay.value)
-        if key not in self.waves:
-            self.waves[key] = mode.wave(self.t, self.main)
-        return self.waves[key]
+            sizes = np.abs(refitted.envelope(self.t) * refitted.wave(self.t, self.main))
+            yield replace(refitted, amplitude_m=float(np.sqrt(np.mean(sizes**2))))
 
     def hole(self, *holes: tuple[float, float]) -> None:
         self.band = replace(self.band, holes=(*self.band.holes, *holes))
@@ -133,36 +123,25 @@ class _Search:
         self.left = self.data - self.basis @ (self.basis.T @ self.data)
 
     def columns_of(self, mode: Mode) -> F8:
-        wave = self.wave(mode) * self.blocks.attenuation(mode.frequency.value)
+        wave = mode.wave(self.t, self.main) * self.blocks.attenuation(mode.frequency_hz)
         return mode.columns(self.t, wave) * self.blocks.weight[:, None]
-
-    def fitted(self, mode: Mode, values: F8, cofactors: F8, unit: float) -> Mode:
-        """Return the mode with its coefficients and their amplitude; ``unit`` is the variance."""
-        mode = replace(mode, coefficients=values.view(np.complex128))
-        u = math.sqrt(0.5 * unit * float(cofactors[0, 0] + cofactors[1, 1])) * _rms(self.wave(mode))
-        return replace(mode, amplitude=Estimate(self.size(mode), u, "m"))
 
     def harmonics(self) -> None:
         """Test the multiples of the main frequency one after another, each beyond those found before it."""
-        trials = [self.blank(turns, Estimate(turns * self.main_hz, 0.0, "Hz")) for turns in HARMONICS]
-        trials = [trial for trial in trials if self.sought(trial.frequency.value)]
-        if not trials:
-            return
+        trials = [self.blank(turns, turns * self.main_hz) for turns in HARMONICS if self.sought(turns * self.main_hz)]
         taken, fallen = np.empty((self.t.size, 0)), 0.0
         least = evidence_for(0.5 * FALSE_ALARM, len(HARMONICS))
         for trial in trials:
             both = np.concatenate([taken, self.columns_of(trial)], axis=1)
-            values, cofactors, fitted = self.fit(both)
+            _, _, fitted = self.fit(both)
             fall, left = float(fitted @ fitted), self.blocks.unweighted(self.left - fitted)
-            evidence, f = 0.5 * (fall - fallen) / self.blocks.samples, trial.frequency.value
+            evidence, f = 0.5 * (fall - fallen) / self.blocks.samples, trial.frequency_hz
             smooth = smooth_density(left, f * self.blocks.step)
             if evidence <= least * smooth:
                 continue  # the density is at least the smooth one
             density = spectral_density(self.blocks, left, f, self.band, smooth)
             if evidence > least * density:
-                unit, chance = density * self.blocks.samples, false_alarm(evidence / density, len(HARMONICS))
-                found = replace(trial, false_alarm=chance)
-                self.found.append(self.fitted(found, values[-2:], cofactors[-2:, -2:], unit))
+                self.found.append(trial)
                 taken, fallen = both, fall
         if taken.size:
             self.add(taken)
@@ -183,10 +162,10 @@ class _Search:
         known = any(abs(frequency_hz - centre) < half for centre, half in self.band.holes)
         return 0.1 * self.main_hz < frequency_hz < 0.4 / self.blocks.step and not known
 
-    def blank(self, turns: int, frequency: Estimate) -> Mode:
+    def blank(self, turns: int, frequency_hz: float) -> Mode:
         """Return a mode that has yet to be fitted."""
-        span, unknown = (float(self.carrier.t[0]), float(self.carrier.t[-1])), Estimate(0.0, 0.0, "m")
-        return Mode(turns, frequency, unknown, Estimate(0.0, 0.0, "1/s"), 1.0, span, np.zeros(1, np.complex128))
+        span = float(self.carrier.t[0]), float(self.carrier.t[-1])
+        return Mode(turns, frequency_hz, span, np.zeros(1, np.complex128))
 
     def free(self, peak: Peak) -> tuple[Mode, F8]:
         """Refine a peak's frequency, decide whether it decays, and choose the degree of its envelope.
@@ -212,24 +191,15 @@ class _Search:
         # A varying mode has a wider spectrum, which must not overlap the variations of the main oscillation.
         room = int(2.0 * (abs(f - self.main_hz) * self.blocks.seconds - 1.0) - self.carrier.degree)
         degrees = np.arange(min(ENVELOPE, max(room, 0)) + 1)
-        trial = replace(
-            self.blank(0, Estimate(f, u_rate / (2.0 * math.pi), "Hz")),
-            decay=Estimate(rate if abs(rate) > 3.0 * u_rate else 0.0, u_rate, "1/s"),
-            false_alarm=peak.false_alarm,
-            coefficients=np.zeros(degrees.size, np.complex128),
-        )
+        decay = rate if abs(rate) > SIGNIFICANT * u_rate else 0.0
+        trial = replace(self.blank(0, f), decay=decay, coefficients=np.zeros(degrees.size, np.complex128))
         columns = self.columns_of(trial)
         # The first two, four, ... columns lower the sum of squares by the residual's components along their directions.
         q, _ = np.linalg.qr(beyond(self.basis, columns))
         falls = np.cumsum((q.T @ self.left) ** 2)[1::2]
         criterion = -falls / unit + 2.0 * (degrees + 1) * math.log(self.blocks.t.size)
-        columns = columns[:, : 2 * (int(np.argmin(criterion)) + 1)]
-        values, cofactors, _ = self.fit(columns)
-        return self.fitted(trial, values, cofactors, unit), columns
-
-
-def _rms(wave: C16) -> float:
-    return float(np.linalg.norm(wave)) / math.sqrt(wave.size)
+        size = int(np.argmin(criterion)) + 1
+        return replace(trial, coefficients=trial.coefficients[:size]), columns[:, : 2 * size]
 
 
 def _main_columns(carrier: Carrier, t: F8) -> F8:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import base64
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.numerics.quantity import SHOWN, Unit
 from pipeline.track import F8
@@ -36,6 +36,11 @@ class Series:
     line: bool = False
     u: F8 | None = None
     why: tuple[str, ...] | None = None
+
+    def at(self, rows: NDArray[np.intp]) -> Series:
+        """Return the series with these rows alone."""
+        u, why = None if self.u is None else self.u[rows], self.why and tuple(self.why[row] for row in rows)
+        return replace(self, x=self.x[rows], y=self.y[rows], u=u, why=why)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,10 +101,7 @@ def thinned(series: Series, of_line: int = MOST_OF_LINE) -> Series:
     bins = most // (2 if series.line else 4)
     edges = np.linspace(0, y.size, bins + 1).astype(np.intp)
     ends = [at + f(y[at:to]) for at, to in itertools.pairwise(edges) for f in (np.argmin, np.argmax)]
-    rows = np.unique(ends if series.line else np.append(ends, np.arange(0, y.size, -(-y.size // (most // 2)))))
-    why = None if series.why is None else tuple(series.why[row] for row in rows)
-    u = None if series.u is None else series.u[rows]
-    return replace(series, x=series.x[rows], y=series.y[rows], u=u, why=why)
+    return series.at(np.unique(ends if series.line else [*ends, *range(0, y.size, -(-y.size // (most // 2)))]))
 
 
 def to_json(chart: Chart) -> dict[str, Any]:
@@ -185,12 +187,6 @@ def line_of(label: str, x: F8, y: F8, role: Role = "law") -> Series:
 def band_of(label: str, x: F8, y: F8, u: F8) -> Series:
     """Return a band from y - u to y + u."""
     return Series(label, x, y, "band", line=True, u=u)
-
-
-def mark(label: str, x: Sequence[float], texts: Sequence[str]) -> Series:
-    """Return vertical lines with their texts."""
-    at = np.asarray(x, np.float64)
-    return Series(label, at, np.full(at.size, np.nan), "mark", why=tuple(texts))
 
 
 @dataclass(frozen=True, slots=True)

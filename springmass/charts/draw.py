@@ -6,11 +6,10 @@ import io
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import cache
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -41,14 +40,15 @@ def _looks() -> dict[str, dict[str, Any]]:
     return looks
 
 
-def save(charts: Sequence[Chart], folder: Path, kinds: Sequence[Kind], stem: str = "") -> dict[str, dict[Kind, bytes]]:
-    """Write each chart as a file of every kind, complete or not at all; return their bytes by the chart's name."""
-    files = {}
+def save(charts: Iterable[Chart], folder: Path, kinds: Sequence[Kind], stem: str = "") -> dict[str, bytes]:
+    """Write each chart as a file of every kind, complete or not at all; return the SVG by the names of their files."""
+    pictures = {}
     for chart in charts:
-        files[chart.name] = render(chart, kinds)
-        for kind, data in files[chart.name].items():
+        for kind, data in render(chart, kinds).items():
             write_whole(folder / f"{stem}{chart.name}.{kind}", data)
-    return files
+            if kind == "svg":
+                pictures[f"{stem}{chart.name}"] = data
+    return pictures
 
 
 def render(chart: Chart, kinds: Sequence[Kind]) -> dict[Kind, bytes]:
@@ -125,11 +125,7 @@ def _until(panel: Panel, end: float | None) -> Panel:
     """Return a panel with the part of its series up to an end."""
     if end is None:
         return panel
-    parts = []
-    for one in panel.series:
-        rows = np.flatnonzero(one.x <= end)
-        u, why = None if one.u is None else one.u[rows], None if one.why is None else tuple(one.why[i] for i in rows)
-        parts.append(replace(one, x=one.x[rows], y=one.y[rows], u=u, why=why))
+    parts = (one.at(np.flatnonzero(one.x <= end)) for one in panel.series)
     return replace(panel, series=tuple(one for one in parts if one.x.size))
 
 
@@ -143,13 +139,13 @@ def legend(ax: Axes) -> None:
 def draw(panel: Panel, ax: Axes) -> Axes:
     """Draw a panel into axes, in their own style; text from outside is never set as mathematics."""
     low, high = panel.reach()
-    others = count()
-    numbers = {one.label: next(others) for one in {s.label: s for s in panel.series if s.role == "other"}.values()}
+    others = list(dict.fromkeys(one.label for one in panel.series if one.role == "other"))
     named: set[str] = set()
     for i, series in enumerate(each if panel.equal else thinned(each, MOST_OF_LINE) for each in panel.series):
         label = "_" if series.label in named else series.label.replace("$", r"\$")
         named.add(series.label)
-        _draw(ax, series, label, numbers.get(series.label, 0), (low, high), 1.5 + 0.01 * i)
+        number = others.index(series.label) if series.role == "other" else 0
+        _draw(ax, series, label, number, (low, high), 1.5 + 0.01 * i)
     if panel.log:
         low = low if low > 0.0 else high * 1e-6
         ax.set_yscale("log")
@@ -201,12 +197,7 @@ def _draw(ax: Axes, s: Series, label: str, number: int, ends: tuple[float, float
             ax.plot(s.x, s.y, lw=1.2 if s.role != "rest" else 0.8, ls=(0, lines) if lines else "-", **style)
     else:
         marker = {"dot": "o", "ring": "o", "cross": "x"}[found["marker"]]
-        look = {
-            "fmt": marker,
-            "ms": 2.4 if flat else 3.4,
-            "mew": 0 if found["marker"] == "dot" else 0.8,
-            "elinewidth": 0.8,
-        }
+        look = {"fmt": marker, "ms": 2.4 if flat else 3.4, "mew": 0 if found["marker"] == "dot" else 0.8}
         shown = np.clip(s.y, *ends) if s.role == "flagged" else s.y
         hollow: dict[str, Any] = {"mfc": "none"} if found["marker"] == "ring" else {}
-        ax.errorbar(s.x, shown, s.u, rasterized=flat, **style, **look, **hollow)
+        ax.errorbar(s.x, shown, s.u, elinewidth=0.8, rasterized=flat, **style, **look, **hollow)

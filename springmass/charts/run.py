@@ -13,10 +13,9 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.results.classic import CYCLES, Classic
-from pipeline.results.curves import Curve
-from pipeline.results.kinematics import Smoothed
+from pipeline.results.curves import Curve, Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
-from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, mark, rate_label, value_label
+from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty
 
 REASONS: tuple[tuple[int, str], ...] = (
@@ -45,7 +44,7 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
     track, factor = a.track, SHOWN[a.track.unit].factor
     rows = np.flatnonzero(np.isfinite(track.t))
     rows = rows[np.argsort(track.t[rows], kind="stable")]
-    t, y, used = track.t[rows], track.y[rows] * factor, _used(a)[rows]
+    t, y, used = track.t[rows], track.y[rows] * factor, used_samples(a)[rows]
     out = np.flatnonzero(~used)
     why = tuple(_reason(int(a.flags[rows[i]]), y[i]) for i in out)
     if track.unit != "m":
@@ -79,7 +78,8 @@ def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
     return Chart("position", "Position and residuals", caption, tuple(panels), end)
 
 
-def _used(a: Analysis) -> NDArray[np.bool_]:
+def used_samples(a: Analysis) -> NDArray[np.bool_]:
+    """Return which samples the analysis used."""
     return np.asarray(((a.flags & UNUSABLE) == 0) & np.isfinite(a.track.y) & np.isfinite(a.track.t), np.bool_)
 
 
@@ -92,8 +92,8 @@ def _reason(flags: int, y: float) -> str:
 def _marks(notes: Sequence[Note]) -> list[Series]:
     """Marks of the recording, its trigger and its losses, as vertical lines."""
     chosen = [note for note in notes if note.kind in ("mark", "trigger", "lost", "reopened")]
-    texts = [note.text if note.kind == "mark" else note.kind for note in chosen]
-    return [mark("marks", [note.t_s for note in chosen], texts)] if chosen else []
+    at, texts = np.array([note.t_s for note in chosen]), (n.text if n.kind == "mark" else n.kind for n in chosen)
+    return [Series("marks", at, np.full(at.size, np.nan), "mark", why=tuple(texts))] if chosen else []
 
 
 def _fit_lines(a: Analysis, motion: Oscillation, factor: float) -> list[Series]:
@@ -120,7 +120,7 @@ def model_motion(motion: Oscillation, t: F8) -> tuple[F8, F8]:
 
 def _relaxing(a: Analysis, motion: Overdamped) -> tuple[F8, F8]:
     """Return times and values of a relaxation: a linear fit of amplitudes and rest at the fitted rates."""
-    x, used = motion.estimates, _used(a) & (a.track.t >= motion.start_s)
+    x, used = motion.estimates, used_samples(a) & (a.track.t >= motion.start_s)
 
     def columns(t: F8) -> F8:
         since = t - motion.start_s
@@ -202,10 +202,8 @@ def frequency(a: Analysis) -> Chart | None:
     for part in np.array_split(order, min(MOST_STRETCHES, order.size // 2)):
         t, turned = windows.t[part], windows.phase[part]
         weight = 1.0 / np.maximum(windows.covariance[part, 1, 1] * max(phase.reduced_chi2, 1.0), 1e-30)
-        middle = np.average(t, weights=weight)
-        spread = float(np.sum(weight * (t - middle) ** 2))
-        slope = float(np.sum(weight * (t - middle) * turned)) / spread
-        points.append((float(np.mean(windows.amplitude[part])), slope, spread**-0.5))
+        (slope, _), covariance = np.polyfit(t - t.mean(), turned, 1, w=np.sqrt(weight), cov="unscaled")
+        points.append((float(np.mean(windows.amplitude[part])), slope, covariance[0, 0] ** 0.5))
     size, slope, u = np.array(sorted(points), np.float64).T
     factor, mean = SHOWN[a.track.unit].factor, phase.angular_frequency.value
     grid = np.linspace(float(size[0]), float(size[-1]), 100)
@@ -311,7 +309,7 @@ def motion(a: Analysis, smoothed: Smoothed | None = None) -> Chart | None:
     band = rows.size // 400 + 1  # u changes slowly
     first = [line_of(names[0], t, velocity)]
     if a.track.velocity is not None:
-        first.append(Series("as recorded", t, np.where(_used(a), a.track.velocity, np.nan)[rows]))
+        first.append(Series("as recorded", t, np.where(used_samples(a), a.track.velocity, np.nan)[rows]))
     around = band_of(f"± u of the {names[0]}", t[::band], np.zeros(t[::band].size), k * u[::band])
     label = "v − law / (mm/s)" if unit == "m" else rate_label("deviation", 1, unit)
     panels = (
@@ -346,7 +344,7 @@ def phase(a: Analysis) -> Chart | None:
     series = [line_of("fitted motion", line[:, 0] * factor, line[:, 1])]
     if track.velocity is not None:
         few, turn = int(np.ceil(motion.cycles.count / TURNS_OF_SAMPLES)), np.floor((track.t - first) / period)
-        seen = _used(a) & np.isfinite(track.velocity) & (turn >= 0) & (np.mod(turn, few) == 0)
+        seen = used_samples(a) & np.isfinite(track.velocity) & (turn >= 0) & (np.mod(turn, few) == 0)
         displacement = (track.y - motion.rest.at(track.t)) * factor
         series.insert(0, Series("samples, velocity as recorded", displacement[seen], track.velocity[seen], "rest"))
     label = rate_label("velocity" if unit == "m" else "derivative", 1, unit)
@@ -363,7 +361,7 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
         return None
     factor, period = SHOWN[a.track.unit].factor, classic.estimates["period"].value
     start, end = (float(classic.crests_t[i]) + s * 0.75 * period for i, s in ((0, -1), (-1, 1)))
-    near = np.flatnonzero(_used(a) & (a.track.t >= start) & (a.track.t <= end))
+    near = np.flatnonzero(used_samples(a) & (a.track.t >= start) & (a.track.t <= end))
     if not near.size:
         return None
     chosen = np.array([0, CYCLES])
@@ -446,7 +444,7 @@ def spectrum_of(a: Analysis, motion: Oscillation) -> tuple[F8, F8, F8] | None:
     samples and gaps are filled with the fit in the recording, and with zero in the residuals.
     """
     track, waveform = a.track, motion.waveform
-    used = ((a.flags & UNUSABLE) == 0) & np.isfinite(track.y) & np.isfinite(waveform.residual)
+    used = used_samples(a) & np.isfinite(waveform.residual)
     start, end = float(track.t[used][0]), float(track.t[used][-1])
     count = max(round((end - start) * track.rate_hz) + 1, 8)
     grid = np.linspace(start, end, count)

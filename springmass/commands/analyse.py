@@ -171,9 +171,8 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     from springmass.report.advice import trust_text
     from springmass.report.budgets import budget_text
     from springmass.report.words import damping_sentence
-    from springmass.terminal.printing import classic_text, findings_text, fitted, wrapped
+    from springmass.terminal.printing import classic_text, findings_text, fitted, text_table, wrapped
     from springmass.terminal.style import style_of
-    from springmass.terminal.table1 import text_table
     from springmass.typeset import typeset
 
     style = style_of(sys.stdout, si=options.si)
@@ -189,9 +188,8 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
 
 
 def _print_together(runs: Sequence[Run], options: AnalyseOptions) -> None:
-    from springmass.terminal.printing import shared_findings_text
+    from springmass.terminal.printing import shared_findings_text, text_table
     from springmass.terminal.style import style_of
-    from springmass.terminal.table1 import text_table
     from springmass.typeset import typeset
 
     style = style_of(sys.stdout, si=options.si)

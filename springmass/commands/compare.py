@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from acquisition.errors import visible
+from pipeline.findings.finding import kinds
 from springmass.commands.options import Figures, File, Json, Scenes, Strict, refuse
 from springmass.course.rows import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
@@ -126,7 +127,7 @@ def _print_text(compared: Compared, runs: list[Run]) -> None:
     for message in (*beside(compared), *(joint.message for joint in compared.joint)):
         print(f"\n{wrapped(message)}")
     if compared.reported:
-        mistakes = [plain(f) for f in compared.findings if f.code.startswith("reported_")]
+        mistakes = [plain(f) for f in compared.findings if "reported" in kinds()[f.code].about]
         print(f"\n{reported_text(compared.reported, style_of(sys.stdout))}\n\n{findings_text(mistakes, full=True)}")
     for run in runs:
         grave = [f for f in run.result["findings"] if f["severity"] != "info"]

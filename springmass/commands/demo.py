@@ -18,9 +18,8 @@ from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import make_folder, save_run
 from springmass.runs.run import Run, Task, analysed
 from springmass.runs.scenes import read_scene
-from springmass.terminal.printing import findings_text
+from springmass.terminal.printing import findings_text, text_table
 from springmass.terminal.style import style_of
-from springmass.terminal.table1 import text_table
 
 RUNS = ("undamped", "damped")
 

@@ -14,8 +14,7 @@ from acquisition.errors import visible
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.course import LITTLE
 from springmass.charts.chart import Chart
-from springmass.charts.drag_map import drag_map
-from springmass.charts.several import course
+from springmass.charts.several import course, drag_map
 from springmass.course.benches import BENCHES, CourseComparison
 from springmass.course.rows import COURSE, FAILED
 from springmass.report.advice import sentence

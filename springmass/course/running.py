@@ -19,7 +19,7 @@ from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
 from springmass.errors import ProgramError, complain, manner
 from springmass.report.html import SHARED, report_script
-from springmass.terminal.progress import TaskProgress
+from springmass.terminal.progress import counting
 from storage.atomic import write_whole, writing
 
 GROWTH = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
@@ -43,7 +43,7 @@ def run_course(
             shutil.rmtree(page.parent)
     done = made_of.keys() - {job.key for job in todo}
     made, written = 0, len(done)
-    with TaskProgress("runs", len(todo), lines=True, quiet=manner()[0]) as shown:
+    with counting("runs", len(todo), lines=True, quiet=manner()[0]) as show:
         for rows in _analysed(todo, jobs, dask):
             # A run during which a worker died is tried again by the next pass.
             store.add((job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows)
@@ -55,7 +55,7 @@ def run_course(
             for _, row in rows:
                 if row["status"] in FAILED:
                     complain(row["error"])
-            shown.update(made)
+            show(made)
     table = _table(course, store, done)
     write_rows(folder, table, course.tags)
     return table, made, _write_pages(course, folder, table, reports, jobs)
@@ -99,12 +99,12 @@ def _write_pages(course: Plan, folder: Path, table: Sequence[Row], reports: int,
     tasks = [(name, job, page.parent) for name, job, page in named if not page.exists()]
     unwritten: list[str] = []
     finished = 0
-    progress = TaskProgress("reports", len(tasks), lines=True, quiet=manner()[0])
-    with workers(len(tasks), jobs) as by, progress as shown:
+    progress = counting("reports", len(tasks), lines=True, quiet=manner()[0])
+    with workers(len(tasks), jobs) as by, progress as show:
         for written in outcomes(write_report_of, tasks, by):
             unwritten += [f"{job.path}: {_DIED}" if why is None else why for (_, job, _), why in written if why != ""]
             finished += len(written)
-            shown.update(finished)
+            show(finished)
     for line in lines:
         line["link"] = line["link"] if (folder / line["link"]).exists() else ""
     write_page(folder, table, lines, course.tags)

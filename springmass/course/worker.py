@@ -15,8 +15,7 @@ from pipeline.bench.scene import PLACES
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
-from springmass.charts.drag_map import drag_points
-from springmass.charts.several import outline
+from springmass.charts.several import drag_points, outline
 from springmass.course.plan import Job, code_sha256, digest_of
 from springmass.course.rows import ESTIMATES
 from springmass.errors import internal_error, quietly

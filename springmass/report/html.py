@@ -5,13 +5,13 @@ from __future__ import annotations
 import base64
 import functools
 import hashlib
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import visible
 from pipeline.analyse import Oscillation
+from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
@@ -22,7 +22,6 @@ from springmass.report.budgets import budgets_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
 from springmass.runs.comparing import Compared, beside
-from springmass.runs.json_results import picked
 from springmass.runs.rows import table_rows
 from springmass.runs.run import Run
 from springmass.runs.showing import laws_across, laws_of
@@ -96,7 +95,10 @@ def render_html(
         parts=parts,
         tables=list(_tables(runs)),
         several=overview,
-        compared=None if compared is None else _compared(compared),
+        compared=compared,
+        of_reported={code for code, kind in kinds().items() if "reported" in kind.about},
+        verdict="" if compared is None else typeset(" ".join([compared.comparison.message, *beside(compared)])),
+        joint=() if compared is None else [laws_across(joint) for joint in compared.joint],
         provenance=list(_flattened(provenance)),
         version=provenance["version"],
         **drawn_by_script(figures.charts, script),
@@ -169,7 +171,6 @@ def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, s
     analysis, quality, given = run.analysis, run.result["quality"], run.result["input"]
     motion, title = analysis.motion, str(run.recorded.get("title") or given.get("title") or "")
     ordered = [*(name for name in _QUALITY if name in quality), *(name for name in quality if name not in _QUALITY)]
-    findings = [picked(x, ("code", "severity", "message", "advice", "details")) for x in analysis.findings]
     return {
         "name": run.name,
         "index": index,
@@ -183,7 +184,7 @@ def _part(index: int, run: Run, charts: Mapping[str, Chart], figures: Figures, s
         "summary": summary(analysis),
         "method": method(analysis),
         "figures": {name: figures.add(chart, stem, index) for name, chart in charts.items()},
-        "notices": notices_of(run.result.get("findings", findings), charts),
+        "notices": notices_of(run.result["findings"], charts),
         "laws": laws_of(motion) if isinstance(motion, Oscillation) else None,
         "budgets": budgets_of(analysis),
         "effects": analysis.effects,
@@ -223,19 +224,6 @@ def _classic_rows(run: Run) -> list[tuple[str, Estimate | None, Estimate]] | Non
     words = {row.name: row.quantity for row in table_rows([run.analysis])}
     estimates = run.analysis.estimates
     return [(words.get(x, x.replace("_", " ")), estimates.get(x), value) for x, value in run.classic.estimates.items()]
-
-
-def _compared(compared: Compared) -> dict[str, Any]:
-    """Return everything that the template needs about the comparison."""
-    found = compared.comparison
-    return {
-        "found": found,
-        "message": typeset(" ".join([found.message, *beside(compared)])),
-        "findings": [picked(x, ("code", "severity", "message", "advice", "details")) for x in compared.findings],
-        "reported": compared.reported,
-        "rows": list(zip(itertools.count(1), found.names, found.each, found.pulls, strict=False)),
-        "joint": [laws_across(joint) for joint in compared.joint],
-    }
 
 
 def _flattened(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:

@@ -73,7 +73,7 @@ def lab_report_tex(run: Run, captions: Mapping[str, str], sentences: Sequence[st
         table=table_tex([run.name], [run.analysis]),
         captions=captions,
         budgets=[row for row in budgets_of(run.analysis) if row.name in ("period", "spring_constant")],
-        warnings=list(filter(None, map(lab_report_line, by_harm(run.result.get("findings", ()))))),
+        warnings=list(filter(None, map(lab_report_line, by_harm(run.result["findings"])))),
     )
 
 

@@ -66,8 +66,7 @@ def write_folder(
         title = f"{Path(where).name} by {simulation.solution.integrator.name}"
         configuration = {"rest_m": _rest_m(trajectory), **results}
         _write_run(folder / "run.h5", *_exact(trajectory, Path(where).name), scene, title, configuration)
-        drawn = save(charts, make_folder(folder / "figures"), kinds) if kinds else {}
-        figures = Figures({name: files["svg"] for name, files in drawn.items() if "svg" in files})
+        figures = Figures(save(charts, make_folder(folder / "figures"), kinds) if kinds else {})
         shown = [figures.add(chart) for chart in charts]
         page = template("charts.html.j2").render(title=title, figures=shown, **drawn_by_script(figures.charts))
         write_whole(folder / PAGE, page)

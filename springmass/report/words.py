@@ -13,7 +13,7 @@ from pipeline.track import UNUSABLE
 from springmass.report.advice import harm_of, sentence, trust_of, trust_text
 from springmass.report.budgets import budgets_of
 from springmass.runs.rows import is_about
-from springmass.typeset import kept, prefixed, pretty_number, typeset, unbroken
+from springmass.typeset import prefixed, pretty, pretty_number, typeset, unbroken
 
 
 def method(analysis: Analysis) -> tuple[str, ...]:
@@ -36,8 +36,8 @@ def method(analysis: Analysis) -> tuple[str, ...]:
         shares = {"spring_mass": "a share of the spring", "added_mass": "the air that the disc carries along"}
         moving = ["the bob", *(shares[x.name] for x in analysis.effects if x.included and x.name in shares)]
         sentences.append(
-            f"The spring constant is k\u00a0=\u00a0mω² with the oscillating mass m\u00a0=\u00a0{kept(mass)}: "
-            f"{listed(moving)}."
+            "The spring constant is k\u00a0=\u00a0mω² with the oscillating mass "
+            f"m\u00a0=\u00a0{unbroken(pretty(mass))}: {listed(moving)}."
         )
     rows = {row.name: row for row in budgets_of(analysis)}
     expanded = [
@@ -68,15 +68,11 @@ def damping_sentence(analysis: Analysis) -> str:
             "instead of its coefficients."
         )
     if damping.best.rejected:
-        if quoted:
-            return (
-                f"No damping law fits to within the scatter; {chosen} is by far the nearest, and u of its coefficients "
-                "was increased."
-            )
-        return (
-            f"No damping law fits to within the scatter; {chosen} is nearest, but others are nearly as good: quote the "
-            "damping rate or the amplitude against time, not their coefficients."
-        )
+        nearest = "by far the nearest, and u of its coefficients was increased"
+        if not quoted:
+            instead = "the damping rate or the amplitude against time, not their coefficients"
+            nearest = f"nearest, but others are nearly as good: quote {instead}"
+        return f"No damping law fits to within the scatter; {chosen} is {nearest}."
     possible = [words_of(damping.fits[name].law) for name in damping.admissible if name != damping.selected]
     if damping.growth_rate:
         text = "The amplitude grows exponentially"
@@ -141,15 +137,13 @@ def summary(analysis: Analysis) -> tuple[tuple[str, str], ...]:
 def _values(analysis: Analysis, motion: Oscillation) -> str:
     x, unit = analysis.estimates, analysis.track.unit
     moves = "bob swings" if unit == "m" else f"{noun(unit)} oscillates"
-    parts = [f"the {moves} with the period T\u00a0=\u00a0{kept(x['period'])}"]
+    parts = [f"the {moves} with the period T\u00a0=\u00a0{unbroken(pretty(x['period']))}"]
     if "spring_constant" in x:
-        parts.append(f"the mass gives the spring constant k\u00a0=\u00a0{kept(x['spring_constant'])}")
-    start = f"{motion.damping.t0:.2f}\u00a0s"
-    parts.append(
-        f"its amplitude by the fit at t\u00a0=\u00a0{start} is A₀\u00a0=\u00a0{kept(prefixed(x['amplitude']))}"
-    )
+        parts.append(f"the mass gives the spring constant k\u00a0=\u00a0{unbroken(pretty(x['spring_constant']))}")
+    start, size = f"{motion.damping.t0:.2f}\u00a0s", unbroken(pretty(prefixed(x["amplitude"])))
+    parts.append(f"its amplitude by the fit at t\u00a0=\u00a0{start} is A₀\u00a0=\u00a0{size}")
     if "damping_rate" in x:
-        parts.append(f"its damping rate at the start is λ\u00a0=\u00a0{kept(x['damping_rate'])}")
+        parts.append(f"its damping rate at the start is λ\u00a0=\u00a0{unbroken(pretty(x['damping_rate']))}")
     return f"{sentence('; '.join(parts))} {damping_sentence(analysis)}"
 
 

@@ -51,8 +51,6 @@ def write_report(
     one the page contains it. If there are several runs, the names of figures and motions begin with the name of the
     run.
     """
-    if not runs:
-        raise ValueError("a report needs one run at least, got none")
     directory, stems = Path(directory), _stems([run.name for run in runs])
     pdf: tuple[Kind, ...] = ("pdf",) if template is not None else ()
     kinds = list(dict.fromkeys((*figures, *pdf)))
@@ -76,8 +74,7 @@ def write_report(
         if kinds:
             (folder / "figures").mkdir()
             for stem, own in (("", several), *zip(stems, charts, strict=True)):
-                drawn = save(list(own.values()), folder / "figures", kinds, stem)
-                pictures |= {f"{stem}{name}": files["svg"] for name, files in drawn.items() if "svg" in files}
+                pictures |= save(own.values(), folder / "figures", kinds, stem)
         for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
             if not isinstance(smoothed, str):
                 write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))

@@ -21,12 +21,11 @@ from springmass import __version__
 from springmass.runs.loading import Loaded
 
 SCHEMA = 3
-_REJECTED_WARNINGS = frozenset({"sensor_lost"})
 
 
 def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
     """Return the codes that ``--strict`` rejects: errors, and warnings that the run is not the intended one."""
-    grave = [f["code"] for f in findings if f["severity"] == "error" or f["code"] in _REJECTED_WARNINGS]
+    grave = [f["code"] for f in findings if f["severity"] == "error" or "strict" in kinds()[f["code"]].about]
     return list(dict.fromkeys(grave))
 
 

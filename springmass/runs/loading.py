@@ -16,7 +16,7 @@ import numpy as np
 
 from acquisition.block import Block, SourceInfo
 from acquisition.decoders.family import RESONATOR_PPM
-from acquisition.errors import NeedsAnswer
+from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.clock_fit import fit_clock
 from acquisition.recordings.identify import open_recording
@@ -84,9 +84,7 @@ def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = F
     """Read a recording, a run file or a wire log, or standard input.
 
     All digests of a run file are checked before any sample is used. With ``scene_given`` the caller uses another scene,
-    and none is said to be read from the notes. Raises NeedsAnswer if the file leaves something
-    open that the options do not give, FormatError or StorageError if it cannot be read, and ProgramError if no sample
-    lies within the chosen time interval, or an option is given that the file states itself.
+    and none is said to be read from the notes. NeedsAnswer says what the file leaves open and the options do not give.
     """
     if str(path) == STDIN:
         return _load_stdin(options)
@@ -135,7 +133,12 @@ def _load_stdin(options: ReadOptions) -> Loaded:
             raise ProgramError("standard input is closed; name a file", UNREADABLE)
         with open(spooled, "wb") as file:
             shutil.copyfileobj(sys.stdin.buffer, file)
-        loaded = load(spooled, options)
+        try:
+            loaded = load(spooled, options)
+        except NeedsAnswer as error:
+            raise NeedsAnswer(replace(error.question, path=STDIN), line=error.line) from None
+        except FormatError as error:
+            raise type(error)(STDIN, error.problem, error.remedy, line=error.line) from None
         kept = loaded.originals  # read while the file exists
     return replace(loaded, path=Path(STDIN), kept=kept)
 

@@ -28,7 +28,6 @@ LOOK_S = 0.05
 PREVIEW_NS = 600_000_000_000
 """Maximum duration of a preview log; then a new log replaces it, and the old one is deleted."""
 STILL_S = 3.0
-LONGEST_KEEP_S = 60.0
 
 
 class Closed(Exception):
@@ -84,7 +83,7 @@ class Operator:
                 case "record":
                     return None
                 case "arm":
-                    return Trigger(float(request["threshold_m"]), min(float(request["keep_s"]), LONGEST_KEEP_S))
+                    return Trigger(float(request["threshold_m"]), float(request["keep_s"]))
                 case "close":
                     raise Closed
                 case "zero":

@@ -40,15 +40,10 @@ class TroubleKind(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """Why a sensor's readings are useless, and what to check; with the channel if there are several."""
+    """Why a sensor's readings are useless, and what to check."""
 
     kind: TroubleKind
     text: str
-    channel: int | None = None
-
-    def __str__(self) -> str:
-        """Return the text, with the sensor's channel if there are several."""
-        return self.text if self.channel is None else f"sensor {self.channel}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +194,7 @@ def trouble_of(shown: LiveState, chains: Sequence[SensorChain], *, waiting: bool
             trouble = Trouble(TroubleKind.SENSOR_FAULT, complaint)
         # While the trigger waits, the bob is expected to hang still.
         if trouble is not None and not (waiting and trouble.kind is TroubleKind.UNCHANGED):
-            return trouble if len(chains) == 1 else replace(trouble, channel=channel)
+            return trouble if len(chains) == 1 else replace(trouble, text=f"sensor {channel}: {trouble.text}")
     return None
 
 

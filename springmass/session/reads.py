@@ -180,13 +180,13 @@ class Tee:
 
     def absent(self, now_ns: int) -> list[int]:
         """Return the ports that are lost or whose sensor is silent."""
+        absent = []
         with self._lock:
-            return [port for port, sensor in enumerate(self._sensors) if self._is_absent(port, sensor, now_ns)]
-
-    def _is_absent(self, port: int, sensor: Sensor, now_ns: int) -> bool:
-        last, longest_s = self._last[port], SILENT_PERIODS / (sensor.rate_hz or sensor.family.rate_hz)
-        silent = last is None or (now_ns - last.host_ns) * 1e-9 > max(SILENCE_S, longest_s)
-        return port in self.gone or silent
+            for port, (sensor, last) in enumerate(zip(self._sensors, self._last, strict=False)):
+                longest_s = max(SILENCE_S, SILENT_PERIODS / (sensor.rate_hz or sensor.family.rate_hz))
+                if port in self.gone or last is None or (now_ns - last.host_ns) * 1e-9 > longest_s:
+                    absent.append(port)
+        return absent
 
     def blocks(self) -> list[tuple[int, Block]]:
         """Return the samples received since the last call, by channel, for sensors that have any."""

@@ -203,7 +203,7 @@ class Session:
         since_ns = moment_ns if trigger is None else moment_ns - int(trigger.keep_s * 1e9)
         # New chains make indices and times count from the run's first byte, as in recovery.
         self._chains = [sensor.chain() for sensor in self.sensors]
-        with self.stops.counted():
+        with self.stops.raising(False):
             recorder = self.recorder = Recorder(log, self._header(), self._clock)
             start_ns = self._clock.now_ns()
             self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
@@ -303,7 +303,7 @@ class Session:
 
     def _wait_until(self, deadline_ns: int) -> None:
         """Wait until a deadline or a request to end, and record a failure of the reader, if any."""
-        with self.stops.raised():
+        with self.stops.raising(True):
             self._clock.sleep_until_ns(deadline_ns)
         failure = None if self._reader is None else self._reader.failure
         if failure is not None and failure is not self._reader_failure:

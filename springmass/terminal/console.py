@@ -33,14 +33,6 @@ class Console:
         self._drawing = False  # whether the queue contains a step that draws the latest lines
         self._worker = Worker("console", failed)
 
-    @property
-    def columns(self) -> int:
-        """Current width of the terminal, columns."""
-        try:
-            return max(os.get_terminal_size(self._stream.fileno()).columns, 1) if self._stream is not None else 80
-        except (OSError, ValueError, AttributeError):
-            return 80
-
     def line(self, text: str) -> None:
         """Write text as one line, with line breaks joined and control characters made visible."""
         line = visible(" ".join(text.splitlines()))

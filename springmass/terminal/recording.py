@@ -40,13 +40,13 @@ class ProgressLine:
             self._console.line(" | ".join([*_parts(progress, self._style), *_troubles(progress)]))
             self._console.wait(PATIENCE_S)
         elif trouble is not None and trouble.kind is not self._trouble:
-            self._console.line(str(trouble))
+            self._console.line(trouble.text)
         self._trouble = None if trouble is None else trouble.kind
 
     def _lines(self, progress: Progress) -> list[str]:
         """Return the progress as far as it fits, the troubles, the keys and the last mark."""
         parts = _parts(progress, self._style)
-        while len(parts) > 2 and len(" | ".join(parts)) >= self._console.columns:
+        while len(parts) > 2 and len(" | ".join(parts)) >= self._style.width:
             parts.pop()
         lines, keys = [" | ".join(parts)], self._help
         if troubles := _troubles(progress):
@@ -94,7 +94,7 @@ def _troubles(progress: Progress) -> list[str]:
     if not progress.gone and progress.silent_s > SILENT_S:
         parts.append(f"no reading for {progress.silent_s:.0f} s: check power, wiring and baud rate")
     elif progress.trouble is not None:
-        parts.append(str(progress.trouble))
+        parts.append(progress.trouble.text)
     if progress.unshown:
         parts.append(f"{progress.unshown} samples recorded and not shown")
     if progress.status is not None and progress.status.error:

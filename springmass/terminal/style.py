@@ -45,16 +45,17 @@ def watched(stream: TextIO | None) -> bool:
         return False
 
 
-def shown(estimate: Estimate | None, style: TerminalStyle) -> str:
-    """Return an estimate as text: plain SI for a pipe, with prefix and ± if the terminal supports it."""
+def shown(estimate: Estimate | None, style: TerminalStyle, *, brackets: bool = False) -> str:
+    """Return an estimate as text, with a prefix unless SI is wanted, and u after ± or as digits in parentheses."""
     if estimate is None:
         return "-"
     chosen = estimate if style.si else prefixed(estimate)
-    if style.unicode:
-        return pretty(chosen)
     if isinstance(chosen, UpperLimit):
-        return str(chosen).replace("µ", "u")
-    return format_value(chosen.value, chosen.u, chosen.unit.replace("µ", "u"))
+        return pretty(chosen) if style.unicode else str(chosen).replace("µ", "u")
+    write = in_brackets if brackets else format_value
+    if style.unicode:
+        return f"{typeset(write(chosen.value, chosen.u))} {page_unit(chosen.unit)}".rstrip()
+    return write(chosen.value, chosen.u, chosen.unit.replace("µ", "u"))
 
 
 def concise(estimate: Estimate | None, style: TerminalStyle) -> str:
@@ -63,10 +64,4 @@ def concise(estimate: Estimate | None, style: TerminalStyle) -> str:
     >>> concise(Estimate(0.05145, 2e-5, "m"), TerminalStyle(True, True, si=False))
     '51.450(20) mm'
     """
-    if estimate is None or isinstance(estimate, UpperLimit):
-        return shown(estimate, style)
-    chosen = estimate if style.si else prefixed(estimate)
-    written = in_brackets(chosen.value, chosen.u)
-    if not style.unicode:
-        return f"{written} {chosen.unit.replace('µ', 'u')}".rstrip()
-    return f"{typeset(written)} {page_unit(chosen.unit)}".rstrip()
+    return shown(estimate, style, brackets=True)

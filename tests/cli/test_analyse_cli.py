@@ -159,6 +159,8 @@ def test_standard_input_is_read(cli: Cli, data: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(path.read_bytes())))
     (result,) = cli("analyse", "-", "--json").results
     assert result["estimates"] == expected["estimates"]
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"hello")))
+    assert cli("analyse", "-", "--json").complaint.startswith("springmass: <stdin>: ")
 
 
 @pytest.mark.trials

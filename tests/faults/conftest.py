@@ -24,10 +24,11 @@ import pytest
 
 from storage.run_file.reading import open_run
 
-STEP_S = 0.01
+RATE_HZ = 100.0
 FIRST_US, STEP_US = 1000.0, 0.25
 SPEED_M_PER_S = 344.0
 LIMIT_S = 180.0
+Send = Callable[[int], bytes]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -37,67 +38,82 @@ def line_of(number: int) -> bytes:
     return b"$%s*%04X\n" % (body, binascii.crc_hqx(body, 0xFFFF))
 
 
+def frame_of(millimetres: int) -> bytes:
+    """Return four bytes of an A02YYUW: header, millimetres, sum."""
+    high, low = divmod(millimetres, 256)
+    return bytes([0xFF, high, low, (0xFF + high + low) % 256])
+
+
 def usual_signals() -> None:
     """Give the signals their usual effect: a child inherits what the caller of the tests ignores."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_DFL)
 
 
-class Feeder:
-    """Sends a hundred readings a second into a pseudo-terminal until it is stopped or unplugged.
+class Sensor:
+    """Writes to a descriptor at a fixed rate, or once for each request, until it is stopped."""
 
-    The port's name stands in ``folder``.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.port = folder / "port"
+    def __init__(self, descriptor: int, send: Send, *, polled: bool) -> None:
+        os.set_blocking(descriptor, False)
+        self._descriptor, self._send, self._polled = descriptor, send, polled
         self._stop = threading.Event()
-        self._mute = threading.Event()
-        self._unplug = threading.Event()
-        self.sent = 0
-        self._master, self._slave = pty.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.port.symlink_to(os.ttyname(self._slave))
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        start, number = time.monotonic(), 0
+        while not self._stop.wait(0.002 if self._polled else max(0.0, start + number / RATE_HZ - time.monotonic())):
+            with contextlib.suppress(OSError):  # nobody reads: a sensor's bytes are lost then
+                for _ in range(len(os.read(self._descriptor, 100)) if self._polled else 1):
+                    os.write(self._descriptor, self._send(number))
+                    number += 1
+
+
+@contextmanager
+def on_a_terminal(send: Send, *, polled: bool = False) -> Iterator[str]:
+    """Yield the name of a port on which a sensor sends."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    sensor = Sensor(master, send, polled=polled)
+    try:
+        yield os.ttyname(slave)
+    finally:
+        sensor.stop()
+        os.close(slave)
+        os.close(master)
+
+
+class Feeder:
+    """Sends a hundred readings a second to a port of this name in ``folder`` until it is stopped or unplugged."""
+
+    def __init__(self, folder: Path) -> None:
+        self.port, self.sent = folder / "port", 0
+        self._mute, self._plugged = False, contextlib.ExitStack()
+        self.port.symlink_to(self._plugged.enter_context(on_a_terminal(self._line)))
 
     def __enter__(self) -> Feeder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join()
-        self._pull()
+        self.unplug()
 
     def mute(self) -> None:
         """Send nothing more, the cable still in."""
-        self._mute.set()
+        self._mute = True
 
     def unplug(self) -> None:
         """Take the port away."""
-        self._unplug.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        start = time.monotonic()
-        while not self._stop.wait(max(0.0, start + self.sent * STEP_S - time.monotonic())):
-            if self._unplug.is_set():
-                self._pull()
-                return
-            if self._mute.is_set():
-                self._stop.wait(STEP_S)
-                continue
-            with contextlib.suppress(BlockingIOError):  # nobody reads: a sensor's bytes are lost then
-                os.write(self._master, line_of(self.sent))
-            self.sent += 1
-
-    def _pull(self) -> None:
         self.port.unlink(missing_ok=True)
-        for descriptor in (self._slave, self._master):
-            if descriptor >= 0:
-                os.close(descriptor)
-        self._slave = self._master = -1
+        self._plugged.close()
+
+    def _line(self, number: int) -> bytes:
+        self.sent = number
+        return b"" if self._mute else line_of(number)
 
 
 @dataclass

@@ -45,17 +45,15 @@ def record_under_a_limit(log: str) -> None:
 class Faulty:
     """A real file whose writes are cut short or refused, as a seeded plan says."""
 
-    def __init__(self, path: Path, rng: np.random.Generator, refuse_after: int | None) -> None:
+    def __init__(self, path: Path, rng: np.random.Generator, room: int) -> None:
         self._file: LogFile = open_log_file(path)
-        self._rng = rng
-        self._room = refuse_after
+        self._rng, self._room = rng, room
 
     def write(self, data: bytes | memoryview) -> int:
         """Take a part, or none."""
         taken = int(self._rng.integers(1, len(data) + 1)) if self._rng.random() < 0.3 else len(data)
-        if self._room is not None:
-            taken = min(taken, self._room)
-            self._room -= taken
+        taken = min(taken, self._room)
+        self._room -= taken
         if not taken:
             raise OSError(errno.ENOSPC, "No space left on device")
         return self._file.write(data[:taken])
@@ -104,18 +102,6 @@ def test_short_writes_and_a_full_disk_keep_what_was_committed(seed: int, tmp_pat
     final = recorder.status
     assert read_log(log).damage.records == final.records == final.synced_records
     assert len(reads) + final.dropped_records == 500
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_short_writes_alone_lose_nothing(seed: int, tmp_path: Path) -> None:
-    """A disk that takes every third write in parts still takes all of it."""
-    rng = np.random.default_rng(seed)
-    log = tmp_path / "run.wire"
-    with Recorder(log, HEADER, VirtualClock(), open_file=lambda path: Faulty(path, rng, None)) as recorder:
-        for number in range(300):
-            recorder.put(0, number, b"R%04d\r" % number)
-    assert reads_of(log) == [b"R%04d\r" % number for number in range(300)]
-    assert read_log(log).damage.intact
 
 
 def test_a_disk_full_from_the_start_leaves_nothing_behind(tmp_path: Path) -> None:

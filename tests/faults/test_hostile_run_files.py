@@ -37,16 +37,21 @@ def names_of(file: Any, name: str) -> list[str]:
     return [name, *(each for each in file if file[each] == file[name])]
 
 
+def taken(file: Any, name: str) -> list[str]:
+    """Take an array away; return every name that it had."""
+    names = names_of(file, name)
+    for each in names:
+        del file[each]
+    return names
+
+
 def put(name: str, make: Callable[[Any], Any]) -> Harm:
     """Return a function that puts another array in place of one, made of it; its attributes stay."""
 
     def harm(file: Any, _: Path) -> None:
-        values, attributes, names = file[name][()], dict(file[name].attrs), names_of(file, name)
-        for each in names:
-            del file[each]
+        values, attributes, names = file[name][()], dict(file[name].attrs), taken(file, name)
         made = file.create_dataset(name, data=make(values), fletcher32=values.ndim > 0 or None)
-        for key, value in attributes.items():
-            made.attrs[key] = value
+        made.attrs.update(attributes)
         for each in names[1:]:
             file[each] = made
 
@@ -60,8 +65,8 @@ def edited(values: Any) -> Any:
     return values
 
 
-def linked(name: str, link: Callable[[str, Path], Any]) -> Harm:
-    """Return a function that puts a link in place of a name, to the same content."""
+def linked(name: str, *, elsewhere: bool) -> Harm:
+    """Return a function that puts a link in place of a name, to the same content in this file or in another."""
 
     def harm(file: Any, folder: Path) -> None:
         with h5py.File(folder / "elsewhere.h5", "w") as second:
@@ -70,53 +75,35 @@ def linked(name: str, link: Callable[[str, Path], Any]) -> Harm:
         if aside == "aside":
             file[aside] = file[name]
         del file[name]
-        file[name] = link(f"/{aside}", folder / "elsewhere.h5")
+        second = h5py.ExternalLink(str(folder / "elsewhere.h5"), "/x")
+        file[name] = second if elsewhere else h5py.SoftLink(f"/{aside}")
 
     return harm
 
 
-def soft(inside: str, beside: Path) -> Any:
-    """Link within the file."""
-    return h5py.SoftLink(inside)
-
-
-def external(inside: str, beside: Path) -> Any:
-    """Link to another file."""
-    return h5py.ExternalLink(str(beside), "/x")
-
-
 def outside(file: Any, folder: Path) -> None:
     """Have the distances stand in a file next to this one."""
-    values, names = file[DISTANCE][:], names_of(file, DISTANCE)
+    values, names = file[DISTANCE][:], taken(file, DISTANCE)
     (folder / "raw").write_bytes(values.tobytes())
-    for each in names:
-        del file[each]
     file.create_dataset(DISTANCE, values.shape, "<f8", external=[(str(folder / "raw"), 0, h5py.h5f.UNLIMITED)])
     file[names[1]] = file[DISTANCE]
 
 
 def without(name: str) -> Harm:
     """Return a function that takes a name away."""
-
-    def harm(file: Any, _: Path) -> None:
-        for each in names_of(file, name):
-            del file[each]
-
-    return harm
+    return lambda file, _: taken(file, name)
 
 
 def huge(file: Any, _: Path) -> None:
     """Have a small file state more distances than the memory holds."""
-    names = names_of(file, DISTANCE)
-    for each in names:
-        del file[each]
+    names = taken(file, DISTANCE)
     file[names[1]] = file.create_dataset(DISTANCE, (2**40,), "<f8", chunks=(65536,), compression="gzip")
 
 
 HARM: dict[str, Harm] = {
     "a distance": put(DISTANCE, edited),
-    "a soft link to the distances": linked(DISTANCE, soft),
-    "an external link to the distances": linked(DISTANCE, external),
+    "a soft link to the distances": linked(DISTANCE, elsewhere=False),
+    "an external link to the distances": linked(DISTANCE, elsewhere=True),
     "a time": put(TIME, edited),
     "a flag": put(QUALITY, edited),
     "the distances backwards": put(DISTANCE, lambda values: values[::-1].copy()),
@@ -130,10 +117,10 @@ HARM: dict[str, Harm] = {
     "an empty header": put(HEADER, lambda _: np.bytes_(b"")),
     "a header that is no JSON": put(HEADER, lambda _: np.bytes_(b"[" * 100_000)),
     "another title in the header": put(HEADER, lambda text: np.bytes_(bytes(text).replace(b'"title":', b'"titel":'))),
-    "a soft link to the header": linked(HEADER, soft),
-    "an external link to the header": linked(HEADER, external),
+    "a soft link to the header": linked(HEADER, elsewhere=False),
+    "an external link to the header": linked(HEADER, elsewhere=True),
     "distances in another file": outside,
-    "an external link to the signal": linked("/entry/signal", external),
+    "an external link to the signal": linked("/entry/signal", elsewhere=True),
     "more distances than the memory holds": huge,
     "a byte of the original": put(ORIGINALS, edited),
 }

@@ -9,26 +9,22 @@ from __future__ import annotations
 import json
 import os
 import threading
-import tty
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from acquisition.clock import SystemClock, VirtualClock
-from acquisition.live.reader import Line, PortReader
-from acquisition.live.serial_port import SerialPort
-from acquisition.readings import Read
+from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import QUEUE_BYTES, Recorder
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import LogFile, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry
 from storage.wire_log.scanning import read_log
+from tests.faults.conftest import frame_of
 from tests.sampling import sampled
 from tests.wire import json_of
 
@@ -161,63 +157,9 @@ def demand_complete(put: list[tuple[int, bytes]], records: list[Record], channel
     return len(lost)
 
 
-class Kept:
-    """Hands reads to the recorder, and says when so many bytes have come."""
-
-    def __init__(self, recorder: Recorder, size: int) -> None:
-        self._recorder = recorder
-        self._left = size
-        self.all_came = threading.Event()
-
-    def reads(self, reads: Sequence[Read]) -> None:
-        """Take what one wake-up read."""
-        self._recorder.reads(reads)
-        self._left -= sum(len(data) for _, _, data in reads)
-        if self._left <= 0:
-            self.all_came.set()
-
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Take what became of the port."""
-        self._recorder.event(channel, host_ns, kind, facts)
-
-
-def test_the_reading_thread_never_waits_for_the_disk(tmp_path: Path) -> None:
-    """A port whose own buffer holds 4 KiB is read on while the disk hangs: 200 kB that were sent then are all there."""
-    disk = Hanging()
-    sent = b"".join(b"%06d line by line\n" % number for number in range(10_000))
-    device, port = os.openpty()
-    tty.setraw(port)
-    header = LogHeader(sensors=(SensorEntry(0, "text-lines"),), mono_ns=0, unix_ns=0)
-    writer = threading.Thread(target=write_all, args=(device, sent), daemon=True)
-    with Recorder(tmp_path / "run.wire", header, SystemClock(), open_file=disk.open) as recorder:
-        recorded = Kept(recorder, len(sent))
-        reader = PortReader([Line(SerialPort(os.ttyname(port), 9600))], recorded, SystemClock())
-        reader.start()
-        disk.goes.clear()
-        writer.start()
-        writer.join(WAIT_S)
-        assert not writer.is_alive()
-        assert recorded.all_came.wait(WAIT_S)
-        reader.stop()
-        assert disk.hangs.wait(WAIT_S)
-        assert (recorder.status.dropped_records, recorder.status.records) == (0, 1)
-        disk.goes.set()
-    os.close(device)
-    os.close(port)
-    data = [record.payload for record in read_log(tmp_path / "run.wire") if record.kind is Kind.DATA]
-    assert b"".join(data) == sent
-
-
-def write_all(device: int, data: bytes) -> None:
-    """Write everything; it waits where nobody reads."""
-    while data:
-        data = data[os.write(device, data) :]
-
-
 def swinging(number: int) -> bytes:
-    """One frame of an A02YYUW, ten a second, over a bob of 0.9 s."""
-    high, low = divmod(round(400.0 + 50.0 * np.cos(2.0 * np.pi * number / 9.0)), 256)
-    return bytes([0xFF, high, low, (0xFF + high + low) % 256])
+    """One frame, ten a second, over a bob of 0.9 s."""
+    return frame_of(round(400.0 + 50.0 * np.cos(2.0 * np.pi * number / 9.0)))
 
 
 def test_what_did_not_fit_is_a_gap_with_its_time_and_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

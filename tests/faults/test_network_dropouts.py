@@ -23,6 +23,7 @@ from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
+from tests.faults.conftest import frame_of
 from tests.sampling import sampled
 
 TRIALS = 50 if os.environ.get("SPRINGMASS_TRIALS") else 12
@@ -45,9 +46,8 @@ def counted_line(number: int, device_us: int, distance_m: float) -> bytes:
 
 
 def frame(number: int, device_us: int, distance_m: float) -> bytes:
-    """Four bytes of an A02YYUW: header, millimetres, sum."""
-    high, low = divmod(round(distance_m * 1e3), 256)
-    return bytes([0xFF, high, low, (0xFF + high + low) % 256])
+    """A reading of an A02YYUW."""
+    return frame_of(round(distance_m * 1e3))
 
 
 SENSORS: dict[str, tuple[Callable[[int, int, float], bytes], float, dict[str, Any]]] = {

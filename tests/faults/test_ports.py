@@ -9,11 +9,8 @@ import contextlib
 import errno
 import grp
 import os
-import pty
 import socket
 import threading
-import time
-import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,64 +22,22 @@ import serial
 
 from springmass.cli import main
 from storage.run_file.reading import open_run
-from tests.faults.conftest import line_of, numbers_of, whole_numbers_of
+from tests.faults.conftest import RATE_HZ, Send, Sensor, frame_of, line_of, numbers_of, on_a_terminal, whole_numbers_of
 from tests.sampling import sampled
 
-RATE_HZ = 100.0
 WAIT_S = 60.0
 FIRST_MM, DIFFERENT = 300, 1000
 """Binary readings count up from here in millimetres, and begin again after so many."""
 
-Send = Callable[[int], bytes]
-
 
 def ffhls(number: int) -> bytes:
-    """A frame of an A02YYUW: header, millimetres, sum."""
-    high, low = divmod(FIRST_MM + number % DIFFERENT, 256)
-    return bytes([0xFF, high, low, (0xFF + high + low) % 256])
+    """A reading of an A02YYUW."""
+    return frame_of(FIRST_MM + number % DIFFERENT)
 
 
 def us100(number: int) -> bytes:
     """The reply of a US-100: millimetres, without a header or a checksum."""
     return bytes(divmod(FIRST_MM + number % DIFFERENT, 256))
-
-
-class Sensor:
-    """Writes to a descriptor at a fixed rate, or once for each request, until it is stopped."""
-
-    def __init__(self, descriptor: int, send: Send, *, polled: bool) -> None:
-        os.set_blocking(descriptor, False)
-        self._descriptor, self._send, self._polled = descriptor, send, polled
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End the thread."""
-        self._stop.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        start, number = time.monotonic(), 0
-        while not self._stop.wait(0.002 if self._polled else max(0.0, start + number / RATE_HZ - time.monotonic())):
-            with contextlib.suppress(OSError):  # nobody reads: a sensor's bytes are lost then
-                for _ in range(len(os.read(self._descriptor, 100)) if self._polled else 1):
-                    os.write(self._descriptor, self._send(number))
-                    number += 1
-
-
-@contextmanager
-def on_a_terminal(send: Send, *, polled: bool = False) -> Iterator[str]:
-    """Yield the name of a port on which a sensor sends."""
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    sensor = Sensor(master, send, polled=polled)
-    try:
-        yield os.ttyname(slave)
-    finally:
-        sensor.stop()
-        os.close(slave)
-        os.close(master)
 
 
 @contextmanager
@@ -205,11 +160,7 @@ def test_without_permission_the_group_is_named(
     place.touch()
     place.chmod(0o660)
     group = grp.getgrgid(place.stat().st_gid).gr_name
-    groups = [group] if os.geteuid() else [group, "tty"]
-    for name in groups:
-        if os.geteuid() == 0:
-            os.chown(place, -1, grp.getgrnam(name).gr_gid)
-        assert main(["record", "--port", str(place), "--sensor", "ffhls", "-o", str(tmp_path / "run.h5")]) == 4
-        (line,) = capsys.readouterr().err.splitlines()
-        assert name in line
-        assert ("usermod" in line) == (name != "root")
+    assert main(["record", "--port", str(place), "--sensor", "ffhls", "-o", str(tmp_path / "run.h5")]) == 4
+    (line,) = capsys.readouterr().err.splitlines()
+    assert group in line
+    assert ("usermod" in line) == (group != "root")

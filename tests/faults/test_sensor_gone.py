@@ -10,7 +10,6 @@ import re
 import socket
 import subprocess
 import threading
-import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,7 +26,7 @@ from springmass import load, sample_data
 from springmass.cli import main
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
-from tests.faults.conftest import line_of, whole_numbers_of
+from tests.faults.conftest import line_of, on_a_terminal, whole_numbers_of
 from tests.sampling import sampled
 
 RUN_S = 3.0
@@ -76,26 +75,9 @@ def test_strict_rejects_a_run_whose_sensor_was_lost(tmp_path: Path, capsys: pyte
 @contextlib.contextmanager
 def foreign(port: Path) -> Iterator[None]:
     """Put another bench's sensor under a port's name: distances in millimetres, by another form."""
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    os.set_blocking(master, False)
-    port.symlink_to(os.ttyname(slave))
-    stop = threading.Event()
-
-    def speak() -> None:
-        while not stop.wait(0.002):
-            with contextlib.suppress(BlockingIOError):
-                os.write(master, b"R0431\r" * 8)
-
-    thread = threading.Thread(target=speak)
-    thread.start()
-    try:
+    with on_a_terminal(lambda _: b"R0431\r" * 8) as name:
+        port.symlink_to(name)
         yield
-    finally:
-        stop.set()
-        thread.join()
-        os.close(slave)
-        os.close(master)
 
 
 @pytest.mark.trials

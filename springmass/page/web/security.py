@@ -21,7 +21,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from springmass.report.html import script_sha256
 
-LOOK, ACT = "look", "act"
+VIEW, ACT = "view", "act"
 """Rights of a request; the controller has both."""
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 REPORT = "/v2/report"
@@ -37,7 +37,7 @@ HEADERS = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"
 def guarded(app: ASGIApp, access: Access, hosts: Iterable[str] = ()) -> ASGIApp:
     """Return an application with security headers that serves only known browsers, and only under its own names.
 
-    ``auth.scopes`` of its requests contains :data:`LOOK` and, for the controller, :data:`ACT`. ``hosts`` are names
+    ``auth.scopes`` of its requests contains :data:`VIEW` and, for the controller, :data:`ACT`. ``hosts`` are names
     besides those of the loopback.
     """
     known = TrustedHostMiddleware(
@@ -94,8 +94,8 @@ class Access(AuthenticationBackend):
 
     def _rights(self, token: str) -> list[str]:
         if _same(token, self.token):
-            return [LOOK, ACT]
-        return [LOOK] if self._viewers and _same(token, self.viewers_token) else []
+            return [VIEW, ACT]
+        return [VIEW] if self._viewers and _same(token, self.viewers_token) else []
 
 
 def _same(given: str, wanted: str) -> bool:

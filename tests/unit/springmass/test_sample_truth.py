@@ -114,11 +114,5 @@ def test_clipped_run() -> None:
 def test_no_error_and_no_false_alarm(run: Sample) -> None:
     """What the simulation does not hold is not found: no drift, no bend, no misfit."""
     codes = {finding.code for finding in run.result.findings}
-    assert not codes & {
-        "rest_drift",
-        "amplitude_dependent_frequency",
-        "model_misfit",
-        "no_oscillation",
-        "quantised",
-    }
+    assert not codes & {"rest_drift", "amplitude_dependent_frequency", "model_misfit", "no_oscillation", "quantised"}
     assert "error" not in {finding.severity for finding in run.result.findings}

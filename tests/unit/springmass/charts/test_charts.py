@@ -14,10 +14,9 @@ from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Note, Panel, Series, decoded, to_json
-from springmass.charts.drag_map import drag_map
 from springmass.charts.draw import render
 from springmass.charts.run import charts_of
-from springmass.charts.several import comparison, course, overlay
+from springmass.charts.several import comparison, course, drag_map, overlay
 
 DATA = sm.sample_data()
 

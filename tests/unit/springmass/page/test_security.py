@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from springmass.page.web.security import ACT, LOOK, Access, guarded
+from springmass.page.web.security import ACT, VIEW, Access, guarded
 from springmass.report.html import script_sha256
 
 HOST = "127.0.0.1:8000"
@@ -76,7 +76,7 @@ def test_the_token_gives_the_cookie_and_leaves_the_address(page: Page, known: st
         assert page.ask(query=f"token={token}", host=HOST)[0] == 403
     assert page.ask(query=f"token={page.access.token}", host=HOST, cookie=known)[0] == 303
     status, headers = page.ask(host=HOST, cookie=known)
-    assert (status, page.served) == (200, [[LOOK, ACT]])
+    assert (status, page.served) == (200, [[VIEW, ACT]])
     assert headers["content-security-policy"].startswith("default-src 'self'")
     assert (headers["x-content-type-options"], headers["cache-control"]) == ("nosniff", "no-store")
 
@@ -102,7 +102,7 @@ def test_viewers_look_and_do_not_act() -> None:
     for _ in range(2):
         cookie = shared.cookie_for(shared.access.viewers_token, "192.168.1.5:8000")
         assert shared.ask(host="192.168.1.5:8000", cookie=cookie)[0] == 200
-    assert shared.served == [[LOOK], [LOOK]]
+    assert shared.served == [[VIEW], [VIEW]]
     alone = Page()
     assert alone.ask(query=f"token={alone.access.viewers_token}", host=HOST)[0] == 403
 
