@@ -17,10 +17,12 @@ import numpy as np
 from cyclopts import Parameter
 
 from acquisition.clock import SystemClock
+from acquisition.decoders.family import Family
 from acquisition.decoders.registry import get_family
 from acquisition.errors import CalibrationError
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
 from acquisition.live.serial_port import SerialPort
+from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
@@ -362,45 +364,34 @@ class _Bench:
 @contextlib.contextmanager
 def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> Iterator[list[Sensor]]:
     """Open the source of the recording: the named ports, or a simulated bench on a simulated port."""
-    family_options = dict(options.option)
-    names = options.sensor or ((SIMULATED_FAMILY,) if options.simulate else ())
-    for name in names:
-        get_family(name).demand_options(family_options)
+    given, names = dict(options.option), options.sensor or ((SIMULATED_FAMILY,) if options.simulate else ())
+    families = [get_family(name) for name in names]
+    for family in families:
+        family.demand_options(given)
     calibration = _calibration(options, scene)
-    if options.simulate:
-        assert scene is not None
-        with _simulated(options, names[0], scene, family_options, calibration, release) as sensor:
-            yield [sensor]
-        return
-    if len(names) not in (1, len(options.port)):
-        raise ProgramError("--sensor must be named once for all ports, or once for each in their order")
-    families = [get_family(name) for name in (names * len(options.port) if len(names) == 1 else names)]
-    sensors: list[Sensor] = []
-    try:
-        for address, family in zip(options.port, families, strict=True):
+    with contextlib.ExitStack() as opened:
+        virtual = opened.enter_context(_virtual(options, families[0], scene, release)) if options.simulate else None
+        addresses = options.port if virtual is None else (virtual.path,)
+        if len(families) not in (1, len(addresses)):
+            raise ProgramError("--sensor must be named once for all ports, or once for each in their order")
+        sensors = []
+        for address, family in zip(addresses, families * (len(addresses) // len(families)), strict=True):
             baud = options.baud or family.baud
             port = SerialPort(address, baud)
-            sensors.append(Sensor(family, port, options.rate_hz, family_options, calibration, baud, options.clock_ppm))
+            sensor = Sensor(family, port, options.rate_hz, given, calibration, baud, options.clock_ppm)
+            opened.callback(lambda each: each.port.close(), sensor)
+            sensors.append(sensor)
+        if virtual is not None:
+            virtual.start()
+            release.begin()
         yield sensors
-    finally:
-        for sensor in sensors:
-            sensor.port.close()
 
 
-@contextlib.contextmanager
-def _simulated(
-    options: RecordOptions,
-    name: str,
-    scene: Scene,
-    family_options: dict[str, Any],
-    calibration: Calibration,
-    release: Release,
-) -> Iterator[Sensor]:
+def _virtual(options: RecordOptions, family: Family, scene: Scene | None, release: Release) -> VirtualPort:
+    """Return a simulated port, on which a sensor of the family sends what it sees of the bench."""
+    assert scene is not None
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port")
-    from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
-
-    family = get_family(name)
     if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
         raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that")
@@ -412,14 +403,7 @@ def _simulated(
     finder = VirtualRangefinder(position, model, np.random.default_rng(options.seed))
     # The simulated sensor must keep sending while the session listens, waits and closes.
     seconds += (options.still or 0.0) + 60.0
-    with VirtualPort(family, finder, SystemClock(), seconds=seconds, options=family_options) as virtual:
-        port = SerialPort(virtual.path, family.baud)
-        virtual.start()
-        release.begin()
-        try:
-            yield Sensor(family, port, options.rate_hz, family_options, calibration, family.baud, options.clock_ppm)
-        finally:
-            port.close()
+    return VirtualPort(family, finder, SystemClock(), seconds=seconds, options=dict(options.option))
 
 
 def _calibration(options: RecordOptions, scene: Scene | None) -> Calibration:
