@@ -19,8 +19,7 @@ from cyclopts import Parameter
 from acquisition.clock import SystemClock
 from acquisition.decoders.family import Family
 from acquisition.decoders.registry import get_family
-from acquisition.errors import CalibrationError
-from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
+from acquisition.live.calibration import Calibration, StillPoint
 from acquisition.live.serial_port import SerialPort
 from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from pipeline.bench.air import speed_of_sound
@@ -30,7 +29,16 @@ from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
-from springmass.parameters import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
+from springmass.parameters import (
+    PartsPerMillion,
+    Positive,
+    ReadingsPerSecond,
+    SpeedOfSound,
+    Whole,
+    flag,
+    option,
+    output,
+)
 from springmass.runs.outputs import made_now
 from springmass.runs.questions import option_words
 from springmass.runs.scenes import ask_about, read_scene
@@ -95,7 +103,7 @@ class RecordOptions:
     ruler: Annotated[
         tuple[Positive, ...], option("M", "ruler distance of the bob at rest, m; may be repeated; needs --still")
     ] = ()
-    speed_of_sound: Annotated[Positive | None, option("C", "speed of sound for echo times, m/s")] = None
+    speed_of_sound: Annotated[SpeedOfSound | None, option("C", "speed of sound for echo times, m/s")] = None
     clock_ppm: Annotated[
         PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
     ] = None
@@ -408,13 +416,7 @@ def _virtual(options: RecordOptions, family: Family, scene: Scene | None, releas
 
 def _calibration(options: RecordOptions, scene: Scene | None) -> Calibration:
     """Speed of sound by option, else from the scene's air, else the usual 344 m/s."""
-    if options.speed_of_sound is not None:
-        speed = options.speed_of_sound
-    elif scene is not None and scene.air_temperature_c is not None:
+    speed = options.speed_of_sound
+    if speed is None and scene is not None and scene.air_temperature_c is not None:
         speed = speed_of_sound(*(each.value for each in scene_air(scene)))
-    else:
-        speed = SPEED_OF_SOUND_M_PER_S
-    try:
-        return Calibration(speed_of_sound_m_per_s=speed)
-    except CalibrationError as error:
-        raise ProgramError(str(error)) from error
+    return Calibration() if speed is None else Calibration(speed_of_sound_m_per_s=speed)
