@@ -29,8 +29,8 @@ import sys
 import numpy as np
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
-from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
-from acquisition.simulated.pseudo_terminal import VirtualPort
+from acquisition.simulated import VirtualRangefinder, VirtualSensor
+from acquisition.simulated import VirtualPort
 
 finder = VirtualRangefinder(lambda t: 0.25 + 0.05 * np.cos(8 * t), VirtualSensor(), np.random.default_rng(5))
 with VirtualPort(get_family("line-protocol"), finder, SystemClock(), seconds=3600.0) as port:

@@ -14,9 +14,9 @@ from pipeline.motion.overdamped import Overdamped
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.threads import one_thread
 from pipeline.options import Options
+from pipeline.results.curves import Smoothed, kinematics
 from pipeline.results.derive import Derived
 from pipeline.results.effects import Effect
-from pipeline.results.kinematics import Smoothed, kinematics
 from pipeline.samples.condition import Conditioned
 from pipeline.track import U8, Track
 from pipeline.windows.cycles import Cycles

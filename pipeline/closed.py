@@ -64,10 +64,7 @@ def _ended(
 ) -> Analysis:
     track = samples.track
     findings = worded(
-        track.unit,
-        first,
-        sample_findings(samples, samples.flags, samples.noise_m),
-        clock_findings(track),
+        track.unit, first, sample_findings(samples, samples.flags, samples.noise_m), clock_findings(track)
     )
     return Analysis(track, scene, options, samples, motion, (), findings, estimates)
 

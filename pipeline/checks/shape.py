@@ -14,7 +14,7 @@ from pipeline.track import F8
 
 # Highest order of the harmonics that are sought; each further one adds IMPROBABLE to the probability of a false alarm.
 HIGHEST = 8
-BINS = HIGHEST**2  # phase bins per period: the highest harmonic keeps sin(x)/x = 0.97 of its amplitude, x = pi/8
+BINS = HIGHEST * HIGHEST  # phase bins per period: the highest harmonic keeps sin(x)/x = 0.97 of its amplitude, x = pi/8
 # Minimum share of harmonics in the amplitude for a warning; the uncertainties include smaller ones. Those of a scale
 # bent by 1 % reach it, as measured by `python -m tests.trials.troubles --only bent`.
 REPORTED = 0.002

@@ -58,8 +58,8 @@ class LawFit:
     def drag_term(self, name: str) -> float | None:
         """Return a coefficient of friction ("mu"), linear ("gamma") or quadratic ("beta") drag.
 
-        Return None if the law lacks the term. Return None also if the law is no sum of these terms, because its
-        parameter of the same name is another quantity.
+        None if the law lacks the term, or is no sum of such terms, so that its parameter of this name is another
+        quantity.
         """
         return self.joint[name].value if isinstance(self.law, Drag) and name in self.joint.names else None
 
@@ -116,12 +116,10 @@ def _relative_rate(law: Law, theta: F8) -> float:
 def mean_squared_rate(fit: LawFit, amplitude: F8, weights: F8 | None = None) -> float:
     """Return the mean decrease of the squared angular frequency by drag, 1/s^2, over amplitudes (n,).
 
-    The default weights are the squared amplitudes, as in the fit of a straight line to the phases of windows.
-
-    The decrease is calculated as :math:`r r'/A`, where :math:`r(A)` is :math:`-\\dot A` without dry friction. It is
-    :math:`\\gamma^2` for linear drag. Friction does not change the frequency, with linear drag or without: it moves the
-    rest position of a half-cycle but does not change its duration. Both statements are exact. For quadratic drag the
-    exact decrease is 1.85 :math:`(r/A)^2` instead of 2.
+    The default weights are the squared amplitudes, as in the fit of a straight line to the phases of windows. The
+    decrease is :math:`r r'/A`, where :math:`r(A)` is :math:`-\\dot A` without dry friction: :math:`\\gamma^2` for
+    linear drag. Friction moves the rest position of a half-cycle but does not change its duration. Both statements are
+    exact. For quadratic drag the exact decrease is 1.85 :math:`(r/A)^2` instead of 2.
     """
     moving = amplitude != 0.0
     amplitude, weights = amplitude[moving], (amplitude**2 if weights is None else weights)[moving]
@@ -172,10 +170,7 @@ def least_chi2(fits: Mapping[str, Fit], laws: Mapping[str, Law] = LAWS) -> dict[
 
 
 def weigh(law: Law, fit: Fit, least_chi2: float, points: int, correlation: float, unit: str) -> LawFit:
-    """Test the fit of one law against a number of points, of which ``correlation`` count as one.
-
-    ``least_chi2`` is the law's value from :func:`least_chi2`, for the BIC.
-    """
+    """Test the fit of a law against points, of which ``correlation`` count as one; ``least_chi2`` is for the BIC."""
     count = len(law.parameters)
     covariance = correlation * fit.covariance
     free = points - count
@@ -191,15 +186,11 @@ def weigh(law: Law, fit: Fit, least_chi2: float, points: int, correlation: float
 
 
 def choose(fits: Mapping[str, LawFit], evidence: float, span: Callable[[str], F8]) -> tuple[str, tuple[str, ...]]:
-    """Return the selected law, and the admissible laws from best to worst.
+    """Return the selected law, and the admissible laws from best to worst; if all are rejected, the nearest and none.
 
-    If all laws are rejected, the law that fits best is selected and no law is admissible.
-
-    A law that contains the selected one as a special case is left out of the admissible laws on two conditions. Its
-    further coefficient improves nothing: its BIC is higher by more than 2. Its damping, with twice its uncertainty, is
-    within a tenth of the simpler law's at both ends of the span. The lower end of the span is at most a third of the
-    largest amplitude, even if the record ends earlier. The law stays if the record cannot exclude a difference of a
-    tenth.
+    A law that contains the selected one as a special case is not admissible if its BIC is higher by more than 2, and
+    its damping, with twice its uncertainty, is within a tenth of the simpler law's at both ends of the span. The lower
+    end is at most a third of the largest amplitude, even if the record ends earlier.
     """
     allowed = [name for name in fits if not fits[name].rejected]
     count = {name: len(fit.law.parameters) for name, fit in fits.items()}

@@ -27,9 +27,8 @@ LOOSEST_POWER = 3.0  # maximum standard uncertainty of a free power that is stat
 class Damping:
     """The damping laws fitted to a record, and which of them it admits.
 
-    The selected law is the admissible law with the lowest BIC, or the law that fits best if all are rejected
-    (:func:`choose`). If the BIC differs by less than 2 ("not worth more than a bare mention"), it is the law with fewer
-    parameters, then the law listed first. A stated law is always selected if it could be fitted.
+    The selected law is the admissible one with the lowest BIC, or the law that fits best if all are rejected. Among
+    differences of BIC below 2 it is the law with fewest parameters. A stated law is always selected if it has a fit.
     """
 
     t0: float  # time at which the analysed part starts, s; laws count time from here
@@ -74,10 +73,7 @@ class Damping:
         return next(fits, None)
 
     def squared_rate(self, t: F8) -> float:
-        """Return the mean decrease of the squared angular frequency by drag, 1/s^2, at times t (n,) in s.
-
-        See :func:`pipeline.damping.law_fit.mean_squared_rate`.
-        """
+        """Return :func:`pipeline.damping.law_fit.mean_squared_rate` of the selected law at times t (n,) in s."""
         return mean_squared_rate(self.best, self.best.amplitude(t - self.t0))
 
 
@@ -118,10 +114,7 @@ def fit_laws(
 
 
 def select_law(fits: Mapping[str, LawFit], known: str, last_s: float) -> tuple[str, tuple[str, ...]]:
-    """Return the selected law and the admissible laws, for a record of ``last_s`` seconds.
-
-    A stated law is selected if it has a fit. It is then the only admissible law, or no law is if the record rejects it.
-    """
+    """Return the selected and the admissible laws, for a record of ``last_s`` seconds; a stated one stands alone."""
     if known in fits:
         return known, () if fits[known].rejected else (known,)
     ends = np.array([0.0, last_s])

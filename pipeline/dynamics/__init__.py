@@ -11,11 +11,10 @@ from failure.extensions import entry_points_of, load_named
 from pipeline.dynamics.equation import Equation as Equation
 from pipeline.dynamics.equation import Problem as Problem
 from pipeline.dynamics.equation import effective_mass_kg as effective_mass_kg
-from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import Integrator as Integrator
 from pipeline.dynamics.integrator import Trajectory as Trajectory
 from pipeline.dynamics.methods import DOP853, FORWARD_EULER, RK4, SYMPLECTIC_EULER, VERLET, YOSHIDA4
-from pipeline.dynamics.strang import STRANG
+from pipeline.dynamics.strang import EXACT, STRANG
 from pipeline.errors import DynamicsError
 
 _EACH = (FORWARD_EULER, SYMPLECTIC_EULER, VERLET, YOSHIDA4, RK4, EXACT, STRANG, DOP853)

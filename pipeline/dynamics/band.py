@@ -76,11 +76,7 @@ class Band:
 
 
 def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
-    """Return the quantities of a scene that are uncertain and affect the motion of its bob.
-
-    The scene's quantities are independent. A joint estimate of some of its attributes replaces the scene's own values
-    and uncertainties.
-    """
+    """Return the uncertain quantities of a scene that affect its motion; a joint estimate replaces the scene's own."""
     together = measured or Joint((), np.empty(0), np.empty((0, 0)), ())
     alone: dict[str, Estimate] = {}
     for name in (field.name for field in fields(scene)):
@@ -102,11 +98,9 @@ def uncertain(scene: Scene, measured: Joint | None = None) -> Joint:
 def draw(scene: Scene, measured: Joint | None = None, *, members: int = MEMBERS, seed: int = 0) -> list[Problem]:
     """Return an ensemble of problems: first that of the scene's values, then members drawn from its uncertainties.
 
-    The quantities are normally distributed and drawn on a Latin hypercube [1]_: the range of each is divided into as
-    many intervals of equal probability as there are members, and each interval is drawn once. Quantiles then scatter
-    less than with independent draws. Negative draws of a quantity that cannot be negative are set to 0.
-
-    .. [1] M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239, doi:10.1080/00401706.1979.10489755.
+    The quantities are normally distributed and drawn on a Latin hypercube (M. D. McKay, R. J. Beckman, W. J. Conover,
+    Technometrics 21 (1979) 239): each of as many intervals of equal probability as there are members is drawn once, so
+    that quantiles scatter less. Negative draws of a quantity that cannot be negative are set to 0.
     """
     from scipy.special import ndtri
 

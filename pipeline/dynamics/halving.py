@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.dynamics.equation import Problem
-from pipeline.dynamics.flow import EXACT
 from pipeline.dynamics.integrator import MOST_STEPS, Integrator, Trajectory, demand_times
 from pipeline.dynamics.methods import LEAST_RTOL, SolveIvp
-from pipeline.dynamics.strang import STRANG
+from pipeline.dynamics.strang import EXACT, STRANG
 from pipeline.errors import DynamicsError
 
 LONGEST_STEP = 0.5  # maximum first step in rad; with fewer than six steps per cycle halving cannot estimate the error
@@ -124,8 +123,7 @@ def solved_once(
 ) -> Solution:
     """Solve a motion with the spacing as the step, and estimate the error from a second run with half this step.
 
-    With an error of :math:`c h^p` the error of the run with the longer step h is :math:`2^p / (2^p - 1)` times the
-    difference.
+    With an error of :math:`c h^p`, that of the longer step is :math:`2^p / (2^p - 1)` times the difference.
     """
     started = timer()
     run = integrator.run(problem, spacing_s, count)

@@ -85,9 +85,6 @@ def clock_findings(track: Track) -> Iterator[Found]:
         yield Found("late_readings", {"readings": track.held_samples, "longest_stall_s": track.longest_stall_s})
 
 
-SHOWN = 5  # maximum number of times listed in one text
-
-
 def part_findings(segments: Segments | None, first_s: float, last_s: float) -> Iterator[Found]:
     """Yield which parts of a recording from ``first_s`` to ``last_s`` were left out, and why."""
     if segments is None:
@@ -134,5 +131,4 @@ def _seconds(spans: Sequence[Span]) -> float:
 
 
 def _listed(spans: Sequence[Span]) -> str:
-    more = f" and {len(spans) - SHOWN} more" if len(spans) > SHOWN else ""
-    return ", ".join(f"{span.first_s:.2f} to {span.last_s:.2f} s" for span in spans[:SHOWN]) + more
+    return ", ".join(f"{span.first_s:.2f} to {span.last_s:.2f} s" for span in spans)

@@ -335,11 +335,7 @@ def lag_of(fit: LawFit, t0: float, windows: Demodulated) -> Table | None:
 
 
 def area_of(law: Law, theta: F8, t0: float, middle: float, last: float) -> Table:
-    """Return the integral of A^2 from the middle, from t0 to the last time.
-
-    The trapezoidal rule and linear interpolation between its points have a relative error below 1e-5 if A^2 decays
-    by a factor of e^10 within the table.
-    """
+    """Return the integral of A^2 from the middle, from t0 to the last time."""
     from scipy.integrate import cumulative_trapezoid
 
     grid = np.linspace(t0, max(last, t0 + 1e-9), POINTS)

@@ -48,7 +48,10 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
     rows = _rows(fitted, samples, level)
     # The lag is that of the windows' law; a law that is tried in its place has its own, which is constant.
     lags = {name: None if few and name in ("none", "linear") else phase.lag for name in laws}
-    model = replace(_model(fitted, rows, laws[first]), lag=lags[first])
+    free = fitted.disturbances.conditioned
+    last, reach = float(np.max(free.track.t[free.used])), float(np.max(np.abs(rows.t - phase.middle)))
+    degree = min(DEGREE, windows.t.size // 4 - 1) if fitted.rest.drifts else 0
+    model = Averaged(laws[first], phase.t0, last, phase.middle, reach, degree, phase.area, lags[first])
     rest = np.zeros(model.degree + 1)
     if model.degree:
         rest = np.asarray(np.linalg.lstsq(model.rest(windows.t), fitted.rest.curve - level, rcond=None)[0])
@@ -73,7 +76,6 @@ def fit_samples(fitted: Fitted, samples: Conditioned) -> Fitted:
             fits[name] = _described(other, own, rows, count, stated)
     damping = _selected(damping, fits) if few else _refined(damping, fits)
     best = fits[damping.selected]
-    free = fitted.disturbances.conditioned
     flags = rows.marked(free.flags, free.used, rows.y - rows.left(best.model, best.fit.values))
     return assembled(
         replace(windows, flags=flags),
@@ -95,8 +97,7 @@ def _considered(damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
 def _short(windows: Demodulated, damping: Damping) -> tuple[dict[str, Law], dict[str, F8]]:
     """Return linear drag and no damping, which are all that a record of few periods can distinguish.
 
-    A built-in law that is stated is fitted as well, although the windows did not determine it, and the laws that fit
-    the windows if linear drag contradicts these.
+    A stated built-in law is fitted as well, and the laws that fit the windows if linear drag contradicts these.
     """
     amplitude, rate, t = float(windows.amplitude[0]), float(windows.decay[0]), windows.t - damping.t0
     start = amplitude * math.exp(rate * float(t[0]))
@@ -133,21 +134,6 @@ def _rows(fitted: Fitted, samples: Conditioned, level: float) -> Rows:
     return Rows(t, y, candidates, used, 1.0, columns if columns.size else None, near_plateau)
 
 
-def _model(fitted: Fitted, rows: Rows, law: Law) -> Averaged:
-    phase, free = fitted.phase, fitted.disturbances.conditioned
-    degree = min(DEGREE, fitted.demodulated.t.size // 4 - 1) if fitted.rest.drifts else 0
-    return Averaged(
-        law,
-        phase.t0,
-        float(np.max(free.track.t[free.used])),
-        phase.middle,
-        float(np.max(np.abs(rows.t - phase.middle))),
-        degree,
-        phase.area,
-        None,
-    )
-
-
 def _described(model: Averaged, found: Fit, rows: Rows, windows: int, stated: float | None) -> _OfLaw:
     """Return a fit with its covariance; a noise may be stated for its samples."""
     count = found.values.size + (0 if rows.columns is None else rows.columns.shape[1])
@@ -167,10 +153,7 @@ def _refined(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
 
 
 def _selected(damping: Damping, fits: Mapping[str, _OfLaw]) -> Damping:
-    """Select no damping or linear drag by BIC; the noise is unknown, so it uses the logarithm of the residuals.
-
-    A stated law is selected if it was fitted.
-    """
+    """Select a law by BIC from the logarithm of the residuals, as the noise is unknown, or the stated law."""
     found = {}
     for name in sorted(fits, key=lambda name: len(LAWS[name].parameters)):
         one, law = fits[name], LAWS[name]

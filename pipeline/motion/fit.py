@@ -109,19 +109,13 @@ def fit(model: Model, rows: Rows, start: F8) -> Fit:
 
 
 def clipped(
-    model: Model,
-    rows: Rows,
-    start: F8,
-    *,
-    least_m: float,
-    noise_m: float = math.inf,
-    rounds: int = ROUNDS,
+    model: Model, rows: Rows, start: F8, *, least_m: float, noise_m: float = math.inf, rounds: int = ROUNDS
 ) -> tuple[Fit, Rows]:
-    """Fit until the set of false echoes is stable; return the fit and its rows.
+    """Fit until the set of false echoes is stable; return the last fit and its rows.
 
     Residuals below ``least_m`` times :data:`CLIP_SIGMAS` are never false echoes. If the residuals contain more than
-    noise, no more samples are excluded and none returns. The fit is the last one also if it has not converged; it has
-    not if hardly any sample lies on the model.
+    noise, no more samples are excluded and none returns. The fit has not converged if hardly any sample lies on the
+    model.
     """
     for left_rounds in range(rounds, 0, -1):
         found = fit(model, rows, start)

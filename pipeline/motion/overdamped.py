@@ -161,8 +161,7 @@ def critical_decay(rows: Rows, near: Decay) -> Decay | None:
 def lone_exponential(rows: Rows, rate: float) -> tuple[float, float]:
     """Fit :math:`o + p e^{-rt}` from a start value of the rate (in 1/s), and return r and chi-square.
 
-    If the record shows no such rate the search diverges. The rate returned is therefore limited to a factor of e to
-    the power :data:`FAR` above or below the start value.
+    If the record shows no such rate the search diverges; r is limited to a factor of :data:`FAR`.
     """
     start = math.log(rate)
     end = LONE.fit(rows, np.array([start]))
@@ -208,10 +207,7 @@ LEAST_DAMPING = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Overdamped:
-    """A motion that damping ends within a few cycles or before the first one.
-
-    It relaxes with two rates or with one, or it is an oscillation whose damping ratio is large.
-    """
+    """A motion that relaxes with two rates or with one, or an oscillation whose damping ratio is large."""
 
     why: str  # one sentence that states the rates or the damping ratio
     kind: Kind
@@ -304,10 +300,7 @@ def _beats_other_shapes(rows: Rows, found: Decay) -> bool:
 
 
 def _other_shapes(t: F8, y: F8) -> Iterator[tuple[float, int]]:
-    """Fit polynomials up to degree three, the best step and a grid of ramps.
-
-    Yield the residual sum of squares and the number of parameters of each shape.
-    """
+    """Yield squared residuals and number of parameters of polynomials up to degree three, the best step, and ramps."""
     x = 2.0 * t / t[-1] - 1.0
     for degree in range(4):
         yield _left(np.polynomial.legendre.legvander(x, degree), y), degree + 1
@@ -332,8 +325,7 @@ def _left(design: F8, y: F8) -> float:
 def _kind(rows: Rows, fit: Decay, fastest: float, unit: str) -> tuple[Kind, Decay] | NoOscillation | None:
     """Return the kind of damping with the lowest BIC and its fit, unless a single exponential suffices.
 
-    Return None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, where a
-    relaxation cannot be distinguished from a step.
+    None if the motion ends at a rate above ``fastest`` (in 1/s), that is between two samples, like a step.
     """
     price = math.log(rows.t.size)
     rate, left = lone_exponential(rows, fit.slowest)
@@ -397,11 +389,7 @@ def _estimate(quantity: Any, unit: str) -> Estimate:
 
 
 def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
-    """Return the spring constant (in N/m) by name; empty if the scene gives no bob mass.
-
-    :math:`k = \\omega_0^2 M` with the undamped frequency and the oscillating mass M: the bob, the air that a disc
-    carries along, and the spring's share (:func:`pipeline.bench.spring.oscillating_mass_kg`).
-    """
+    """Return :math:`k = \\omega_0^2 M` in N/m by name, M being the oscillating mass; empty without a bob's mass."""
     if scene.bob_mass_kg is None:
         return {}
     spring = scene.spring_mass_kg or unstated_spring_kg(scene)

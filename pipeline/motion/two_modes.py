@@ -28,11 +28,7 @@ MOST = 100_000  # maximum number of median spacings; longer records are not fitt
 
 @dataclass(frozen=True, slots=True)
 class TwoModes:
-    """Two simultaneous oscillations.
-
-    The estimates are ``first_mode_period`` and ``first_mode_amplitude`` (at the first sample), and likewise for the
-    second mode. The first mode is the stronger one.
-    """
+    """The period and the amplitude, at the first sample, of the stronger ("first") and of the other mode."""
 
     why: str  # one sentence that states the periods and amplitudes of both modes
     estimates: dict[str, Estimate]
@@ -57,10 +53,9 @@ class Modes:
 def find_two_modes(conditioned: Conditioned) -> TwoModes | None:
     """Return the two modes that a record consists of; None if two modes do not describe it.
 
-    :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted by least squares to all samples
-    used. It starts from the strongest line of the spectrum and from the strongest line of the residual of the first.
-    Covariances are scaled by the residuals, including their correlation. Records above the limits in length or mean
-    spacing are not searched.
+    :math:`o + \\sum_i e^{-g_i t}(a_i\\cos\\omega_i t + b_i\\sin\\omega_i t)` is fitted to all samples used, started
+    from the strongest line of the spectrum and the strongest line of the residual of the first. Covariances are scaled
+    by the residuals, including their correlation.
     """
     used = conditioned.used & np.isfinite(conditioned.track.t)
     t, y, unit = conditioned.track.t[used], conditioned.track.y[used], conditioned.track.unit

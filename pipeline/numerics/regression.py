@@ -71,10 +71,7 @@ def decompose(matrix: F8, least: float = 1e-13) -> tuple[F8, F8, bool]:
 
 
 def covariance_of(jacobian: F8) -> F8:
-    """Return :math:`(J^T J)^{-1}`, the covariance of a least-squares solution.
-
-    Infinite where the points do not determine every parameter; a pseudo-inverse would be finite there.
-    """
+    """Return the covariance :math:`(J^T J)^{-1}` of a least-squares solution; infinite if one is undetermined."""
     unknown = np.full((jacobian.shape[1],) * 2, np.inf)
     if not np.all(np.isfinite(np.linalg.norm(jacobian, axis=0))):
         return unknown

@@ -201,10 +201,7 @@ def spectral_density(blocks: Blocks, y: F8, frequency_hz: float, band: Band, smo
 
 
 def smooth_density(y: F8, turns: float) -> float:
-    """Return the spectral density, at a frequency in cycles per step, of an autoregression fitted to y (n,).
-
-    Its mean over all frequencies is the variance, so the density of white noise equals its variance everywhere.
-    """
+    """Return the spectral density, at a frequency in cycles per step, of an autoregression fitted to y (n,)."""
     return float(_density(*_autoregression(y, AR_ORDER), np.asarray(turns)))
 
 

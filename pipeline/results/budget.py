@@ -48,19 +48,13 @@ class Budget:
 
     @property
     def dof(self) -> float:
-        """Effective degrees of freedom: :math:`\\nu = u^4 / \\sum_i u_i^4/\\nu_i` (Welch-Satterthwaite).
-
-        The formula is from JCGM 100:2008, G.4.1.
-        """
+        """Effective degrees of freedom, :math:`\\nu = u^4 / \\sum_i u_i^4/\\nu_i` (JCGM 100:2008, G.4.1)."""
         below = sum(c.share**2 / c.dof for c in self.contributions)
         return 1.0 / below if below > 0.0 else math.inf
 
     @property
     def coverage_factor(self) -> float:
-        """Coverage factor k on u: quantile of Student's t for :attr:`dof` and :data:`COVERAGE`; 2.00 if infinite.
-
-        It is calculated as in EA-4/02 M:2022, appendix E.
-        """
+        """Coverage factor k on u: quantile of Student's t for :attr:`dof` (EA-4/02 M:2022, appendix E)."""
         from scipy.special import ndtri, stdtrit
 
         tail, dof = 0.5 * (1.0 + COVERAGE), self.dof

@@ -70,28 +70,29 @@ def classic(track: Track, scene: Scene | None = None) -> Classic:
     t, y = track.t[there], track.y[there]
     if t.size < 2:
         raise AnalysisError(f"the classic method needs distances, got {t.size} of {len(track)} samples; record longer")
-    estimates: dict[str, Estimate] = {}
     crests = _crests(t, y)
     period = Estimate(float(t[crests[-1]] - t[crests[0]]) / CYCLES, READING_S / CYCLES, "s")
-    estimates["period"] = period
-    frequency = Estimate(1.0 / period.value, period.u / period.value**2, "Hz")
-    estimates["frequency"] = frequency
-    omega = Estimate(2 * math.pi * frequency.value, 2 * math.pi * frequency.u, "rad/s")
-    estimates["angular_frequency"] = omega
-    amplitude = 0.5 * float(np.ptp(y))
-    estimates["amplitude"] = Estimate(amplitude, STATED_ERROR_M / math.sqrt(2.0), "m")
     window_t, window_amplitude = sliding_amplitude(t, y, WINDOW_S)
-    gamma, u_gamma = _exponential(window_t - window_t[0], window_amplitude)
-    estimates["damping_rate"] = Estimate(gamma, u_gamma, "1/s")
-    fitted = window_amplitude[0] * np.exp(-gamma * (window_t - window_t[0]))
-    chi2 = float(np.sum(((window_amplitude - fitted) / STATED_ERROR_M) ** 2))
+    since = window_t - window_t[0]
+    gamma, u_gamma = _exponential(since, window_amplitude)
+    estimates = {
+        "period": period,
+        "frequency": Estimate.of_variable(1.0 / period, "Hz"),
+        "angular_frequency": Estimate.of_variable(2.0 * math.pi / period, "rad/s"),
+        "amplitude": Estimate(0.5 * float(np.ptp(y)), STATED_ERROR_M / math.sqrt(2.0), "m"),
+        "damping_rate": Estimate(gamma, u_gamma, "1/s"),
+    }
+    chi2 = float(np.sum(((window_amplitude - window_amplitude[0] * np.exp(-gamma * since)) / STATED_ERROR_M) ** 2))
     if scene.bob_mass_kg is not None:
-        mass = scene.bob_mass_kg
-        k = omega.value**2 * mass.value
-        relative = math.hypot(2 * omega.u / omega.value, mass.u / mass.value)
-        estimates["spring_constant"] = Estimate(k, k * relative, "N/m")
+        constant = scene.bob_mass_kg * (2.0 * math.pi / period) ** 2
+        estimates["spring_constant"] = Estimate.of_variable(constant, "N/m")
     if track.velocity is not None and np.isfinite(track.velocity).any():
-        _add_velocity(estimates, track.velocity[np.isfinite(track.velocity)], scene)
+        velocity = track.velocity[np.isfinite(track.velocity)]
+        rms = math.sqrt(float(np.mean(velocity**2)))
+        # Eq. 25 as evaluated: its "deviation" of v^2, 0.03266 m^2/s^2, is the mean, and it divides by N, not sqrt(N).
+        estimates["velocity_rms"] = speed = Estimate(rms, rms / (2.0 * velocity.size), "m/s")
+        if scene.disc_diameter_m is not None:  # eq. 26, with the report's constants
+            estimates["reynolds_number"] = Estimate.of_variable(1.204 / 1.825e-5 * (scene.disc_diameter_m * speed), "")
     lowest, highest = int(np.argmin(y)), int(np.argmax(y))
     extremes = (float(t[lowest]), float(y[lowest])), (float(t[highest]), float(y[highest]))
     return Classic(estimates, window_t, window_amplitude, t[crests], y[crests], extremes, chi2)
@@ -143,24 +144,7 @@ def _exponential(t: F8, amplitude: F8) -> tuple[float, float]:
     def residuals(theta: F8) -> F8:
         return np.asarray(start * np.exp(-theta[0] * t) - amplitude)
 
-    def jacobian(theta: F8) -> F8:
-        return np.asarray(-start * t * np.exp(-theta[0] * t))[:, None]
-
-    fit = minimise(residuals, [0.0], jacobian, precision=1e-9)
+    fit = minimise(residuals, [0.0], precision=1e-9)
     if not fit.converged:
         return float(fit.values[0]), math.inf
     return float(fit.values[0]), math.sqrt(fit.cost / max(t.size - 1, 1) * float(fit.covariance[0, 0]))
-
-
-def _add_velocity(estimates: dict[str, Estimate], velocity: F8, scene: Scene) -> None:
-    """Add the rms of the recorded velocity and the Reynolds number (eqs. 25, 26), with the report's constants."""
-    rms = math.sqrt(float(np.mean(velocity**2)))
-    # Eq. 25 as evaluated: its "deviation" of v^2, 0.03266 m^2/s^2, is the mean, and it divides by N, not by sqrt(N).
-    u_rms = rms / (2.0 * velocity.size)
-    estimates["velocity_rms"] = Estimate(rms, u_rms, "m/s")
-    if scene.disc_diameter_m is not None:
-        per_area = 1.204 / 1.825e-5
-        length = scene.disc_diameter_m
-        value = per_area * rms * length.value
-        u = value * math.hypot(u_rms / rms, length.u / length.value) if rms > 0 else math.inf
-        estimates["reynolds_number"] = Estimate(value, u)

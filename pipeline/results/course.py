@@ -128,8 +128,7 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
 
     A run with an implausible mass takes no part in the rest. Runs far from the median of their spring or disc are
     suspect. The runs of one spring at one bench are compared as in file mode, which names two that were exchanged; a
-    run without which the others agree is suspect too. Then far runs of different benches are exchanged in pairs, next
-    to good runs of their spring.
+    run without which the others agree is suspect too.
     """
     found = {run.name: Suspect(run.name, run.implausible) for run in runs if run.implausible}
     plausible = [run for run in runs if not run.implausible]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -76,7 +75,7 @@ class Derived:
     def parameters_of(self, fit: LawFit) -> dict[str, Estimate]:
         """Return the parameters of a law by name, in true seconds and metres, with all known contributions.
 
-        If the results are stated by this law, their values are returned. Coefficients that are not determined are upper
+        Those of the law of the results are the results themselves; coefficients that are not determined are upper
         limits.
         """
         from uncertainties import correlated_values
@@ -144,13 +143,8 @@ def derive(
     inputs = Inputs()
     laws = _Laws(fitted.damping, inputs, fitted.demodulated)
     unit = track.unit
-    terms, coefficients = _terms(track, fitted, scene, effects, misfits, laws, inputs)
-    found: dict[str, tuple[Any, str]] = {}
-    for name, formula in _FORMULAS.items():
-        if _NEEDS[name] <= terms.keys():
-            if formula is not None:
-                terms[name] = formula(**{each: terms[each] for each in _NEEDS[name]})
-            found[name] = terms[name], _unit_of(name, unit)
+    every, coefficients, scales = _results(track, fitted, scene, effects, misfits, laws, inputs)
+    found = {name: (x, _unit_of(name, unit)) for name, x in every.items() if x is not None}
     parts = {name: Estimate.of_variable(*found.pop(name)) if name in found else None for name in _PARTS}
     budgets = {name: inputs.budget(name, x, own) for name, (x, own) in (found | coefficients).items()}
     law = laws.stated.name if len(laws.weighted) == 1 and laws.stated.name == fitted.damping.selected else ""
@@ -162,7 +156,7 @@ def derive(
         law=law,
         law_of_coefficients=laws.shown.name,
         quoted=laws.quoted,
-        scales=(terms["rates"], terms["lengths"]),
+        scales=scales,
         **parts,
     )
 
@@ -172,45 +166,8 @@ def limited(law: Law, name: str, estimate: Estimate) -> Estimate:
     return estimate if name in ("A0", free_power(law)) else UpperLimit.of(estimate)
 
 
-# The estimates, then what curves and comparisons need, in the order of calculation. A new estimate is a new row: a
-# function whose parameters are terms, from :func:`_terms` or from rows above, or None for a term that is itself a
-# result. If a term is missing, so is the result.
-_FORMULAS: Mapping[str, Callable[..., Any] | None] = {
-    "period": lambda angular_frequency: 2 * math.pi / angular_frequency,
-    "period_small_swings": lambda omega_small: 2 * math.pi / omega_small,
-    "frequency": lambda angular_frequency: angular_frequency / (2 * math.pi),
-    "angular_frequency": None,
-    "amplitude": None,
-    "offset": None,
-    "phase": None,
-    "noise": None,
-    "damping_rate": None,
-    "displacement_amplitude": lambda amplitude, per_length: amplitude * per_length,
-    "angle_amplitude": lambda amplitude, per_angle: amplitude * per_angle,
-    "velocity_rms": lambda angular_frequency, lengths, root_mean_square, per_value: (
-        angular_frequency * lengths * root_mean_square * per_value
-    ),
-    "gravity": lambda omega_rest, length: length * omega_rest**2,
-    "quality_factor": lambda natural, decay: 0.5 * natural**0.5 / decay,
-    "displacement": None,
-    "half_stiffness": lambda angular_frequency, scale, gain, displacement, energy_mass: (
-        0.5 * (angular_frequency * scale / gain * displacement) ** 2 * energy_mass
-    ),
-    "effective_mass_kg": None,
-    "own_mass_kg": None,
-    "spring_constant": lambda natural, sprung_mass: natural * sprung_mass,
-    "keulegan_carpenter_number": lambda displacement_amplitude, diameter: (
-        2 * math.pi * displacement_amplitude / diameter
-    ),
-    "reynolds_number": lambda density, velocity_rms, diameter, viscosity: density * velocity_rms * diameter / viscosity,
-    "reynolds_number_start": lambda density, angular_frequency, displacement_amplitude, diameter, viscosity: (
-        density * angular_frequency * displacement_amplitude / math.sqrt(2.0) * diameter / viscosity
-    ),
-    "drag_length": lambda drag_per_beta, rate, scale, gain: drag_per_beta * rate / scale * gain,
-    "drag_coefficient": lambda drag_per_beta, beta: drag_per_beta * beta,
-}
-_NEEDS = {name: frozenset(inspect.signature(each).parameters if each else (name,)) for name, each in _FORMULAS.items()}
-_PARTS = tuple(name for name in _FORMULAS if name not in QUANTITIES)
+# What curves and comparisons need besides the estimates; names of attributes of :class:`Derived`.
+_PARTS = ("displacement", "half_stiffness", "effective_mass_kg", "own_mass_kg", "drag_length")
 
 
 def _unit_of(name: str, unit: str) -> str:
@@ -230,7 +187,7 @@ def _unit_of(name: str, unit: str) -> str:
 _LENGTHS = ("m", "m/s", "m/s^2")  # units in which a displacement, or a derivative of it, is recorded
 
 
-def _terms(
+def _results(
     track: Track,
     fitted: Fitted,
     scene: Scene,
@@ -238,8 +195,12 @@ def _terms(
     misfits: tuple[Misfit, ...],
     laws: _Laws,
     inputs: Inputs,
-) -> tuple[dict[str, Any], dict[str, tuple[Any, str]]]:
-    """Return the terms of the formulas by name, as far as record and scene give them, and the coefficients."""
+) -> tuple[dict[str, Any], dict[str, tuple[Any, str]], tuple[Any, Any]]:
+    """Return the results by name, None where record or scene do not determine them, coefficients, and scales.
+
+    The scales are the factors that convert rates and lengths of the record to true seconds and metres. A new estimate
+    is one entry here and one in :data:`pipeline.registry.quantities.QUANTITIES`.
+    """
     demodulated, damping, phase, rest = fitted.demodulated, fitted.damping, fitted.phase, fitted.rest
     instrument, unit = Instrument.of(track), track.unit
     ambient = Ambient(scene, inputs, u_temperature_k=U_AIR_TEMPERATURE_K)
@@ -271,60 +232,60 @@ def _terms(
     offset = inputs.add("rest_position", rest.mean, "A", free) * scale
     noise = inputs.add("noise", _noise(demodulated, unit), "A", demodulated.residual.size - 3.0 * windows)
     coefficients = _coefficients(laws, rates, lengths, lam, start)
-    length, per_angle = scene.pendulum_length_m, {"rad": 1.0, "rad/s": natural**-0.5}.get(unit)
-    rest_rate = slow
+    length: Any = scene.pendulum_length_m
+    per_angle = {"rad": 1.0, "rad/s": natural**-0.5}.get(unit)
     if slow is None and per_angle is not None:
         # The recording shows no change with the amplitude: that of a pendulum, A^2/16, is below its u.
-        rest_rate = omega * (1.0 + (laws.root_mean_square * per_angle) ** 2 / 8.0)
+        at_rest = omega * (1.0 + (laws.root_mean_square * per_angle) ** 2 / 8.0)
+    else:
+        at_rest = slow
+    if length is not None and per_angle is not None:
+        length = inputs.add("pendulum_length", length, "B")
     diameter: Any = None if scene.disc_diameter_m is None else inputs.add("disc_diameter", scene.disc_diameter_m, "B")
     own, share = _masses(scene, effects, diameter, ambient, inputs)
     mass = own if share is None else own + share
-    # The amplitude of a length or an angle, whose time derivative of some order was recorded, over that of the record.
+    # The amplitude of a length or an angle, whose time derivative of some order was recorded.
     moving = omega**2 + lam**2
-    per_length, from_rate = {"m/s": moving**-0.5, "m/s^2": 1.0 / moving}.get(unit), {"rad/s": moving**-0.5}.get(unit)
-    in_air = ambient.known and diameter is not None and displacement is not None
-    drag_per_beta = None
-    if in_air and mass is not None:
-        # The ratio C/beta.
-        drag_per_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
+    swing: Any = {"m": start, "m/s": start * moving**-0.5, "m/s^2": start / moving}.get(unit)
+    per_value = displacement if per_angle is None else per_angle
+    speed = None if per_value is None else omega * lengths * laws.root_mean_square * per_value
     # An angle may be that of a pendulum, so a spring constant is given only if the scene has a spring.
     sprung = not unit.startswith("rad") or scene.spring_mass_kg is not None
-    quadratic = damping.settled and damping.best.drag_term("beta") is not None
-    terms = {
+    results = {
+        "period": 2 * math.pi / omega,
+        "period_small_swings": None if slow is None else 2 * math.pi / slow,
+        "frequency": omega / (2 * math.pi),
         "angular_frequency": omega,
-        "omega_small": slow,
-        "omega_rest": rest_rate,
-        "length": None if length is None or per_angle is None else inputs.add("pendulum_length", length, "B"),
-        "natural": natural,
-        "rate": rate,
-        "scale": scale,
-        "gain": gain,
-        "lengths": lengths,
-        "rates": rates,
         "amplitude": start,
         "offset": offset + zero + amiss["offset"],
         "phase": _start_phase(phase, slope, inputs, free) + amiss["phase"] + delay,
         "noise": noise,
         "damping_rate": lam,
-        "decay": lam if laws.values[1] > 0 else None,
-        "root_mean_square": laws.root_mean_square,
+        "displacement_amplitude": None if unit == "m" else swing,  # not stated twice
+        "angle_amplitude": start * moving**-0.5 if unit == "rad/s" else None,
+        "velocity_rms": speed,
+        "gravity": None if length is None or at_rest is None or per_angle is None else length * at_rest**2,
+        "quality_factor": 0.5 * natural**0.5 / lam if laws.values[1] > 0 else None,
         "displacement": displacement,
-        "per_value": displacement if per_angle is None else per_angle,
-        "per_length": per_length,
-        "per_angle": from_rate,
-        # For a length, the amplitude itself is used, so that it is not stated twice.
-        "displacement_amplitude": start if unit == "m" else None,
         "effective_mass_kg": mass,
-        "energy_mass": 1.0 if mass is None else mass,
         "own_mass_kg": own,
-        "sprung_mass": mass if sprung else None,
-        "diameter": diameter if displacement is not None else None,
-        "density": ambient.density if in_air else None,
-        "viscosity": ambient.viscosity() if in_air else None,
-        "drag_per_beta": drag_per_beta,
-        "beta": coefficients["beta"][0] if quadratic and drag_per_beta is not None else None,
+        "spring_constant": natural * mass if sprung and mass is not None else None,
     }
-    return {name: x for name, x in terms.items() if x is not None}, coefficients
+    if displacement is not None:
+        stiffness = 0.5 * (omega * scale / gain * displacement) ** 2
+        results["half_stiffness"] = stiffness if mass is None else stiffness * mass
+    if displacement is not None and diameter is not None:
+        results["keulegan_carpenter_number"] = 2 * math.pi * swing / diameter
+        if ambient.known:
+            per_speed = ambient.density * diameter / ambient.viscosity()
+            results["reynolds_number"] = per_speed * speed
+            results["reynolds_number_start"] = per_speed * omega * swing / math.sqrt(2.0)
+        if ambient.known and mass is not None:
+            per_beta = 6.0 * mass / (omega * ambient.density * diameter**2) / displacement
+            results["drag_length"] = per_beta * rate / scale * gain
+            if damping.settled and damping.best.drag_term("beta") is not None:
+                results["drag_coefficient"] = per_beta * coefficients["beta"][0]
+    return results, coefficients, (rates, lengths)
 
 
 def _small_swings(phase: Phase, laws: _Laws, demodulated: Demodulated) -> Estimate | None:
@@ -345,9 +306,8 @@ def _crest(phase: Phase, laws: _Laws, unit: str, inputs: Inputs) -> Any:
     """Return the largest angle of the first swing over the amplitude of its sinusoid.
 
     A stiffness that changes as the square of the amplitude by :math:`\\Delta\\omega/\\omega_0 = \\kappa A^2/\\omega_0`
-    gives a third harmonic of :math:`\\kappa A^2/12\\omega_0` of the amplitude: for a pendulum, whose period grows by
-    :math:`A^2/16`, a crest :math:`A^2/192` below that of the sinusoid. This is half of a per cent at 60 degrees. Half
-    of it is taken as its uncertainty, because the frequency may change for another reason.
+    gives a third harmonic of :math:`\\kappa A^2/12\\omega_0` of the amplitude: half of a per cent for a pendulum at 60
+    degrees. Half of it is its uncertainty, because the frequency may change for another reason.
     """
     if phase.backbone is None or phase.small_swings is None or unit != "rad":
         return 1.0

@@ -71,12 +71,7 @@ def tabulate(track: Track, fitted: Fitted, scene: Scene) -> tuple[Effect, ...]:
     )
 
 
-def simulated_effects(
-    scene: Scene,
-    problem: Problem,
-    seconds: float,
-    drag: DerivedDrag | None,
-) -> tuple[Effect, ...]:
+def simulated_effects(scene: Scene, problem: Problem, seconds: float, drag: DerivedDrag | None) -> tuple[Effect, ...]:
     """Return the effects table of a simulation, which solves all terms of the equation.
 
     Leaving out a share s of the mass shifts the

@@ -42,10 +42,7 @@ class MassLine:
 
 
 def mass_line(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> MassLine | None:
-    """Fit the line as in a comparison, but without a prior mass of the spring.
-
-    None for fewer than three runs or bobs of nearly one mass.
-    """
+    """Fit the line as in a comparison, but without a prior mass; None for fewer than three runs or nearly one mass."""
     masses = [run.mass_kg for run in runs]
     mass = np.array([each.value for each in masses])
     if len(runs) < 3 or mass.max() < (1.0 + NEGLIGIBLE) * mass.min():

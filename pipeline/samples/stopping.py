@@ -10,7 +10,9 @@ from pipeline.numerics.robust import median
 from pipeline.samples.condition import Conditioned
 from pipeline.track import F8
 
-BLOCK = 25  # samples over which a bob is judged to be moving or at rest
+# Samples over which a bob is judged to be moving or at rest: half of them deviate by two standard deviations of noise
+# with a probability of 2e-11.
+BLOCK = 25
 
 
 def moving_part(conditioned: Conditioned, share: float) -> Conditioned | None:

@@ -20,11 +20,17 @@ from pipeline.windows.cycles import Cycles
 from pipeline.windows.demodulate import ROUNDING, Demodulated
 from pipeline.windows.sinusoids import Windows, refit, solve
 
-LEVELS = 40  # number of heights tried for the level, from the middle of the swing to its top
-SHARE_BEYOND = 0.05  # share of a plateau's samples below the level beyond which samples are left out
+# Number of heights tried for the level, from the middle of the swing to its top. With 80, amplitudes of clipped records
+# move by up to 0.05 u, as measured by `python -m tests.trials.troubles --only clipped`.
+LEVELS = 40
+# Share of a plateau's samples below the level beyond which samples are left out. With 0.1, amplitudes of clipped
+# records of `python -m tests.golden` move by up to 0.1 u.
+SHARE_BEYOND = 0.05
 
 Bools = NDArray[np.bool_]
-MIDDLE = 0.5  # fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted
+# Fraction of the amplitude within which the motion is never cut, so that the sinusoid can be fitted: a sample lies
+# there with a probability of 1/3.
+MIDDLE = 0.5
 # Fraction of the amplitude beyond which the crest lies: within 30 degrees of the turning point.
 CREST = math.cos(math.pi / 6.0)
 

@@ -161,10 +161,8 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
     turning = np.exp(1j * tuning.angular_frequency * (windows.centre - windows.centre[0]))
     steady = (solution.coefficients[:, 1] + 1j * solution.coefficients[:, 2]) / turning
     slow = np.stack([solution.coefficients[:, 0], steady.real, steady.imag])
-    around = np.sort(slow[:, _neighbours(n)], axis=2)
-    last = around.shape[2] - 1
-    rest, *pair = 0.5 * (around[:, :, last // 2] + around[:, :, (last + 1) // 2])
-    smooth = (pair[0] + 1j * pair[1]) * turning
+    rest, real, imaginary = np.median(slow[:, _neighbours(n)], axis=2)
+    smooth = (real + 1j * imaginary) * turning
     expected = np.stack([rest, smooth.real, smooth.imag], axis=1)
     away = np.abs(solution.coefficients - expected).max(axis=1)
     level = _typical(spread, windows, solution)
@@ -176,7 +174,7 @@ def _rescue(windows: Windows, basis: F8, solution: Solution, spread: F8, tuning:
         return
     part, usable = basis[odd], windows.usable[odd]
     size = np.abs(part[:, 3] - (expected[odd, None, :] @ part[:, :3])[:, 0])
-    # Only the best samples sets the scale, so that echoes may make up more than half of a window.
+    # Only the best samples set the scale, so that echoes may make up more than half of a window.
     trial = _reweighted(part, usable, size, MINORITY, level, ROUNDS)
     after = np.sum((np.abs(trial.residual) <= bound) * usable, axis=1)
     better = trial.good & ((after > before[odd]) | ~solution.good[odd])

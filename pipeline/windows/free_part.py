@@ -19,12 +19,13 @@ from pipeline.windows.gaps import longest_part
 from pipeline.windows.lost_rows import LostRows, find_lost_rows
 from pipeline.windows.segments import Segments, Span, SpanKind, before_trigger, find_free_part
 
-MOST_BENT = 0.25  # maximum residual over the amplitude: parabolas leave 0.19, a motion seen mostly as plateaus 0.35
-WANDERING = 0.3  # maximum residual beyond white noise, over the amplitude
+# Maximum residual of an oscillation over its amplitude: parabolas leave 0.20 and square waves 0.34, as measured on one
+# period of each.
+MOST_BENT = 0.25
 
 # Share of the samples: if the bob stops before it, its rest is left out; if it stops before the end less this share,
-# only if the whole recording shows no oscillation. Its periods are then those measured by `pytest
-# tests/trials/test_stopping.py`; with an eighth, the rest hides some of them.
+# only if the whole recording shows no oscillation. With an eighth, rest long before the end is analysed, as measured
+# by `python -m tests.trials.troubles --only before`.
 EARLY = 0.25
 
 
@@ -142,7 +143,7 @@ def check_sinusoid(conditioned: Conditioned, demodulated: Demodulated) -> NoOsci
     # 8.5/n. Five standard deviations are allowed: the largest difference in 2,000 records at -10 dB is 4.3.
     chance = 5.0 * math.sqrt(8.5 / max(float(np.sum(demodulated.count)), 1.0))
     excess = math.sqrt(max(left**2 - (1.0 + chance) * noise**2, 0.0))
-    if left <= 0.15 * size or (left <= 4.0 * conditioned.noise_m and excess <= WANDERING * size):
+    if left <= 0.15 * size or (left <= 4.0 * conditioned.noise_m and excess <= MOST_BENT * size):
         return None
     if left > MOST_BENT * size or demodulated.t.size < FEWEST_FOR_CURVE:
         return NoOscillation(

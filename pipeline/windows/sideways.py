@@ -26,7 +26,8 @@ from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.modes import C16, Carrier, Mode, Sideways
 
-HARMONICS = (2, 3)  # multiples of the main frequency
+# Multiples of the main frequency that bent scales and springs cause; they share half of the probability FALSE_ALARM.
+HARMONICS = (2, 3)
 FALSE_ALARM = 0.01  # probability that a mode or a harmonic is found in a record without any; each has half of it
 MOST = 4  # maximum number of modes, not counting harmonics
 ENVELOPE = 4  # maximum degree of the polynomial for a mode's amplitude and phase

@@ -13,8 +13,7 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.results.classic import CYCLES, Classic
-from pipeline.results.curves import Curve
-from pipeline.results.kinematics import Smoothed
+from pipeline.results.curves import Curve, Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
 from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty

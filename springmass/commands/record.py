@@ -398,8 +398,7 @@ def _simulated(
 ) -> Iterator[Sensor]:
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port")
-    from acquisition.simulated.pseudo_terminal import VirtualPort
-    from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
+    from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 
     family = get_family(name)
     if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):

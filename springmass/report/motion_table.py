@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.quantity import Unit, noun
-from pipeline.results.kinematics import Smoothed
+from pipeline.results.curves import Smoothed
 from pipeline.track import UNUSABLE
 
 MOST_ROWS = 1_000_000

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquisition.block import Block, SourceInfo
-from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
+from acquisition.simulated import VirtualRangefinder, VirtualSensor
 from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory, effective_mass_kg
 from pipeline.dynamics.band import LEVELS, Band

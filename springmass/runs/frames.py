@@ -15,7 +15,7 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
 from pipeline.numerics.quantity import Unit
 from pipeline.results.compare import Comparison
-from pipeline.results.kinematics import Smoothed
+from pipeline.results.curves import Smoothed
 from pipeline.track import Quality
 from springmass.runs.arrays import ABOUT, about_json
 from springmass.runs.estimates import Value

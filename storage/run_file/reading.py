@@ -39,7 +39,7 @@ class Run:
     """An open run file.
 
     The header is read when the file is opened, samples on demand. Everything is checked: every chunk has a checksum,
-    and every column that is read to its end is compared with its SHA-256. Every method raises RunDamaged for the first
+    and every column that is read is compared with its SHA-256. Every method raises RunDamaged for the first
     damage that it finds, and RunClosed after the run was closed.
 
     ``sha256`` is the digest of the header, which contains the digests of all arrays and original files. Two files with
@@ -92,30 +92,16 @@ class Run:
         """Software, configuration and times, as the writer stated them."""
         return self.header.provenance
 
-    def blocks(self, size: int = 1024) -> Iterator[Block]:
-        """Yield the samples in blocks, which are read on demand.
-
-        A damaged chunk is found when it is read. The checksum of a whole column is compared before the blocks of the
-        last chunk.
-        """
-        digests = {name: hashlib.sha256() for name in CHECKED if name in self.header.columns}
-        step = size * max(1, CHUNK // size)  # read whole blocks, about one chunk at a time
-        for start in range(0, len(self), step):
-            values = self._rows(start, start + step)
-            for name, array in values.items():
-                digests[name].update(array.data)
-            if start + step >= len(self):
-                for name, digest in digests.items():
-                    self._compare(f"the column {name!r}", digest, self.header.columns[name], strict=False)
-            read = _block(self.header, start, values)
-            for row in range(0, len(read), size):
-                yield read[row : row + size]
-
     def samples(self) -> Block:
         """Return all samples as one block."""
-        for block in self.blocks(max(len(self), 1)):
-            return block
-        return _block(self.header, 0, self._rows(0, 0))
+        values = self._rows(0, len(self))
+        for name, array in values.items():
+            digest = hashlib.sha256(array.data)
+            self._compare(f"the column {name!r}", digest, self.header.columns[name], strict=False)
+        fields: dict[str, Any] = {layout.BY_NAME[name].field: array for name, array in values.items()}
+        # Older files do not state the quantity; they contain lengths.
+        quantity, unit = self.header.quantity or "length", self.header.unit or "m"
+        return Block(self.header.first, **fields, quantity=quantity, unit=unit)
 
     def originals(self) -> tuple[Original, ...]:
         """Return the original files, bit for bit; an empty tuple if there are none."""
@@ -244,9 +230,3 @@ def _demand_hdf5(path: Path) -> None:
         raise NotARun(path, f"the run file cannot be opened ({error.strerror or error})", remedy) from error
     if head != layout.MAGIC:
         raise NotARun(path, f"expected a run file (HDF5), got a file that begins with {head!r}", remedy)
-
-
-def _block(header: Header, start: int, values: Mapping[str, NDArray[Any]]) -> Block:
-    fields: dict[str, Any] = {layout.BY_NAME[name].field: array for name, array in values.items()}
-    # Older files do not state the quantity; they contain lengths.
-    return Block(header.first + start, **fields, quantity=header.quantity or "length", unit=header.unit or "m")

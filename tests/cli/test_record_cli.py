@@ -18,8 +18,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
-from acquisition.simulated.pseudo_terminal import VirtualPort
-from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
+from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from springmass import analyse, load
 from springmass.cli import main
 from storage.run_file.reading import open_run

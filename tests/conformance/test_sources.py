@@ -11,7 +11,7 @@ import pytest
 from acquisition.block import Block, Flag, Source, SourceInfo, concatenate
 from acquisition.clock import Clock, VirtualClock
 from acquisition.replay import Replay
-from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
+from acquisition.simulated import VirtualRangefinder, VirtualSensor
 
 SECONDS = 120
 RATE_HZ = 100.0

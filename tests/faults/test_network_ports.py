@@ -18,8 +18,7 @@ from serial.rfc2217 import PortManager
 
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
-from acquisition.simulated.pseudo_terminal import VirtualPort
-from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
+from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from springmass.cli import main
 from storage.run_file.reading import open_run
 

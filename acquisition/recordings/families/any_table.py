@@ -41,6 +41,8 @@ _MONITOR = re.compile(
     r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",
     re.MULTILINE,
 )
+_MATRIX_ROW = re.compile(rb"^[-+.,\deE \t\[]*[;\]][ \t\];]*$", re.MULTILINE)
+_BLANKED = bytes.maketrans(b"[];", b"   ")
 _FEWEST, _SHARE, _HEAD = 3, 0.8, 40
 
 
@@ -102,7 +104,6 @@ def header(lines: Sequence[str]) -> Header | None:
         ragged=len(values) > 1,
         traps=tuple(traps),
         clock=clock,
-        brackets=table.brackets,
         refused=(problem, remedy) if wrong_commas(table) else None,
     )
 
@@ -164,10 +165,14 @@ def without_monitor(text: Text) -> Text:
 def prepared(text: Text) -> Text:
     """Return a text as rows: without a serial monitor's clock, and with the lines joined that come in turn.
 
-    A sketch may print the time on one line and the values on the next. The line numbers stay as they are.
+    A sketch may print the time on one line and the values on the next. The line numbers stay as they are. The brackets
+    and semicolons of a matrix of MATLAB become blanks.
     """
     text = without_monitor(text)
     head = text.head(_HEAD)
+    if 2 * sum(line.rstrip().endswith(";") for line in head) > len(head):
+        text = Text.of(_MATRIX_ROW.sub(lambda row: row[0].translate(_BLANKED), text.data))
+        head = text.head(_HEAD)
     mark = next((mark for mark in "\t;," if any(mark in line for line in head)), " ")
     widths = [_width(line, mark) for line in head]
     first = in_turn(widths)

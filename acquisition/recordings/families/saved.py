@@ -31,7 +31,7 @@ from acquisition.errors import FormatError
 from acquisition.recordings.families.dialects import logger_pro
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat, text_format
-from acquisition.recordings.tables.headings import Heading, Role, is_time, name_and_unit, numbered_apart
+from acquisition.recordings.tables.headings import Heading, Role, is_time, name_and_unit, unique
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Table, side_by_side
 from acquisition.recordings.tables.text import HEAD_BYTES, Text, decode, head_lines, text_of
@@ -126,7 +126,8 @@ def _vernier_evidence(head: bytes) -> str:
 def _vernier_tables(path: str, data: bytes) -> list[Table]:
     root = _read_markup(path, _unpacked(path, data) if _is_tar(data[:HEAD_BYTES]) else data, _EXPORT)
     sets = [each for each in root.iter("DataSet") if each.find("DataColumn") is not None]
-    runs = numbered_apart([(each.findtext("DataSetName") or "").strip() or "Data Set" for each in sets])
+    taken: set[str] = set()
+    runs = [unique((each.findtext("DataSetName") or "").strip() or "Data Set", taken) for each in sets]
     tables = [table for run, each in zip(runs, sets, strict=True) for table in _of_set(each, run)]
     if not tables:
         raise FormatError(path, "expected columns with numbers, got none", _EXPORT)

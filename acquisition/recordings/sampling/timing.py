@@ -168,12 +168,6 @@ class Timing(NamedTuple):
     traps: tuple[Trap, ...] = ()
 
 
-def check_rate(path: str, rate_hz: float | None) -> None:
-    """Check that a rate, if given, is a positive number."""
-    if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise FormatError(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
-
-
 def rate_needed(instead: MissingItem | None = None) -> MissingItem:
     """Return the missing item for a rate; a column of times may be given instead."""
     return MissingItem(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)

@@ -88,14 +88,12 @@ def parse_number(text: str) -> float | None:
     return None if decimals in (EMPTY, UNREAD) else value
 
 
-def split_page(page: bytes, delimiter: str, *, brackets: bool = False) -> list[list[bytes]]:
-    """Split whole lines into cells without blanks and quotes; an empty list for a blank line.
+def split_page(page: bytes, delimiter: str) -> list[list[bytes]]:
+    """Split whole lines into cells without blanks and quotes; without a delimiter, runs of white space separate them.
 
-    The delimiter is empty for runs of white space. With brackets, ``[``, ``]`` and ``;`` are blanks.
+    A blank line gives an empty list.
     """
     page = page.translate(_DAMAGE)
-    if brackets:
-        page = page.translate(bytes.maketrans(b"[];", b"   "))
     lines = page.split(b"\n")
     if not lines[-1]:
         lines.pop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
@@ -12,7 +13,7 @@ from acquisition.block import B1, F8, I8, U8, Block, ClockKind, Flag, Kind, Sour
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.recordings.sampling.samples import flags_of, line_of, place, row_traps, sample_traps, value_traps
-from acquisition.recordings.sampling.timing import Rows, Timing, check_rate, find_timing
+from acquisition.recordings.sampling.timing import Rows, Timing, find_timing
 from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
@@ -73,16 +74,17 @@ class Samples:
         )
 
 
-def read_channel(path: str, tables: Sequence[Table], answers: Answers, *, difference: bool = False) -> Samples:
+def read_channel(path: str, tables: Sequence[Table], answers: Answers, difference: bool = False) -> Samples:
     """Choose a channel and read its samples.
 
     ``difference`` says that each value is the difference from the row before, so that the first may be absent.
     """
-    check_rate(path, answers.rate_hz)
+    if (rate_hz := answers.rate_hz) is not None and not (math.isfinite(rate_hz) and rate_hz > 0):
+        raise FormatError(path, f"rate_hz must be a positive number, got {rate_hz!r}", "give the rate in hertz")
     table, column = choose_channel(path, names_apart(tables), answers)
     measured, traps = measure(path, column, answers.unit)
     rows = rows_of(path, table, column, measured)
-    samples = read_samples(path, rows, table, column, measured, answers.rate_hz, difference=difference)
+    samples = read_samples(path, rows, table, column, measured, rate_hz, difference)
     return replace(samples, traps=(*table.traps, *traps, *samples.traps))
 
 
@@ -92,8 +94,7 @@ def read_samples(
     table: Table,
     column: Column,
     measured: Measure,
-    rate_hz: float | None,
-    *,
+    rate_hz: float | None = None,
     difference: bool = False,
 ) -> Samples:
     """Return the samples in the rows of a channel."""
@@ -103,13 +104,12 @@ def read_samples(
         found.insert(0, Trap("time_unit_assumed", "the times have no unit: read as seconds"))
     unread, t = rows.unread, place(rows, timing)
     timed = np.isfinite(t)
-    where = _rows_in(timed)
-    t, value = t[where], rows.value[where]
+    t, value = t[timed], rows.value[timed]
     if np.isnan(value).all():
         problem = f'expected numbers as "{column.name}", got NaN in all {value.size} rows'
         raise FormatError(path, problem, "record the run again", line=line_of(rows.lines, 0))
-    lines = None if rows.lines is None else rows.lines[where]
-    flags = flags_of(t, value, unread[where], timing.rate_hz)
+    lines = None if rows.lines is None else rows.lines[timed]
+    flags = flags_of(t, value, unread[timed], timing.rate_hz)
     if difference and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
     found += _jumps(t, timing.rate_hz, lines)
@@ -183,22 +183,21 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
     keep = present | remark
     if not (keep & ~remark).any():
         raise _no_numbers(path, column, 0, int(lines.numbers[0]) if lines.rows else None)
-    chosen = _rows_in(keep)
-    remark, unknown = remark[chosen], (unread | remark)[chosen]
+    remark, unknown = remark[keep], (unread | remark)[keep]
     printed, time_digit = None, 0.0
     if time is not None:
-        printed = scaled(time.values, time.forms, seconds.power)[chosen]
+        printed = scaled(time.values, time.forms, seconds.power)[keep]
         time_digit = last_digit(printed, time.forms, seconds.power)
         printed, time_digit = printed * seconds.factor, time_digit * seconds.factor
         beyond = ~(np.abs(printed) < _LONGEST_S)  # true for a NaN
         printed[beyond] = np.nan
         unknown |= beyond
-    value = scaled(own.values, form, measured.power)[chosen]
+    value = scaled(own.values, form, measured.power)[keep]
     value[unknown] = np.nan
     resolution = last_digit(value, form, measured.power) * measured.factor
     value *= measured.factor
 
-    numbers = lines.numbers[chosen]
+    numbers = lines.numbers[keep]
     if unknown.all():
         raise _no_numbers(path, column, unknown.size, int(numbers[0]))
     return Rows(
@@ -211,11 +210,6 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
         resolution=resolution,
         cut=lines.cut and bool(unknown[-1]) and bool(keep[-1]),
     )
-
-
-def _rows_in(mask: B1) -> I8 | slice:
-    """Return the indices of the rows in a mask; a slice of all rows takes no memory."""
-    return slice(None) if mask.all() else np.flatnonzero(mask)
 
 
 def _no_numbers(path: str, column: Column, rows: int, line: int | None) -> FormatError:

@@ -72,7 +72,7 @@ def _survey(path: str, table: Table, column: Column) -> Survey:
     measured = column.measure or NUMBER
     try:
         rows = rows_of(path, table, column, measured)
-        samples = read_samples(path, rows, table, column, measured, None)
+        samples = read_samples(path, rows, table, column, measured)
     except NeedsAnswer:
         return Survey(table.run, column.name, column.unit, rows.value.size, None, ())
     except FormatError as error:
@@ -155,8 +155,7 @@ def tables_of_text(
 
 def _tables(path: str, text: Text | Sheet, begin: int, header: Header, stop: int | None) -> list[Table]:
     """Read the rows below a header that begins at a line."""
-    first, mark = begin + header.lines, header.delimiter
-    read = read_rows(path, text, first, mark, stop=stop, clock=header.clock, brackets=header.brackets)
+    read = read_rows(path, text, begin + header.lines, header.delimiter, stop=stop, clock=header.clock)
     stated = {each.name: getattr(header, each.name) for each in fields(Stated)}
     common = replace(read, **{**stated, "traps": (*header.traps, *read.traps)})
     tables = side_by_side(common, header.headings, header.run)

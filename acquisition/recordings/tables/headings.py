@@ -131,13 +131,10 @@ def split_heading(line: str, mark: str = "") -> tuple[list[str], str]:
     return [cell[1:-1].strip() if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell for cell in cells], mark
 
 
-def numbered_apart(names: Sequence[str]) -> list[str]:
-    """Return unique names: repetitions of a name get a number."""
-    seen: dict[str, int] = {}
-    apart: dict[str, None] = {}
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        while (numbered := name if seen[name] == 1 else f"{name} [{seen[name]}]") in apart:
-            seen[name] += 1  # the file already contains this numbered name
-        apart[numbered] = None
-    return list(apart)
+def unique(name: str, taken: set[str]) -> str:
+    """Return a name that is not taken, with a number if need be, and take it."""
+    apart, number = name, 1
+    while apart in taken:
+        apart, number = f"{name} [{number + 1}]", number + 1
+    taken.add(apart)
+    return apart

@@ -18,7 +18,6 @@ _MARKS = ("\t", ";", ",", "")
 _PROBE, _FEWEST, _SOUND = 20, 3, 0.8
 _ABOVE = 6  # number of lines above the rows that are searched for names
 _COMMENT = "#%*!'/ \ufeff"
-_BRACKETS = re.compile(r"[\[\];]")  # brackets and semicolons of a matrix as MATLAB writes it
 _NUMBERS = re.compile(r"[-+\d.,;eE\s\[\]]*\d[-+\d.,;eE\s\[\]]*")
 _DATE = re.compile(r"\d{1,4}([-./])\d{1,2}\1\d{1,4}", re.ASCII)
 _SETTING = re.compile(r"[=]|:(?!\s*$)")
@@ -45,8 +44,7 @@ class Layout(NamedTuple):
     """The layout of a table: its first row is line ``at``, counted from 0.
 
     ``headings`` has one heading for each column. ``spare`` are names beyond the last column, each with the cell below
-    it in the line of units. ``rows`` are the cells of the first rows, which all have the same number of cells. The
-    rows of a matrix in ``brackets`` end in semicolons.
+    it in the line of units. ``rows`` are the cells of the first rows, which all have the same number of cells.
     """
 
     preamble: tuple[str, ...]
@@ -54,7 +52,6 @@ class Layout(NamedTuple):
     spare: tuple[tuple[str, str], ...]
     at: int
     mark: str
-    brackets: bool
     rows: tuple[tuple[str, ...], ...] = ()
 
     @property
@@ -92,11 +89,8 @@ def _is_separator(table: Layout) -> bool:
 
 def _split_by(lines: Sequence[str], mark: str) -> Layout | None:
     """Find the first rows of numbers in lines with a separator; None if there are none."""
-    ends = 0 if mark else sum(each.rstrip().endswith(";") for each in lines)
-    brackets = ends > len(lines) / 2  # as in a MATLAB matrix
-    blanks = mark + " " if mark else "\t [];" if brackets else "\t "
-    filled = [at for at, each in enumerate(lines) if each.strip(blanks)]
-    cells = [_cells(lines[at], mark, brackets) for at in filled]
+    filled = [at for at, each in enumerate(lines) if each.strip(mark + " " if mark else "\t ")]
+    cells = [_cells(lines[at], mark) for at in filled]
     kinds = [[_kind(cell) for cell in row] for row in cells]
     for at, first in enumerate(kinds):
         if not _is_row(first) or cells[at][0] == "-" or any("=" in cell for cell in cells[at]):
@@ -107,15 +101,14 @@ def _split_by(lines: Sequence[str], mark: str) -> Layout | None:
         if sum(like[:_FEWEST]) == _FEWEST and sum(like) >= _SOUND * len(like):
             rows = [own for own, row in zip(cells[at:], kinds[at:], strict=True) if _alike(row, first, width, mark)]
             padded = tuple(tuple(row + [""] * (width - len(row))) for row in rows)
-            return _with_names(lines, filled[at], mark, brackets, width)._replace(rows=padded)
+            return _with_names(lines, filled[at], mark, width)._replace(rows=padded)
     return None
 
 
-def _cells(line: str, mark: str, brackets: bool) -> list[str]:
+def _cells(line: str, mark: str) -> list[str]:
     """Split a row into cells; separators at its end are ignored."""
     if mark and '"' in line:
         return split_heading(line, mark)[0]
-    line = _BRACKETS.sub(" ", line) if brackets else line
     if mark:
         cells = [cell.strip(" ") for cell in line.rstrip(mark + " ").split(mark)]
     else:
@@ -149,7 +142,7 @@ def _alike(kinds: Sequence[str], first: Sequence[str], width: int, mark: str) ->
     return all(a == b or "" in (a, b) for a, b in zip(kinds, first, strict=False))
 
 
-def _with_names(lines: Sequence[str], start: int, mark: str, brackets: bool, width: int) -> Layout:
+def _with_names(lines: Sequence[str], start: int, mark: str, width: int) -> Layout:
     """Return the layout of a table whose first row is known, without its rows."""
     above = [at for at in range(start - 1, -1, -1) if lines[at].strip(_COMMENT)][:_ABOVE]
     names, units, at_names = [""] * width, [""] * width, start
@@ -173,7 +166,7 @@ def _with_names(lines: Sequence[str], start: int, mark: str, brackets: bool, wid
         plain, own = heading_of(name)
         headings.append(Heading(plain, own or unit.strip(" ()[]")))
     preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t;,")))
-    return Layout(preamble, tuple(headings), spare, start, mark, brackets)
+    return Layout(preamble, tuple(headings), spare, start, mark)
 
 
 def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[str]:

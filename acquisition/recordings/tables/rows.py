@@ -56,11 +56,10 @@ def read_rows(
     *,
     stop: int | None = None,
     clock: int | None = None,
-    brackets: bool = False,
 ) -> Table:
     """Read the rows from line ``first`` on, as columns without names; blank lines are no rows.
 
-    The cells of column ``clock`` are times of day. With brackets, ``[``, ``]`` and ``;`` are blanks.
+    The cells of column ``clock`` are times of day.
     """
     if isinstance(text, Sheet):
         return _rows_of_sheet(text, first, clock)
@@ -71,7 +70,7 @@ def read_rows(
     numbers = [np.empty(0, np.int64)]
     most, count, number, last = int(text.starts[stop] - text.starts[first]) + _MOST_EMPTY, 0, first + 1, []
     for page in text.pages(first, stop):
-        lines = split_page(page, mark, brackets=brackets)
+        lines = split_page(page, mark)
         numbers.append(np.flatnonzero(list(map(bool, lines))) + number)
         number += len(lines)
         rows = list(filter(None, lines))

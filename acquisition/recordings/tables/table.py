@@ -14,7 +14,7 @@ from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.timing import Formula, median
 from acquisition.recordings.tables.cells import EMPTY, I1
-from acquisition.recordings.tables.headings import Heading, numbered_apart, role_of
+from acquisition.recordings.tables.headings import Heading, role_of, unique
 from acquisition.recordings.units import Measure, measure_of
 
 _SET_BACK, _MOST_SET, _FEWEST_ROWS = 50.0, 3, 50
@@ -148,8 +148,6 @@ class Header(Stated):
         One for each column.
     clock : int or None
         A column of times of day.
-    brackets : bool
-        Whether rows are a matrix of MATLAB, in brackets and with semicolons at their ends.
     refused : tuple of str or None
         Why the rows cannot be read, and what to do.
     """
@@ -159,7 +157,6 @@ class Header(Stated):
     delimiter: str
     headings: Sequence[Heading]
     clock: int | None = None
-    brackets: bool = False
     refused: tuple[str, str] | None = None
 
 
@@ -248,11 +245,8 @@ def set_back(table: Table) -> list[Table]:
 
 def names_apart(tables: Sequence[Table]) -> list[Table]:
     """Return tables whose channels have unique names within each run, so that each can be chosen."""
-    result = list(tables)
-    for run in dict.fromkeys(each.run for each in tables):
-        own = [at for at, each in enumerate(tables) if each.run == run]
-        names = iter(numbered_apart([column.name for at in own for column in tables[at].columns]))
-        for at in own:
-            columns = tuple(replace(column, name=next(names)) for column in tables[at].columns)
-            result[at] = replace(tables[at], columns=columns)
-    return result
+    taken: dict[str, set[str]] = {table.run: set() for table in tables}
+    return [
+        replace(table, columns=tuple(replace(each, name=unique(each.name, taken[table.run])) for each in table.columns))
+        for table in tables
+    ]

@@ -153,10 +153,7 @@ def _flow(t: F8, start: float, mu: float, gamma: float, beta: float) -> _Flow:
 
 
 def _turning_ends(pace: float, angle: F8, start: float, mu: float, gamma: float, beta: float) -> F8:
-    """Return 0 after a stop, infinity beyond a pole and NaN elsewhere, at angles |s|t (n,), where s is imaginary.
-
-    The coefficients mu and beta then have the same sign.
-    """
+    """Return 0 after a stop, infinity beyond a pole and NaN elsewhere, at angles |s|t (n,), where s is imaginary."""
     if beta > 0.0:
         return np.where(angle >= math.atan2(pace * start, mu + 0.5 * gamma * start), 0.0, np.nan)
     return np.where(angle >= math.atan2(pace, -beta * start - 0.5 * gamma), np.inf, np.nan)
@@ -201,10 +198,7 @@ def _integral_of_squares(t: F8, flow: _Flow, elapsed: F8) -> F8:
 
 
 def amplitudes(t: F8, theta: F8) -> F8:
-    """Return the amplitudes of several motions.
-
-    Zero after friction has stopped the motion; infinite beyond the pole of an amplitude that grows.
-    """
+    """Return the amplitudes of several motions: 0 after a stop by friction, infinite beyond a pole."""
     return np.array([_flow(t, *row).amplitude for row in theta.tolist()])
 
 

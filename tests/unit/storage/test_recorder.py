@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import threading
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,59 +12,13 @@ from acquisition.clock import VirtualClock
 from acquisition.live.reader import Sink
 from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
-from storage.wire_log.appending import SECOND_COPY, LogFile
+from storage.wire_log.appending import SECOND_COPY
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
-from tests.wire import json_of, parse_log
+from tests.wire import WAIT_S, Disk, json_of, parse_log
 
 HEADER = LogHeader(sensors=(SensorEntry(0, "line"), SensorEntry(1, "line")), mono_ns=0, unix_ns=0)
 HOUR_S = 3600.0
-WAIT_S = 120.0
-
-
-class Disk:
-    """A file in memory whose writes and syncs a test can hold up or refuse."""
-
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.writes_pass, self.syncs_pass = threading.Event(), threading.Event()
-        self.writes_pass.set()
-        self.syncs_pass.set()
-        self.held = threading.Event()
-        self.write_trouble: OSError | None = None
-        self.sync_trouble: OSError | None = None
-        self.room = 1 << 30
-        self.takes: Callable[[], None] = lambda: None
-        self.threads: dict[str, set[str]] = {"write": set(), "sync": set()}
-
-    def __call__(self, path: Path) -> LogFile:
-        """Open."""
-        return self
-
-    def write(self, data: bytes | memoryview) -> int:
-        """Take what there is room for."""
-        self._pass("write", self.writes_pass)
-        self.takes()
-        taken = min(len(data), self.room - len(self.data))
-        if self.write_trouble or not taken:
-            raise self.write_trouble or OSError(errno.ENOSPC, "No space left on device")
-        self.data += data[:taken]
-        return taken
-
-    def sync(self) -> None:
-        """Refuse if told to."""
-        self._pass("sync", self.syncs_pass)
-        if self.sync_trouble:
-            raise self.sync_trouble
-
-    def close(self) -> None:
-        """Nothing is held."""
-
-    def _pass(self, what: str, gate: threading.Event) -> None:
-        self.threads[what].add(threading.current_thread().name)
-        if not gate.is_set():
-            self.held.set()
-            assert gate.wait(WAIT_S)
 
 
 def recorder(disk: Disk, *, sync_every_s: float = HOUR_S, queue_bytes: int = 1 << 20) -> Recorder:

@@ -17,6 +17,7 @@ from acquisition.errors import SensorError
 from acquisition.live.decoding import SensorChain
 from acquisition.live.timebase import Timebase
 from acquisition.readings import Reading, Readings
+from tests.wire import line
 
 RATE_HZ = 100.0
 STEP_US = 10_000
@@ -171,12 +172,6 @@ def test_a_stall_that_lost_a_few_readings_is_no_restart() -> None:
 
 SPEED_M_PER_S = 344.0
 OMEGA, AMPLITUDE_M, REST_M = 8.3, 0.05, 0.25
-
-
-def line(i: int, echo_us: float) -> bytes:
-    """Return the line of one ping, 10 ms after the one before; NaN for no echo."""
-    encoder = get_family("line-protocol").encoder()
-    return encoder.encode(sequence=i, device_us=i * 10_000, echo_us=echo_us, distance_m=0.25, temperature_c=np.nan)
 
 
 def flight_us(t: float) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.simulated.rangefinder import Shot, VirtualRangefinder, VirtualSensor
+from acquisition.simulated import Shot, VirtualRangefinder, VirtualSensor
 
 QUIET: dict[str, Any] = {"noise_m": 0.0, "false_echo_rate_hz": 0.0}
 

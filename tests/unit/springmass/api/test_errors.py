@@ -16,6 +16,8 @@ import springmass as sm
 
 T = np.arange(1000) / 100
 RUN = (T, 0.2 + 0.05 * np.cos(8.3 * T))
+# Three samples a period, of which clipped crests leave too few.
+FEW = 0.066 + 0.0165 * np.cos(13.8 * np.pi * T[:60] * 5.0 + 2.0) + 2e-4 * np.random.default_rng(2).standard_normal(60)
 BENCH = sm.Scene(bob_mass_kg=0.2, spring_constant_n_per_m=14.0, start_displacement_m=0.05)
 WRONG: dict[str, Callable[[Path], Any]] = {
     "a file that is not there": lambda folder: sm.load(folder / "nothing.txt"),
@@ -28,6 +30,7 @@ WRONG: dict[str, Callable[[Path], Any]] = {
     "a scene that is a number": lambda _: sm.analyse(RUN, 3),  # type: ignore[arg-type]
     "an unstable step": lambda _: sm.simulate(BENCH, T, method="forward-euler"),
     "too few samples": lambda _: sm.analyse((T[:3], T[:3])),
+    "crests cut off in every period": lambda _: sm.analyse((5.0 * T[:60], np.minimum(FEW, 0.0792))),
     "times that run backwards": lambda _: sm.analyse((T[::-1], RUN[1])),
     "times under another name": lambda _: sm.analyse(xr.DataArray(RUN[1], {"t": RUN[0]}, ["t"])),
     "no array": lambda _: sm.analyse(3),  # type: ignore[arg-type]

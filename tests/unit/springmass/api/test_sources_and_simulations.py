@@ -14,8 +14,7 @@ import springmass as sm
 from acquisition.block import concatenate
 from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
-from acquisition.simulated.pseudo_terminal import VirtualPort
-from acquisition.simulated.rangefinder import VirtualRangefinder, VirtualSensor
+from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from springmass.cli import main
 from springmass.runs.simulating.bench import bench_position
 

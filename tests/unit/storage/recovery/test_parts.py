@@ -12,13 +12,13 @@ import pytest
 
 from acquisition.block import Flag
 from acquisition.clock import VirtualClock
-from acquisition.decoders.registry import get_family
 from springmass.cli import main
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
 from storage.run_file.reading import Run, open_run
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
+from tests.wire import line
 
 FAMILY = "line-protocol"
 SECOND_NS = 1_000_000_000
@@ -26,17 +26,9 @@ SECOND_NS = 1_000_000_000
 
 def send(recorder: Recorder, channel: int, start_s: float, seconds: float, first: int = 0) -> None:
     """Record a sensor that sends at 100 Hz; the clock of the device shows the time since reading 0."""
-    encoder = get_family(FAMILY).encoder()
     for n in range(int(100 * seconds)):
-        distance = 0.25 + 0.05 * math.cos(0.083 * n)
-        line = encoder.encode(
-            sequence=first + n,
-            device_us=10_000 * (first + n),
-            echo_us=2e6 * distance / 344,
-            distance_m=distance,
-            temperature_c=math.nan,
-        )
-        recorder.put(channel, int((start_s + n / 100) * SECOND_NS), line)
+        echo_us = 2e6 * (0.25 + 0.05 * math.cos(0.083 * n)) / 344
+        recorder.put(channel, int((start_s + n / 100) * SECOND_NS), line(first + n, echo_us))
 
 
 def event(recorder: Recorder, channel: int, at_s: float, kind: str, facts: Mapping[str, Any]) -> None:

@@ -23,7 +23,7 @@ from storage.run_file.reading import Run, open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
-from tests.wire import append
+from tests.wire import append, line
 
 FAMILY = "line-protocol"
 START_NS = 7_000_000_000
@@ -40,15 +40,11 @@ HEADER = LogHeader(
 
 def wire(count: int, seed: int = 0) -> list[tuple[int, bytes]]:
     """Return the reads of a port at which a sensor sends lines at 100 Hz: host times in ns and bytes, cut anywhere."""
-    encoder = get_family(FAMILY).encoder()
     rng = np.random.default_rng(seed)
     reads: list[tuple[int, bytes]] = []
     held = b""
     for n in range(count):
-        distance = 0.3 + 0.05 * math.sin(0.14 * n)
-        held += encoder.encode(
-            sequence=n, device_us=10_000 * n, echo_us=2e6 * distance / 344, distance_m=distance, temperature_c=math.nan
-        )
+        held += line(n, 2e6 * (0.3 + 0.05 * math.sin(0.14 * n)) / 344)
         keep = int(rng.integers(0, 20))
         reads.append((START_NS + 2_000_000_000 + 10_000_000 * n, held[: len(held) - keep]))
         held = held[len(held) - keep :]
@@ -292,14 +288,9 @@ def test_a_log_without_its_name_is_recovered_from_its_recorder(tmp_path: Path, b
 
 def test_what_a_sensor_did_not_give_is_named(tmp_path: Path) -> None:
     """A stretch without echoes and a sensor that is silent until the end are in the run file."""
-    encoder = get_family(FAMILY).encoder()
     with Recorder(tmp_path / "run.wire", HEADER, VirtualClock(START_NS)) as recorder:
         for n in range(1000):
-            echo_us = math.nan if 300 <= n < 500 else 1500.0
-            line = encoder.encode(
-                sequence=n, device_us=10_000 * n, echo_us=echo_us, distance_m=0.258, temperature_c=math.nan
-            )
-            recorder.put(0, START_NS + 10_000_000 * n, line)
+            recorder.put(0, START_NS + 10_000_000 * n, line(n, math.nan if 300 <= n < 500 else 1500.0))
         recorder.event(0, START_NS + 20_000_000_000, "ended", {"by": "seconds"})
     (made,) = recover(tmp_path / "run.wire").runs
     with open_run(made.path) as run:

@@ -17,7 +17,7 @@ from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry, event_payload, frame
 from storage.wire_log.scanning import Scan, read_log
 from tests.sampling import sampled
-from tests.wire import append, json_of, parse_log
+from tests.wire import Disk, append, json_of, parse_log
 
 HEADER = LogHeader(
     sensors=(
@@ -31,37 +31,6 @@ HEADER = LogHeader(
     title="Träger",
     version="0.1.0",
 )
-
-
-class Disk:
-    """A file in memory that takes ``room`` bytes, ``bite`` at a time, and says ``trouble`` after that."""
-
-    def __init__(self, room: int = 1 << 30, bite: int = 1 << 30, trouble: int = errno.ENOSPC) -> None:
-        self.data = bytearray()
-        self.room, self.bite, self.trouble = room, bite, trouble
-        self.sync_trouble: int | None = None
-        self.syncs: list[int] = []
-
-    def __call__(self, path: Path) -> Disk:
-        """Open."""
-        return self
-
-    def write(self, data: bytes | memoryview) -> int:
-        """Take what there is room for."""
-        taken = min(len(data), self.bite, self.room - len(self.data))
-        if taken <= 0 and self.trouble:
-            raise OSError(self.trouble, "No space left on device")
-        self.data += data[:taken]
-        return taken
-
-    def sync(self) -> None:
-        """Note how far the file was."""
-        if self.sync_trouble is not None:
-            raise OSError(self.sync_trouble, "Input/output error")
-        self.syncs.append(len(self.data))
-
-    def close(self) -> None:
-        """Nothing is held."""
 
 
 def content(record: Record) -> tuple[Any, ...]:
@@ -116,7 +85,7 @@ def test_a_failed_sync_is_never_taken_back() -> None:
     disk = Disk()
     log = WireLogWriter("run.wire", HEADER, open_file=disk)
     append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    disk.sync_trouble = errno.EIO
+    disk.sync_trouble = OSError(errno.EIO, "Input/output error")
     with pytest.raises(WriteFailed, match="could not be synced"):
         log.sync()
     disk.sync_trouble = None

@@ -1,1 +1,0 @@
-"""The simulated rangefinder, as a source of blocks or behind a pseudo-terminal; every run is reproducible."""
