@@ -29,7 +29,7 @@ WEAK = 7.0
 # Relative error of a window's sinusoid after two passes, as measured on computed records without noise (`python -m
 # tests.golden --only noise`).
 ROUNDING = 2e-6
-# Scatter relative to the amplitude; only computed records have less. The bundled recordings have 6e-3, as measured by
+# Scatter relative to the amplitude; only computed records have less. The bundled recordings have 2e-3, as measured by
 # `springmass analyse`.
 FINEST = 1e-4
 # Residuals beyond this many standard deviations are false echoes and are excluded from the fit: a normal one has a
