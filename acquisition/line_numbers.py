@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from acquisition.recordings.units import SPELLINGS
+from acquisition.units import SPELLINGS
 
 LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}

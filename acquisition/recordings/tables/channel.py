@@ -18,7 +18,7 @@ from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
 from acquisition.recordings.tables.text import says_simulated
-from acquisition.recordings.units import TIMES, Measure, time_unit
+from acquisition.units import TIMES, Measure, time_unit
 
 _LONGEST_S = 1e10
 """Times beyond three hundred years are no times."""

@@ -15,7 +15,7 @@ from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.rows import Sheet, read_rows
 from acquisition.recordings.tables.table import Column, Header, Stated, Table, names_apart, set_back, side_by_side
 from acquisition.recordings.tables.text import Text, head_lines, text_of
-from acquisition.recordings.units import NUMBER
+from acquisition.units import NUMBER
 
 _HEAD_LINES = 300
 _MOST_RUNS = 5000
