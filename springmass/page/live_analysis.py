@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.errors import AcquisitionError
 from acquisition.recordings.recording import Trap
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
@@ -20,13 +19,12 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.track import F8, Track
 from springmass.charts.chart import to_json
 from springmass.charts.run import CHARTS
-from springmass.errors import ProgramError
+from springmass.errors import Error
 from springmass.page.view import View, json_of
 from springmass.runs.json_results import picked
 from springmass.runs.loading import between
 from springmass.runs.options import Accuracy, How
 from springmass.runs.run import Run, analyse_track
-from storage.errors import StorageError
 
 LIVE_TIER: Accuracy = "fast"
 WHOLE_TIER: Accuracy = "standard"
@@ -229,7 +227,7 @@ class Watcher:
             return self._between(charts=True)
         try:
             run = Run.of(self._complete, how=How(accuracy=WHOLE_TIER, law=self._law))
-        except (AcquisitionError, StorageError, ProgramError, PipelineError) as error:
+        except Error as error:
             return {"type": "motion", "why": str(error), "accuracy": WHOLE_TIER}
         self._run = run
         return _message(run.analysis, WHOLE_TIER, self._wanted_u_s, charts=True)

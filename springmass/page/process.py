@@ -69,8 +69,6 @@ class PageProcess:
         """Send the phase of the recording to the page without waiting."""
         self._phase = phase
         self._lines.put({"phase": phase, **facts})
-        if self.failed:
-            self._close_if_ready()
 
     def ended(self) -> None:
         """Close the input of the page, which then shows the end of the recording and exits."""
@@ -131,9 +129,3 @@ class PageProcess:
             advice = "nothing has been recorded; start `springmass record` again"
         self._say(f"springmass: the page has ended ({error}); {advice}")
         self.failed = True
-        self._close_if_ready()
-
-    def _close_if_ready(self) -> None:
-        """End the program if it waits for a page that is gone."""
-        if self._phase == "ready":
-            self.requests.put({"type": "close"})

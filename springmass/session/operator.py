@@ -66,12 +66,14 @@ class Operator:
     def prepare(self) -> Trigger | None:
         """Wait until recording is requested; return the trigger to wait for, or None to start immediately.
 
-        Closed is raised if the page was closed.
+        Closed is raised if the page was closed or died.
         """
         self._tell("ready")
         since_ns = self.session.now_ns()
         while True:
             self.session.poll(LOOK_S)
+            if self.page.failed:  # nobody can ask for a recording any more
+                raise Closed
             if self.session.now_ns() - since_ns > PREVIEW_NS:
                 self.begin()
                 self._tell("ready")

@@ -12,7 +12,6 @@ from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM
 from acquisition.live.decoding import SensorChain
 from acquisition.live.firmware import MODEL, VERSION
-from acquisition.live.reader import Line
 from acquisition.live.serial_port import SerialPort
 from acquisition.live.timebase import WRAP_US
 from acquisition.readings import Reading
@@ -45,10 +44,6 @@ class Sensor:
             calibration=self.calibration,
             clock_ppm=self.clock_ppm,
         )
-
-    def line(self, channel: int) -> Line:
-        """Return how the reader talks to the sensor."""
-        return Line(self.port, channel, self.family.poll, self.family.identify)
 
     def runs_on(self, before: Reading, now: Reading) -> bool:
         """Return whether a reading continues the device's clock or counter behind a loss of a network port.

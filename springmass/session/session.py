@@ -22,7 +22,7 @@ import numpy as np
 from acquisition.block import Block
 from acquisition.clock import Clock
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
-from acquisition.live.reader import PortReader
+from acquisition.live.reader import Line, PortReader
 from pipeline.streaming import LiveMotion, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
@@ -110,7 +110,7 @@ class Session:
         A sensor that is not heard after 3 s, or after five periods of a slow sensor, raises a ProgramError that
         describes what was received instead.
         """
-        lines = [sensor.line(port) for port, sensor in enumerate(self.sensors)]
+        lines = [Line(x.port, port, x.family.poll, x.family.identify) for port, x in enumerate(self.sensors)]
         for each in lines:
             if each.greeting:
                 each.port.write(each.greeting)

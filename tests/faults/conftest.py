@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
+from types import FrameType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -191,16 +191,8 @@ def whole_numbers_of(run_file: Path) -> list[int]:
     return numbers
 
 
-@dataclass(frozen=True)
-class Bench:
-    """What a test of this folder needs."""
-
-    feeder: Callable[[], Feeder]
-    record: Callable[..., Recording]
-
-
 @pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Bench]:
+def bench(tmp_path: Path) -> Iterator[Any]:
     """Give a feeder and recordings; no process outlives the test."""
     started: list[Recording] = []
 
@@ -208,7 +200,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
         started.append(start_recording(*arguments, **options))
         return started[-1]
 
-    yield Bench(lambda: Feeder(tmp_path), record)
+    yield SimpleNamespace(feeder=lambda: Feeder(tmp_path), record=record)
     for recording in started:
         if recording.process.poll() is None:
             recording.process.kill()

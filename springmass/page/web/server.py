@@ -1,4 +1,4 @@
-"""The page's server: its files, the messages to viewers, and the few messages that they send."""
+"""The page's server: its files, its messages to viewers, the few that they send, and the address to share."""
 
 from __future__ import annotations
 
