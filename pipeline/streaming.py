@@ -53,33 +53,24 @@ class MotionAccumulator:
 
     def clear(self) -> None:
         """Discard all samples."""
-        # The buffers have twice the capacity, so samples are moved to the front once per window, not at every push.
-        self._t = np.empty(2 * self._room)
-        self._y = np.empty(2 * self._room)
-        self._flags = np.empty(2 * self._room, np.uint8)
-        self._stop = 0
+        self._columns = np.empty(0), np.empty(0), np.empty(0, np.uint8)
 
     def __len__(self) -> int:
-        return min(self._stop, self._room)
+        return self._columns[0].size
 
     def push(self, t: F8, y: F8, flags: U8) -> None:
         """Append samples: times (n,) in s, values (n,) in their unit, flags (n,)."""
-        t, y, flags = t[-self._room :], y[-self._room :], flags[-self._room :]
-        n = t.size
-        if self._stop + n > self._t.size:
-            keep = self._room - n if n < self._room else 0
-            for column in (self._t, self._y, self._flags):
-                column[:keep] = column[self._stop - keep : self._stop].copy()
-            self._stop = keep
-        for column, values in ((self._t, t), (self._y, y), (self._flags, flags)):
-            column[self._stop : self._stop + n] = values
-        self._stop += n
+        # New arrays, so that a track that was given away never changes.
+        held_t, held_y, held_flags = self._columns
+        self._columns = (
+            np.concatenate([held_t, t])[-self._room :],
+            np.concatenate([held_y, y])[-self._room :],
+            np.concatenate([held_flags, flags])[-self._room :],
+        )
 
     def track(self) -> Track:
         """Return the stored samples as a track, as a batch analysis would get them."""
-        held = slice(max(self._stop - self._room, 0), self._stop)
-        t, y, flags = self._t[held].copy(), self._y[held].copy(), self._flags[held].copy()
-        return Track(t, y, flags, self._rate_hz, clock="device")
+        return Track(*self._columns, self._rate_hz, clock="device")
 
     def value(self) -> LiveMotion | NotYet:
         """Return the motion of the stored samples, or the reason why no value is available."""

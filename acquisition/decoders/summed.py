@@ -13,6 +13,7 @@ The last two send FF FF for an invalid value. Logs of 0.2.0 may contain their re
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -24,7 +25,8 @@ from acquisition.readings import NAN, Reading
 class Form(NamedTuple):
     """The frames of a family: size, first bytes, unit of the value before the sum, its largest one, and no target.
 
-    The byte at index ``command`` is ``distance`` in a frame with a distance, ``temperature`` in one to be skipped.
+    The byte at index ``command`` is ``distance`` in a frame with a distance, ``temperature`` in one to be skipped; the
+    upper four bits of a temperature are one of ``signs``. Other bytes are ``fixed``.
     """
 
     size: int
@@ -35,6 +37,8 @@ class Form(NamedTuple):
     command: int = 0
     distance: int = 0xFF
     temperature: int = -1
+    signs: Sequence[int] = range(16)
+    fixed: tuple[tuple[int, int], ...] = ()
 
 
 class SummedDecoder(FramedDecoder):
@@ -46,11 +50,10 @@ class SummedDecoder(FramedDecoder):
 
     def _plausible(self, frame: bytes) -> bool:
         form, value = self._form, frame[-3] << 8 | frame[-2]
-        if form.size == 8 and (frame[1], frame[3]) != (0xAA, 2):  # the address may have any value
+        if any(frame[at] != byte for at, byte in form.fixed):
             return False
         if frame[form.command] == form.temperature:
-            # A temperature of the URM37 has twelve bits, and its upper four are all 1 below zero.
-            return form.size == 8 or value >> 12 in (0x0, 0xF)
+            return value >> 12 in form.signs
         return frame[form.command] == form.distance and (value <= form.farthest or value in form.no_target)
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
@@ -63,8 +66,10 @@ class SummedDecoder(FramedDecoder):
 
 # The largest value is beyond the range of every module, but its high byte is none that begins a frame.
 _FFHLS = Form(4, b"\xff", 1e-3, 10_000, (0xFFFD, 0xFFFE))
-_URM37 = Form(4, b"\x22\x11", 1e-2, 1000, (0xFFFF,), distance=0x22, temperature=0x11)
-_SEN0149 = Form(8, b"\x55", 1e-3, 12_000, (0xFFFF,), command=4, distance=0x02, temperature=0x03)
+# A temperature has twelve bits, and its upper four are all 1 below zero.
+_URM37 = Form(4, b"\x22\x11", 1e-2, 1000, (0xFFFF,), distance=0x22, temperature=0x11, signs=(0x0, 0xF))
+# The address, the third byte, may have any value.
+_SEN0149 = Form(8, b"\x55", 1e-3, 12_000, (0xFFFF,), 4, distance=0x02, temperature=0x03, fixed=((1, 0xAA), (3, 2)))
 
 FAMILIES = {
     family.name: family

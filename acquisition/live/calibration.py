@@ -125,9 +125,7 @@ def against_ruler(
         shift = float(np.sum(weight * (y - x)) / np.sum(weight))
         u_shift = float(np.sum(weight) ** -0.5)
         return Calibration(base.speed_of_sound_m_per_s, base.scale, base.offset_m + shift, base.u_scale, u_shift)
-    design = np.stack([x, np.ones_like(x)], axis=1) / u[:, None]
-    covariance = np.linalg.inv(design.T @ design)
-    scale, shift = covariance @ design.T @ (y / u)
+    (scale, shift), covariance = np.polyfit(x, y, 1, w=1.0 / u, cov="unscaled")
     if abs(scale - 1.0) > 0.1:
         raise CalibrationError(f"expected a scale within a tenth of 1, got {scale:.3g}; check the unit of the ruler")
     return Calibration(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -88,11 +87,6 @@ class Recording:
     title: str = ""
     run: str = ""
     start_time: str = ""
-
-    def blocks(self, size: int = 1024) -> Iterator[Block]:
-        """Yield the samples in blocks of at most ``size``."""
-        for start in range(0, len(self.samples), size):
-            yield self.samples[start : start + size]
 
 
 @runtime_checkable

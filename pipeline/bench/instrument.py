@@ -84,7 +84,7 @@ def _rate(track: Track) -> tuple[Estimate, str, bool]:
             f"{text}, and {limit * 1e6:.0f} ppm are all that the two can be apart: nothing is corrected, and "
             f"{half * 1e6:.0f} ppm stand in every frequency's uncertainty as the half-width of a rectangle"
         )
-        return Estimate(1.0, math.hypot(U_CRYSTAL, half / math.sqrt(3.0))), words, True
+        return _uncorrected(half), words, True
     if abs(rate) > SIGNIFICANT * math.hypot(u, math.sqrt(2.0) * U_CRYSTAL):
         span_s = float(track.t[-1] - track.t[0])
         apart_s = abs(rate) * (span_s if track.compared_s is None else min(track.compared_s, span_s))
@@ -93,15 +93,19 @@ def _rate(track: Track) -> tuple[Estimate, str, bool]:
                 f"{text}, {apart_s * 1e3:.2g} ms in all, which the host's delays may be too: nothing is corrected, and "
                 "the difference stands in every frequency's uncertainty"
             )
-            return Estimate(1.0, math.hypot(U_CRYSTAL, rate / math.sqrt(3.0))), words, False
+            return _uncorrected(rate), words, False
         words = f"{text}, more than two crystals can differ: frequencies are corrected to the host's"
         return Estimate(1.0 + rate, (1.0 + rate) * math.hypot(u, U_CRYSTAL)), words, False
+    found = Estimate(1.0, U_CRYSTAL)
     if track.held_samples:
-        u_all = math.hypot(U_CRYSTAL, min(u, limit / math.sqrt(3.0), 1.0))
-        words = f"{text}, as two crystals may: {u_all * 1e6:.0f} ppm stand in every frequency's uncertainty"
-        return Estimate(1.0, u_all), words, False
-    words = f"{text}, as two crystals may: {spec} stand in every frequency's uncertainty"
-    return Estimate(1.0, U_CRYSTAL), words, False
+        found = _uncorrected(min(math.sqrt(3.0) * u, limit, 1.0))
+        spec = f"{found.u * 1e6:.0f} ppm"
+    return found, f"{text}, as two crystals may: {spec} stand in every frequency's uncertainty", False
+
+
+def _uncorrected(half: float) -> Estimate:
+    """Return the factor 1 with the uncertainty of a crystal and of a difference of this half-width."""
+    return Estimate(1.0, math.hypot(U_CRYSTAL, half / math.sqrt(3.0)))
 
 
 def _uncompared(track: Track, limit: float, spec: str) -> tuple[Estimate, str, bool]:
@@ -113,7 +117,7 @@ def _uncompared(track: Track, limit: float, spec: str) -> tuple[Estimate, str, b
             f"{half * 1e6:.0f} ppm that they may be apart stand in every frequency's uncertainty as the half-width of "
             "a rectangle"
         )
-        return Estimate(1.0, math.hypot(U_CRYSTAL, half / math.sqrt(3.0))), words, True
+        return _uncorrected(half), words, True
     source = {"nominal": "are row numbers over the nominal rate", "host": "are the host's"}
     times = source.get(track.clock, "were measured by the device")
     return Estimate(1.0, U_CRYSTAL), f"times {times}: {spec} stand in every frequency's uncertainty", False

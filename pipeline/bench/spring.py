@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 
 # Maximum mass of an unweighed spring over the bob's; laboratory springs have 5 to 50 g for bobs of 0.1 to 0.5 kg.
@@ -36,11 +35,10 @@ def oscillating_mass_kg(spring_kg: float, load_kg: float) -> float:
     return spring_kg / (x * x)
 
 
-def unstated_spring_kg(scene: Scene) -> Estimate:
-    """Return the mass, kg, of a spring whose mass the scene does not state: 0 with an uncertainty.
+def unstated_spring_kg(bob_kg: float) -> Estimate:
+    """Return the mass, kg, of a spring that was not weighed, for a mass of the bob: 0 with an uncertainty.
 
     The uncertainty is the root mean square of a rectangular distribution from 0 to 0.3 of the bob's mass. The mean is
     not corrected for, so it is included in the uncertainty (JCGM 100:2008, F.2.4.5).
     """
-    bob_kg = 0.0 if scene.bob_mass_kg is None else scene.bob_mass_kg.value
     return Estimate(0.0, HEAVIEST_SHARE * bob_kg / math.sqrt(3.0), "kg")

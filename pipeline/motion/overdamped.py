@@ -392,7 +392,7 @@ def spring_constant(found: Overdamped, scene: Scene) -> dict[str, Estimate]:
     """Return :math:`k = \\omega_0^2 M` in N/m by name, M being the oscillating mass; empty without a bob's mass."""
     if scene.bob_mass_kg is None:
         return {}
-    spring = scene.spring_mass_kg or unstated_spring_kg(scene)
+    spring = scene.spring_mass_kg or unstated_spring_kg(scene.bob_mass_kg.value)
     mass = oscillating_mass_kg(spring.value, scene.bob_mass_kg.value + added_mass_kg(scene))
     u_mass = math.hypot(scene.bob_mass_kg.u, spring.u / 3.0)
     k = found.squared_frequency.value * mass

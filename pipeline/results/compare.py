@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.bench.scene import Scene
 from pipeline.bench.spring import HEAVIEST_SHARE, oscillating_mass_kg, unstated_spring_kg
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
@@ -137,7 +136,7 @@ def _fit(
     runs: Sequence[SpringRun], masses: Sequence[Estimate], stated: Estimate | None, mass_correlation: float
 ) -> Comparison:
     loads = np.array([mass.value for mass in masses])
-    spring = _known_spring(masses, stated)
+    spring = stated or unstated_spring_kg(float(loads.min()))
     squared = np.array([run.angular_frequency.value**2 for run in runs])
     covariance, own = shared_covariance(runs, masses, squared * _oscillating(spring.value, loads), mass_correlation)
     line = spring_line(squared, loads, covariance, spring)
@@ -219,12 +218,6 @@ def spring_line(squared: F8, loads: F8, covariance: F8, spring: Estimate) -> Spr
         constants(mass) - fit.values[0],
         np.sqrt(np.maximum(of_residual, 1e-24 * np.diag(covariance))),
     )
-
-
-def _known_spring(masses: Sequence[Estimate], stated: Estimate | None) -> Estimate:
-    """Return the mass of the spring before the comparison: the stated one, or that of an unstated spring."""
-    lightest = min(mass.value for mass in masses)
-    return stated or unstated_spring_kg(Scene(bob_mass_kg=Estimate(lightest, 0.0, "kg")))
 
 
 def _oscillating(spring_kg: float, loads: F8) -> F8:

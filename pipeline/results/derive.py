@@ -447,7 +447,7 @@ def _masses(
         spring = inputs.add("spring_mass", scene.spring_mass_kg, "B")
         return own, function_of(oscillating_mass_kg, spring, own) - own
     if scene.spring_mass_kg is None:
-        return own, inputs.add("unstated_spring_mass", unstated_spring_kg(scene), "B") / 3.0
+        return own, inputs.add("unstated_spring_mass", unstated_spring_kg(scene.bob_mass_kg.value), "B") / 3.0
     return own, None
 
 

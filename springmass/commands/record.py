@@ -17,10 +17,11 @@ import numpy as np
 from cyclopts import Parameter
 
 from acquisition.clock import SystemClock
+from acquisition.decoders.family import Family
 from acquisition.decoders.registry import get_family
-from acquisition.errors import CalibrationError
-from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration, StillPoint
+from acquisition.live.calibration import Calibration, StillPoint
 from acquisition.live.serial_port import SerialPort
+from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from pipeline.bench.air import speed_of_sound
 from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
@@ -28,7 +29,16 @@ from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.process import PageProcess
-from springmass.parameters import PartsPerMillion, Positive, ReadingsPerSecond, Whole, flag, option, output
+from springmass.parameters import (
+    PartsPerMillion,
+    Positive,
+    ReadingsPerSecond,
+    SpeedOfSound,
+    Whole,
+    flag,
+    option,
+    output,
+)
 from springmass.runs.outputs import made_now
 from springmass.runs.questions import option_words
 from springmass.runs.scenes import ask_about, read_scene
@@ -93,7 +103,7 @@ class RecordOptions:
     ruler: Annotated[
         tuple[Positive, ...], option("M", "ruler distance of the bob at rest, m; may be repeated; needs --still")
     ] = ()
-    speed_of_sound: Annotated[Positive | None, option("C", "speed of sound for echo times, m/s")] = None
+    speed_of_sound: Annotated[SpeedOfSound | None, option("C", "speed of sound for echo times, m/s")] = None
     clock_ppm: Annotated[
         PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
     ] = None
@@ -362,45 +372,34 @@ class _Bench:
 @contextlib.contextmanager
 def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> Iterator[list[Sensor]]:
     """Open the source of the recording: the named ports, or a simulated bench on a simulated port."""
-    family_options = dict(options.option)
-    names = options.sensor or ((SIMULATED_FAMILY,) if options.simulate else ())
-    for name in names:
-        get_family(name).demand_options(family_options)
+    given, names = dict(options.option), options.sensor or ((SIMULATED_FAMILY,) if options.simulate else ())
+    families = [get_family(name) for name in names]
+    for family in families:
+        family.demand_options(given)
     calibration = _calibration(options, scene)
-    if options.simulate:
-        assert scene is not None
-        with _simulated(options, names[0], scene, family_options, calibration, release) as sensor:
-            yield [sensor]
-        return
-    if len(names) not in (1, len(options.port)):
-        raise ProgramError("--sensor must be named once for all ports, or once for each in their order")
-    families = [get_family(name) for name in (names * len(options.port) if len(names) == 1 else names)]
-    sensors: list[Sensor] = []
-    try:
-        for address, family in zip(options.port, families, strict=True):
+    with contextlib.ExitStack() as opened:
+        virtual = opened.enter_context(_virtual(options, families[0], scene, release)) if options.simulate else None
+        addresses = options.port if virtual is None else (virtual.path,)
+        if len(families) not in (1, len(addresses)):
+            raise ProgramError("--sensor must be named once for all ports, or once for each in their order")
+        sensors = []
+        for address, family in zip(addresses, families * (len(addresses) // len(families)), strict=True):
             baud = options.baud or family.baud
             port = SerialPort(address, baud)
-            sensors.append(Sensor(family, port, options.rate_hz, family_options, calibration, baud, options.clock_ppm))
+            sensor = Sensor(family, port, options.rate_hz, given, calibration, baud, options.clock_ppm)
+            opened.callback(lambda each: each.port.close(), sensor)
+            sensors.append(sensor)
+        if virtual is not None:
+            virtual.start()
+            release.begin()
         yield sensors
-    finally:
-        for sensor in sensors:
-            sensor.port.close()
 
 
-@contextlib.contextmanager
-def _simulated(
-    options: RecordOptions,
-    name: str,
-    scene: Scene,
-    family_options: dict[str, Any],
-    calibration: Calibration,
-    release: Release,
-) -> Iterator[Sensor]:
+def _virtual(options: RecordOptions, family: Family, scene: Scene | None, release: Release) -> VirtualPort:
+    """Return a simulated port, on which a sensor of the family sends what it sees of the bench."""
+    assert scene is not None
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port")
-    from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
-
-    family = get_family(name)
     if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
         raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that")
@@ -412,25 +411,12 @@ def _simulated(
     finder = VirtualRangefinder(position, model, np.random.default_rng(options.seed))
     # The simulated sensor must keep sending while the session listens, waits and closes.
     seconds += (options.still or 0.0) + 60.0
-    with VirtualPort(family, finder, SystemClock(), seconds=seconds, options=family_options) as virtual:
-        port = SerialPort(virtual.path, family.baud)
-        virtual.start()
-        release.begin()
-        try:
-            yield Sensor(family, port, options.rate_hz, family_options, calibration, family.baud, options.clock_ppm)
-        finally:
-            port.close()
+    return VirtualPort(family, finder, SystemClock(), seconds=seconds, options=dict(options.option))
 
 
 def _calibration(options: RecordOptions, scene: Scene | None) -> Calibration:
     """Speed of sound by option, else from the scene's air, else the usual 344 m/s."""
-    if options.speed_of_sound is not None:
-        speed = options.speed_of_sound
-    elif scene is not None and scene.air_temperature_c is not None:
+    speed = options.speed_of_sound
+    if speed is None and scene is not None and scene.air_temperature_c is not None:
         speed = speed_of_sound(*(each.value for each in scene_air(scene)))
-    else:
-        speed = SPEED_OF_SOUND_M_PER_S
-    try:
-        return Calibration(speed_of_sound_m_per_s=speed)
-    except CalibrationError as error:
-        raise ProgramError(str(error)) from error
+    return Calibration() if speed is None else Calibration(speed_of_sound_m_per_s=speed)

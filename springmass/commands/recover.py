@@ -6,10 +6,9 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
-from acquisition.errors import CalibrationError
 from springmass.commands.options import File, Overwrite
-from springmass.errors import OK, ProgramError, suggest, tell
-from springmass.parameters import Positive, argument, option, output
+from springmass.errors import OK, suggest, tell
+from springmass.parameters import SpeedOfSound, argument, option, output
 from springmass.runs.outputs import made_now
 from springmass.stops import STOPS
 from storage.recovery.recover import recover as build
@@ -22,21 +21,18 @@ def recover(
     output: Annotated[File | None, output("RUN.h5", "run file to create (default: next to the log)")] = None,
     overwrite: Overwrite = False,
     speed_of_sound: Annotated[
-        Positive | None, option("C", "speed of sound for converting echo times, m/s (default: the log's)")
+        SpeedOfSound | None, option("C", "speed of sound for converting echo times, m/s (default: the log's)")
     ] = None,
 ) -> int:
     """Rebuild the run; the log stays."""
     STOPS.last_words = lambda: f"stopped immediately; the log stays: {log}"
-    try:
-        report = build(
-            log,
-            None if output is None else Path(output),
-            overwrite=overwrite,
-            speed_of_sound_m_per_s=speed_of_sound,
-            provenance=made_now(),
-        )
-    except CalibrationError as error:
-        raise ProgramError(str(error)) from error
+    report = build(
+        log,
+        None if output is None else Path(output),
+        overwrite=overwrite,
+        speed_of_sound_m_per_s=speed_of_sound,
+        provenance=made_now(),
+    )
     for line in report.describe():
         tell(line)
     suggest(f"springmass analyse {shlex.quote(str(report.main.path))}")

@@ -62,8 +62,7 @@ def compare_rows(rows: Sequence[Mapping[str, Any]]) -> CourseComparison:
                 groups.setdefault(getattr(run, label), []).append(run)
         for name, group in sorted(groups.items()):
             agreements.append(_agreement(quantity, name, [run for run in group if run.name not in named]))
-    counts = Counter(row["law"] for row in moving if row.get("law"))
-    laws = dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+    laws = dict(Counter(sorted(row["law"] for row in moving if row.get("law"))).most_common())
     return CourseComparison(len(runs), by, tuple(agreements), differing, disagreements, laws)
 
 

@@ -11,7 +11,7 @@ import glob
 import os
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -148,16 +148,11 @@ def about_path(recording: Path) -> Path:
     by_name = recording.with_name(f"{recording.name}.about.toml")
     if recording.suffix.lower() in RUNS:
         return by_stem
+    others = recording.parent.glob(f"{glob.escape(recording.stem)}.*")
+    namesakes = (each for each in others if each.stem == recording.stem and each.name != recording.name)
     # Path.exists would raise for a name that is too long.
-    if os.path.exists(by_name) or not os.path.exists(by_stem) or any(map(is_recording, _namesakes(recording))):
-        return by_name
-    return by_stem
-
-
-def _namesakes(recording: Path) -> Iterator[Path]:
-    for other in sorted(recording.parent.glob(f"{glob.escape(recording.stem)}.*")):
-        if other.stem == recording.stem and other.name != recording.name and other.is_file():
-            yield other
+    alone = os.path.exists(by_stem) and not any(each.is_file() and is_recording(each) for each in namesakes)
+    return by_stem if alone and not os.path.exists(by_name) else by_name
 
 
 def about_of(recording: Path) -> About:
