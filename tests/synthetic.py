@@ -9,8 +9,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LAW_TRUTHS", "Truth", "fisher_bounds", "noisy", "times"]
-
 F8 = NDArray[np.float64]
 # Of each law that takes part in the choice, coefficients of a disc like those recorded.
 LAW_TRUTHS = {

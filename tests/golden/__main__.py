@@ -2,7 +2,7 @@
 
     python -m tests.golden                  # every command line and every damaged log; exit code 1 if anything changed
     python -m tests.golden --every 20       # every twentieth of them
-    python -m tests.golden --add            # freeze the cases of `further` that the file lacks; it never overwrites one
+    python -m tests.golden --add analyse {1}/run.txt --json    # freeze one more command line; it never overwrites one
     VALUES=0.1 US=0.25 python -m tests.golden    # a value may move by 0.1 u, and a u by a quarter
 
 `--only TEXT` takes the command lines that contain a text; `--first` ends at the first difference.
@@ -19,7 +19,6 @@ from concurrent.futures import ProcessPoolExecutor
 from tempfile import TemporaryDirectory
 
 from tests.golden import damaged_logs
-from tests.golden.cases import further
 from tests.golden.golden import ALLOWED, FROZEN, Places, differences, frozen, missing, outcome, unpacked
 
 
@@ -29,14 +28,14 @@ def main() -> int:
     parser.add_argument("--every", type=int, default=1, metavar="N")
     parser.add_argument("--only", default="", metavar="TEXT")
     parser.add_argument("--first", action="store_true")
-    parser.add_argument("--add", action="store_true")
+    parser.add_argument("--add", nargs=argparse.REMAINDER, default=[], metavar="WORD")
     asked, start = parser.parse_args(), time.monotonic()
     # One thread a process: two processes already keep two cores busy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with TemporaryDirectory() as folder, ProcessPoolExecutor(int(os.environ.get("JOBS", "2"))) as pool:
         places = unpacked(folder)
         if asked.add:
-            return _add(places, pool)
+            return _add(places, asked.add)
         before = frozen()
         keys = [key for key in before if asked.only in " ".join(json.loads(key))]
         todo = [key for key in keys[:: asked.every] if not missing(places, json.loads(key))]
@@ -69,12 +68,11 @@ def main() -> int:
     return int(different > 0)
 
 
-def _add(places: Places, pool: ProcessPoolExecutor) -> int:
-    before = frozen()
-    added = [key for key in map(json.dumps, further()) if key not in before]
-    before |= dict(zip(added, pool.map(outcome, [places.filled(json.loads(key)) for key in added]), strict=True))
-    FROZEN.write_text(json.dumps(before, indent=0, ensure_ascii=False), "utf-8")
-    print(f"{len(added)} command lines added, {sum(len(before[key]) for key in added)} values")
+def _add(places: Places, words: list[str]) -> int:
+    goldens = frozen()
+    if (key := json.dumps(words)) not in goldens:
+        goldens[key] = outcome(places.filled(words))
+    FROZEN.write_text(json.dumps(goldens, indent=0, ensure_ascii=False), "utf-8")
     return 0
 
 

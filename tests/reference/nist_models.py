@@ -14,8 +14,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MODELS", "DataSet", "digits", "read"]
-
 F8 = NDArray[np.float64]
 Model = Callable[[F8, F8], F8]  # (x, b) -> y
 

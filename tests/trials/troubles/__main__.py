@@ -12,7 +12,7 @@ import warnings
 from pipeline.options import TIERS
 from tests.trials.troubles.judge import Verdict, try_one
 from tests.trials.troubles.kinds import KINDS
-from tests.trials.troubles.table import as_markdown, as_text, summed, total
+from tests.trials.troubles.table import as_markdown, beyond, summed, total
 
 
 def main() -> int:
@@ -21,7 +21,6 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="records a kind (default 20)")
     parser.add_argument("--tier", choices=TIERS, default="standard")
     parser.add_argument("--only", default="", metavar="TEXT", help="kinds whose name or cause holds this")
-    parser.add_argument("--each", action="store_true", help="a line for every record too")
     parser.add_argument("--markdown", action="store_true", help="the table as the documentation has it")
     options = parser.parse_args()
     warnings.simplefilter("error")
@@ -30,18 +29,11 @@ def main() -> int:
     for kind in chosen:
         print(kind.name, file=sys.stderr, flush=True)
         for seed in range(options.seeds):
-            verdicts.append(one := try_one(kind, seed, options.tier))
-            if options.each:
-                print(_each(one), flush=True)
+            verdicts.append(try_one(kind, seed, options.tier))
     lines = summed(chosen, verdicts)
-    print((as_markdown if options.markdown else as_text)(lines))
+    print((as_markdown if options.markdown else beyond)(lines))
     print(f"\n{options.tier}: {total(lines)}")
     return int(any(not line.holds for line in lines))
-
-
-def _each(one: Verdict) -> str:
-    numbers = ", ".join(f"{name} {g.error:+.3g} u {g.u:.2g} z {g.z:.1f}" for name, g in one.given.items())
-    return f"{one.kind} #{one.seed}: {one.word}; {numbers}; {' '.join(one.warnings)} ({' '.join(one.notes)})"
 
 
 if __name__ == "__main__":

@@ -14,14 +14,11 @@ import numpy as np
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
-from pipeline.findings.finding import Finding
 from pipeline.options import options_for
 from pipeline.track import Track
 from springmass.runs.options import How
 from springmass.runs.run import Run
 from tests.trials.troubles.record import Kind, Record
-
-__all__ = ["LIMIT", "Given", "Verdict", "clean_seconds", "try_one"]
 
 LIMIT = 4.0  # stated uncertainties beyond which a number is wrong
 
@@ -47,10 +44,8 @@ class Verdict:
     """What became of one record."""
 
     kind: str
-    seed: int
     given: Mapping[str, Given]  # the estimates that have a truth
     warnings: tuple[str, ...]  # codes of the findings that are warnings or errors
-    notes: tuple[str, ...]  # codes of the others
     refused: bool  # whether none of the estimates that have a truth was given
     named: bool  # whether a warning names the kind
     cpu_s: float
@@ -63,19 +58,9 @@ class Verdict:
         return max((one.z for one in self.given.values()), default=0.0)
 
     @property
-    def right(self) -> bool:
-        """Whether numbers are given and every one lies within the limit."""
-        return not self.refused and self.worst <= LIMIT
-
-    @property
-    def confident_wrong(self) -> bool:
-        """Whether a number is off by more than the limit and no warning names the kind."""
-        return self.worst > LIMIT and not self.named
-
-    @property
     def word(self) -> str:
-        """The verdict in a word."""
-        if self.right:
+        """The verdict in a word: right if numbers are given and every one lies within the limit."""
+        if not self.refused and self.worst <= LIMIT:
             return "right"
         if self.named:
             return "named"
@@ -83,45 +68,28 @@ class Verdict:
 
 
 def try_one(kind: Kind, seed: int, tier: str) -> Verdict:
-    """Make the record of a seed, analyse it and judge.
-
-    Parameters
-    ----------
-    kind : Kind
-    seed : int
-    tier : {"fast", "standard", "best"}
-    """
+    """Make the record of a seed, analyse it and judge."""
     record = kind.make(seed)
     began = time.process_time()
     try:
-        analysis, findings = _analysed(record, tier)
+        analysis = _analysed(record, tier)
     except AnalysisError as error:
         spent = time.process_time() - began
         # A refusal names the trouble if it does so by a finding's code; its sentence is not searched for words.
         code = getattr(error, "code", "")
-        return Verdict(
-            kind.name, seed, {}, (code,) if code else (), (), True, code in kind.codes, spent, record.t.size, tier
-        )
+        return Verdict(kind.name, {}, (code,) if code else (), True, code in kind.codes, spent, record.t.size, tier)
     spent = time.process_time() - began
-    warnings = tuple(dict.fromkeys(f.code for f in findings if f.severity != "info"))
-    notes = tuple(dict.fromkeys(f.code for f in findings if f.severity == "info"))
+    warnings = tuple(dict.fromkeys(f.code for f in analysis.findings if f.severity != "info"))
     given = _held_against(analysis, record)
     sought = [name for name in record.truth if name != "offset"]
     refused = bool(sought) and not any(name in given for name in sought)
     named = bool(kind.codes & set(warnings))
-    return Verdict(kind.name, seed, given, warnings, notes, refused, named, spent, record.t.size, tier)
+    return Verdict(kind.name, given, warnings, refused, named, spent, record.t.size, tier)
 
 
 @cache
 def clean_seconds(rows: int, tier: str) -> float:
-    """Return the processor time that a record without trouble takes at a tier, s: the least of three.
-
-    Parameters
-    ----------
-    rows : int
-        At 100 Hz.
-    tier : {"fast", "standard", "best"}
-    """
+    """Return the processor time that a record at 100 Hz without trouble takes at a tier, s: the least of three."""
     t = np.arange(rows) / 100.0
     noise = 3e-4 * np.random.default_rng(1).standard_normal(rows)
     track = Track.from_arrays(t, 0.3 + 0.05 * np.exp(-min(0.01, 3.0 / t[-1]) * t) * np.cos(8.3 * t) + noise)
@@ -133,16 +101,14 @@ def clean_seconds(rows: int, tier: str) -> float:
     return min(spent)
 
 
-def _analysed(record: Record, tier: str) -> tuple[Analysis, tuple[Finding, ...]]:
+def _analysed(record: Record, tier: str) -> Analysis:
     scene = Scene.from_mapping(record.scene)
     if record.text is None:
-        found = analyse(Track.from_arrays(record.t, record.y), scene, options_for(tier))
-        return found, found.findings
+        return analyse(Track.from_arrays(record.t, record.y), scene, options_for(tier))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial_position.txt"
         path.write_bytes(record.text)
-        found = Run.of(path, scene, How(accuracy=tier)).analysis
-        return found, found.findings
+        return Run.of(path, scene, How(accuracy=tier)).analysis
 
 
 def _held_against(analysis: Analysis, record: Record) -> dict[str, Given]:

@@ -9,8 +9,6 @@ import numpy as np
 from tests.trials.troubles import moving, rows, sensing
 from tests.trials.troubles.record import Bench, Kind, Make, Record
 
-__all__ = ["KINDS", "PLAIN", "TROUBLES"]
-
 
 def _plain(sigma_mm: float, *, echoes: float, mixed: bool) -> Make:
     """A record without trouble, but for single false echoes, of a quarter of a minute, half a one or a whole."""

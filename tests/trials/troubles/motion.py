@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["F8", "GRAVITY_M_PER_S2", "Bob", "Motion", "swing"]
-
 F8 = NDArray[np.float64]
 GRAVITY_M_PER_S2 = 9.81
 STEPS_A_PERIOD = 100

@@ -10,8 +10,6 @@ import numpy as np
 from tests.trials.troubles.motion import F8, GRAVITY_M_PER_S2, swing
 from tests.trials.troubles.record import Bench, Kind, Make, Record, Truth
 
-__all__ = ["KINDS"]
-
 
 def _eased(s: F8) -> F8:
     """A hand's way from 0 to 1."""

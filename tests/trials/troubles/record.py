@@ -11,8 +11,6 @@ import numpy as np
 
 from tests.trials.troubles.motion import F8, Bob, Motion, swing
 
-__all__ = ["CODES", "Bench", "Kind", "Make", "Record", "Truth"]
-
 # A value, or what it is where an analysis begins (s): amplitude and damping rate fall in the course of a record.
 Truth = float | Callable[[float], float]
 

@@ -10,8 +10,6 @@ import numpy as np
 from tests.trials.troubles.motion import swing
 from tests.trials.troubles.record import Bench, Kind, Make, Record
 
-__all__ = ["KINDS"]
-
 
 def _echoes(share: float, *, how: str = "anywhere", sigma_m: float = 3e-4) -> Make:
     """Distances of something else: anywhere, in clusters at the turning points, in bursts, or the same object's."""

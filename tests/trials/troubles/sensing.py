@@ -9,8 +9,6 @@ import numpy as np
 from tests.trials.troubles.motion import F8
 from tests.trials.troubles.record import Bench, Kind, Make, Record
 
-__all__ = ["KINDS"]
-
 
 def _report_twin(seed: int) -> Record:
     """Seven periods of a lab report: at the far end every crest is cut off by the echo of a fixed object."""

@@ -11,8 +11,6 @@ import numpy as np
 from tests.trials.troubles.judge import LIMIT, Verdict, clean_seconds
 from tests.trials.troubles.record import Kind
 
-__all__ = ["Line", "as_markdown", "as_text", "summed", "total"]
-
 SLOWEST = 20.0  # times what a record without trouble takes, of as many rows or of 12,000 if that is more
 CURED = 3.0  # greatest median u, over the rms error, of a kind that is to be cured
 MEASURED = 16  # records of which the rms error is known well enough to be held against that
@@ -47,11 +45,6 @@ class Line:
         return max(ratios)
 
     @property
-    def median_z(self) -> float:
-        """The median over the records of the greatest error in stated uncertainties."""
-        return float(np.median([one.worst for one in self.verdicts]))
-
-    @property
     def worst(self) -> str:
         """The estimate that is off farthest, with the most by which, of records not named."""
         off = [(g.z, name) for one in self.verdicts if not one.named for name, g in one.given.items()]
@@ -75,11 +68,6 @@ class Line:
         """Whether an analysis takes more than the limit of a record without trouble; short ones may take 12,000's."""
         times = [one.cpu_s / clean_seconds(max(one.rows, 12_000), one.tier) for one in self.verdicts]
         return float(np.median(times)) > SLOWEST
-
-    @property
-    def seconds(self) -> float:
-        """Median processor time of an analysis."""
-        return float(np.median([one.cpu_s for one in self.verdicts]))
 
     @property
     def holds(self) -> bool:
@@ -116,21 +104,15 @@ def total(lines: Sequence[Line]) -> str:
     )
 
 
-def as_text(lines: Sequence[Line]) -> str:
-    """Return the table for a terminal, the worst kinds marked."""
-    head = (
-        f"  {'kind':<42}{'n':>4}{'wrong':>6}{'right':>6}{'named':>6}{'refus':>6}{'u/rms':>7}{'|z|':>8}{'s':>7}{'x':>6}"
-    )
-    rows = [head]
+def beyond(lines: Sequence[Line]) -> str:
+    """Return a line for every kind that is beyond a limit."""
+    words = ("confident wrong", "right", "named", "refused")
+    rows = []
     for line in lines:
-        ratio, name = line.wide
-        counts = "".join(f"{line.count(w):>6}" for w in ("confident wrong", "right", "named", "refused"))
-        cure = f"{ratio:.1f}" + ("*" if line.kind.cure else " ")
-        notes = [line.worst, f"wide: {name}" if line.too_wide else "", "slow" * line.too_slow, line.warnings]
-        rows.append(
-            f"{' ' if line.holds else '!'} {line.kind.name:<42}{line.n:>4}{counts}{cure:>7}{line.median_z:>8.1f}"
-            f"{line.seconds:>7.2f}{line.slow:>6.1f}  {'; '.join(note for note in notes if note)}"
-        )
+        if not line.holds:
+            counts = ", ".join(f"{line.count(word)} {word}" for word in words)
+            notes = [counts, line.worst, f"u over rms error {line.wide}", f"time {line.slow:.1f}", line.warnings]
+            rows.append(f"{line.kind.name}: {'; '.join(filter(None, notes))}")
     return "\n".join(rows)
 
 

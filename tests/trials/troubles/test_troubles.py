@@ -9,7 +9,7 @@ import pytest
 from pipeline.options import TIERS
 from tests.trials.troubles.judge import try_one
 from tests.trials.troubles.kinds import TROUBLES
-from tests.trials.troubles.table import as_text, summed, total
+from tests.trials.troubles.table import beyond, summed, total
 
 # Times are in the table, where a kind beyond the limit is marked; no test hangs on a machine's speed.
 # Two records of each kind by default, so that the three tiers take a few minutes; SPRINGMASS_TRIALS=20 for the whole.
@@ -24,7 +24,7 @@ def test_no_number_is_confidently_wrong(tier: str) -> None:
     """One record in a hundred at most is wrong by four uncertainties and not named, and one in ten of any kind."""
     verdicts = [try_one(kind, seed, tier) for kind in TROUBLES for seed in range(SEEDS)]
     lines = summed(TROUBLES, verdicts)
-    print(f"\n{as_text(lines)}\n{tier}: {total(lines)}")
+    print(f"\n{beyond(lines)}\n{tier}: {total(lines)}")
     wrong, refused = (sum(line.count(word) for line in lines) for word in ("confident wrong", "refused"))
     assert wrong <= WRONG * len(verdicts)
     assert not [line.kind.name for line in lines if line.count("confident wrong") > max(ANY_KIND * line.n, 1)]
