@@ -15,7 +15,6 @@ from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from acquisition.readings import Read
 from springmass.session.reads import Tee
-from tests.encoders import ENCODERS
 
 SENSORS = 7
 STEP_US, STEP_NS = 10_000, 10_000_000
@@ -44,10 +43,12 @@ def line(sequence: int, device_us: int, *, target: bool = True, warm: bool = Tru
     )
 
 
-def chains(family: str = "line-protocol") -> list[SensorChain]:
+def chains() -> list[SensorChain]:
     """Return chains that differ in their calibration."""
     return [
-        SensorChain(get_family(family), rate_hz=100.0, calibration=Calibration(340.0 + i, 1.0 + 1e-3 * i, 1e-4 * i))
+        SensorChain(
+            get_family("line-protocol"), rate_hz=100.0, calibration=Calibration(340.0 + i, 1.0 + 1e-3 * i, 1e-4 * i)
+        )
         for i in range(SENSORS)
     ]
 
@@ -125,23 +126,3 @@ def test_half_lines_of_two_ports_make_no_line() -> None:
     reads = [(0, 0, text[:9]), (1, 0, text[9:]), (2, 0, text + text), (3, 0, text), (4, 0, b"x" + text)]
     found = assert_same(chains(), [reads, [(0, 1, text[9:])]], chains())
     assert [len(block) for block in found] == [1, 0, 2, 1, 1, 0, 0]
-
-
-def test_sensors_of_other_families_go_through_their_own_decoders() -> None:
-    """Lines of text between those of the line protocol, neither disturbed by the other."""
-
-    other = get_family("maxbotix-hr")
-    encoder = ENCODERS["maxbotix-hr"]()
-
-    def mixed() -> list[SensorChain]:
-        return [SensorChain(family, rate_hz=100.0) for family in (get_family("line-protocol"), other) * 3]
-
-    def text(k: int) -> bytes:
-        """Return what the other family sends."""
-        return encoder.encode(
-            sequence=k, device_us=k * STEP_US, echo_us=2900.0, distance_m=0.5 + 1e-3 * k, temperature_c=21.0
-        )
-
-    rounds = [[(i, k * STEP_NS, text(k) if i % 2 else line(k, k * STEP_US)) for k in range(20) for i in range(6)]]
-    found = assert_same(mixed(), rounds, mixed())
-    assert [len(block) for block in found] == [20] * 6

@@ -14,7 +14,7 @@ import pytest
 
 from acquisition.block import Flag
 from acquisition.recordings.identify import open_recording
-from pipeline.analyse import Analysis, Oscillation, Overdamped, Still, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.track import UNITS, Track
 from tests.sampling import sampled
 from tests.synthetic import Truth, noisy, times
@@ -91,12 +91,6 @@ def test_no_result_depends_on_the_unit(kind: str) -> None:
         for name in {"period", "damping_rate"} & expected.estimates.keys():
             other = expected.estimates[name]
             assert found.estimates[name].value == pytest.approx(other.value, rel=1e-9, abs=1e-4 * other.u)
-
-
-def test_the_records_are_of_every_kind() -> None:
-    """Oscillations, an overdamped motion and still records are among those above."""
-    kinds = {type(analyse(track(y, 1.0)).motion) for y in records().values()}
-    assert kinds == {Oscillation, Overdamped, Still}
 
 
 @pytest.mark.parametrize("lost", [False, True])
