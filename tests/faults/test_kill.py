@@ -100,7 +100,6 @@ def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, 
         lost.append(outcome.taken - len(reads))
     assert mode == "flood" or max(lost) <= 1, lost
     assert min(lost) >= 0
-    print(f"kill -9, {mode}: {kills} trials, reads lost in flight: {sum(lost)}, at most {max(lost)}")
 
 
 if __name__ == "__main__":

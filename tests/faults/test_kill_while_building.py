@@ -99,7 +99,6 @@ def test_killed_while_the_run_file_is_built_old_or_new_stands(tmp_path: Path) ->
             assert recover(log, out, overwrite=True).runs[0].samples == 800
         states.append(result == 800)
     assert {False, True} <= set(states), "the kills hit only one side"
-    print(f"kill -9 while building: {TRIALS} trials, {states.count(False)} old, {states.count(True)} new")
 
 
 if __name__ == "__main__":

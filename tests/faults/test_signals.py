@@ -104,7 +104,6 @@ def test_a_file_is_whole_or_absent_after_a_signal(tmp_path: Path) -> None:
         assert len(of_command) == TRIALS
         assert set(of_command) <= {("130", "absent"), ("130", "whole"), ("0", "whole")}
         assert ("130", "absent") in of_command, "no signal came in time"
-        print(f"{command}: {TRIALS} signals, {of_command.count(('130', 'absent'))} ended the work")
 
 
 IMPORTING = """

@@ -5,8 +5,6 @@ The masses, 200.7 g bare and 217.6 g with a disc of 102 mm, are assumed: they ar
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,31 +13,27 @@ from pipeline.bench.disc import derive_drag
 from pipeline.bench.scene import Scene
 from pipeline.dynamics.band import spread
 from pipeline.numerics.estimate import Estimate
-from pipeline.track import Track
 from springmass.runs.simulating.simulation import prepare
+from tests.recordings.test_real_runs import RECORDINGS, track_of
 
-FOLDER = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "AyushPandhi__Pandhi_Ayush_PHY224"
 ASSUMED_KG = {"bare": Estimate(0.2007, 5e-5, "kg"), "disc": Estimate(0.2176, 5e-5, "kg")}
 
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="needs ../shared/recordings")
+pytestmark = pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/recordings")
 
 
 def analysed(name: str, scene: Scene) -> Analysis:
-    """Read a MotionSensor.vi position file in plain Python, at its row numbers over 100 Hz, and analyse it."""
-    rows = [line.split("\t") for line in (FOLDER / name).read_text("utf-8").splitlines() if line[:1].isdigit()]
-    t = float(rows[0][0]) + np.arange(len(rows)) / 100.0
-    y = np.array([float(row[1]) / 100.0 for row in rows])
-    return analyse(Track(t, y, np.zeros(t.size, np.uint8), 100.0, quantum_m=4.3e-5, stated_error_m=0.00239), scene)
+    """Analyse a MotionSensor.vi position file with a scene."""
+    return analyse(track_of(f"AyushPandhi__Pandhi_Ayush_PHY224/{name}"), scene)
 
 
 def test_the_amplitude_with_a_disc_is_predicted() -> None:
     """After 60 s it lies inside the 95 % band of disc and air alone, and the band is no wider than +-30 %."""
     bare = analysed("position data.txt", Scene(bob_mass_kg=ASSUMED_KG["bare"]))
     constant = bare.estimates["spring_constant"]
-    scene = Scene.from_mapping({"disc": {"diameter_m": {"value": 0.102, "u": 5e-4}}, "air": {"temperature_c": 20.0}})
     scene = Scene.from_mapping(
         {
-            **scene.to_mapping(),
+            "disc": {"diameter_m": {"value": 0.102, "u": 5e-4}},
+            "air": {"temperature_c": 20.0},
             "bob": {"mass_kg": {"value": ASSUMED_KG["disc"].value, "u": ASSUMED_KG["disc"].u}},
             "spring": {"constant_n_per_m": {"value": constant.value, "u": constant.u}},
         }
@@ -54,8 +48,6 @@ def test_the_amplitude_with_a_disc_is_predicted() -> None:
     middle, quantiles = band.amplitude_at(np.array([60.0]))
     measured = float(motion.damping.best.amplitude(np.array([60.0]))[0])
     low, high = float(quantiles[0, 0]), float(quantiles[3, 0])
-    predicted = f"predicted {middle[0] * 1e3:.2f} ({low * 1e3:.2f} to {high * 1e3:.2f}) mm"
-    print(f"at 60 s: measured {measured * 1e3:.2f} mm, {predicted}")
     assert low < measured < high
     assert 0.7 * middle[0] < low
     assert high < 1.3 * middle[0]

@@ -22,33 +22,15 @@ HERE = Path(__file__).parent / "nist"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DataSet:
-    """One set.
-
-    Parameters
-    ----------
-    name : str
-    level : str
-        NIST's level of difficulty: lower, average or higher.
-    x : (n,) or (2, n) float64
-    y : (n,) float64
-        For Nelson the logarithm, which is what its model describes.
-    starts : (2, p) float64
-        Far and near.
-    certified, deviation : (p,) float64
-        Values and standard deviations, to eleven digits.
-    rss : float
-        Certified residual sum of squares.
-    dof : int
-    """
+    """One set; y of Nelson is the logarithm, which is what its model describes."""
 
     name: str
-    level: str
-    x: F8
+    x: F8  # (n,) or (2, n)
     y: F8
-    starts: F8
+    starts: F8  # (2, p): far and near
     certified: F8
     deviation: F8
-    rss: float
+    rss: float  # certified residual sum of squares
     dof: int
 
     def residuals(self, b: F8) -> F8:
@@ -59,7 +41,7 @@ class DataSet:
 
 def read(name: str) -> DataSet:
     """Read one set."""
-    head, *lines = (HERE / f"{name}.txt").read_text(encoding="ascii").splitlines()
+    _, *lines = (HERE / f"{name}.txt").read_text(encoding="ascii").splitlines()
     split = [line.split() for line in lines if not line.startswith("#")]
     table = np.array([row[1:] for row in split if row[0] == "p"], np.float64)
     ((rss, dof),) = (row[1:] for row in split if row[0] == "s")
@@ -67,7 +49,6 @@ def read(name: str) -> DataSet:
     x, y = data[:, 1:].T, data[:, 0]
     return DataSet(
         name=name,
-        level=head.rsplit(" ", 1)[1],
         x=x[0] if len(x) == 1 else x,
         y=np.log(y) if name == "Nelson" else y,
         starts=table[:, :2].T,
