@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import threading
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,49 +20,13 @@ from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import QUEUE_BYTES, Recorder
 from storage.run_file.reading import open_run
-from storage.wire_log.appending import LogFile, open_log_file
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry
-from storage.wire_log.scanning import read_log
 from tests.faults.conftest import frame_of
 from tests.sampling import sampled
-from tests.wire import json_of
+from tests.wire import WAIT_S, Disk, json_of, parse_log
 
 TRIALS = 50 if os.environ.get("SPRINGMASS_TRIALS") else 12
 SECOND_NS = 1_000_000_000
-WAIT_S = 120.0
-
-
-class Hanging:
-    """A real file whose writes stand still until they are let go; a sync may stand still with them."""
-
-    def __init__(self) -> None:
-        self.goes = threading.Event()
-        self.goes.set()
-        self.hangs = threading.Event()
-
-    def open(self, path: Path) -> LogFile:
-        """Open the file as a recorder does."""
-        self._file: LogFile = open_log_file(path)
-        return self
-
-    def write(self, data: bytes | memoryview) -> int:
-        """Write, when the disk goes."""
-        self._wait()
-        return self._file.write(data)
-
-    def sync(self) -> None:
-        """Sync, when the disk goes."""
-        self._wait()
-        self._file.sync()
-
-    def close(self) -> None:
-        """Close."""
-        self._file.close()
-
-    def _wait(self) -> None:
-        if not self.goes.is_set():
-            self.hangs.set()
-            assert self.goes.wait(WAIT_S)
 
 
 @dataclass(frozen=True)
@@ -101,7 +64,7 @@ def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_
     header = LogHeader(
         sensors=tuple(SensorEntry(channel, "ffhls") for channel in range(len(sensors.reads_hz))), mono_ns=0, unix_ns=0
     )
-    disk = Hanging()
+    disk = Disk()
 
     def hung(stamp_ns: int) -> bool:
         return SECOND_NS <= stamp_ns < (1.0 + hang_s) * SECOND_NS
@@ -113,15 +76,15 @@ def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_
             put[channel].append((stamp_ns, data))
             recorder.reads([(channel, stamp_ns, data)])
 
-    with Recorder(tmp_path / "run.wire", header, VirtualClock(), open_file=disk.open) as recorder:
+    with Recorder(tmp_path / "run.wire", header, VirtualClock(), open_file=disk) as recorder:
         send(recorder, 0.0, 1.0)
         recorder.drain()
-        disk.goes.clear()
+        disk.writes_pass.clear()
         send(recorder, 1.0, 1.1)
-        assert disk.hangs.wait(WAIT_S)
+        assert disk.held.wait(WAIT_S)
         send(recorder, 1.1, 1.0 + hang_s)
         status = recorder.status
-        disk.goes.set()
+        disk.writes_pass.set()
         recorder.drain()
         send(recorder, 1.0 + hang_s, 2.0 + hang_s)
     # What was put while the disk hung, but for the read that hung with it and those that went along.
@@ -131,7 +94,7 @@ def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_
         assert sum(sizes) > status.queued_bytes
     else:
         assert status.queued_bytes <= min(sum(sizes), QUEUE_BYTES)
-    records = list(read_log(tmp_path / "run.wire"))
+    records = list(parse_log(bytes(disk.data)))
     dropped = sum(demand_complete(put[channel], records, channel) for channel in put)
     assert dropped == status.dropped_records == recorder.status.dropped_records
     assert json_of(records[-1])["dropped_records"] == dropped
@@ -164,22 +127,23 @@ def swinging(number: int) -> bytes:
 
 def test_what_did_not_fit_is_a_gap_with_its_time_and_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Ten seconds beyond a small queue: the run has the event, the gap where they are missing, and says so."""
-    disk = Hanging()
+    disk = Disk()
     header = LogHeader(sensors=(SensorEntry(0, "ffhls"),), mono_ns=0, unix_ns=0)
     room = 50 * (HEAD_BYTES + 4)
-    with Recorder(tmp_path / "run.wire", header, VirtualClock(), queue_bytes=room, open_file=disk.open) as recorder:
+    with Recorder(tmp_path / "run.wire", header, VirtualClock(), queue_bytes=room, open_file=disk) as recorder:
         for number in range(400):
             if number == 100:
                 recorder.drain()
-                disk.goes.clear()
+                disk.writes_pass.clear()
             recorder.put(0, SECOND_NS * number // 10, swinging(number))
             if number == 100:
-                assert disk.hangs.wait(WAIT_S)
+                assert disk.held.wait(WAIT_S)
             if number == 249:
-                disk.goes.set()
-            if disk.goes.is_set():
+                disk.writes_pass.set()
+            if disk.writes_pass.is_set():
                 recorder.drain()
     assert recorder.status.dropped_records == 99
+    (tmp_path / "run.wire").write_bytes(disk.data)
     assert main(["recover", str(tmp_path / "run.wire")]) == 0
     with open_run(tmp_path / "run.h5") as run:
         (event,) = run.provenance["events"]

@@ -17,7 +17,7 @@ from springmass.cli import main
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
-from tests.wire import append
+from tests.wire import Disk, append
 
 KILLS = int(os.environ.get("SPRINGMASS_KILLS", "0"))
 PAGE = 4096
@@ -26,28 +26,16 @@ HEADER = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr", "COM3", 57600),), mono
 """Of a sensor without a checksum: the halves of two frames would make a value."""
 
 
-class Disk:
+class SyncedDisk(Disk):
     """A file in memory that notes how far it was at each sync."""
 
     def __init__(self) -> None:
-        self.data = bytearray()
+        super().__init__()
         self.synced: list[int] = []
-
-    def __call__(self, path: Path) -> Disk:
-        """Open."""
-        return self
-
-    def write(self, data: bytes | memoryview) -> int:
-        """Take all."""
-        self.data += data
-        return len(data)
 
     def sync(self) -> None:
         """Note how far the file is."""
         self.synced.append(len(self.data))
-
-    def close(self) -> None:
-        """Nothing is held."""
 
 
 @dataclass
@@ -62,13 +50,13 @@ class Sent:
         return [value for end, value in self.ends if end <= size]
 
 
-def recording(seed: int, log: int) -> tuple[Disk, Sent]:
+def recording(seed: int, log: int) -> tuple[SyncedDisk, Sent]:
     """Return a file with its syncs, and what was sent: reads of a few frames that are cut anywhere.
 
     Another log of the same seed has other values in the same places, so that an old block joins without a seam.
     """
     rng = np.random.default_rng(seed)
-    disk, sent = Disk(), Sent()
+    disk, sent = SyncedDisk(), Sent()
     writer = WireLogWriter("run.wire", HEADER, open_file=disk, log=log)
     values = np.random.default_rng(log).integers(301, 5000, 1500).tolist()
     stream = b"".join(b"R%04d\r" % value for value in values)
@@ -86,7 +74,7 @@ def recording(seed: int, log: int) -> tuple[Disk, Sent]:
     return disk, sent
 
 
-def after_power_loss(disk: Disk, old: bytes, rng: np.random.Generator) -> tuple[bytes, int]:
+def after_power_loss(disk: SyncedDisk, old: bytes, rng: np.random.Generator) -> tuple[bytes, int]:
     """Return what the disk holds and how much of it is safe, for power cut at some moment."""
     cut = int(rng.integers(disk.synced[0], len(disk.data) + 1))
     safe = max(synced for synced in disk.synced if synced <= cut)

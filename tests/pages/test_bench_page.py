@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import BrowserContext, Page
+from playwright.sync_api import Page
 
 import springmass
-from tests.pages.bench import OLD_RUN, opened
+from tests.pages.bench import OLD_RUN
 from tests.sampling import sampled
 
 # The old run is served once for all tests; each opens its page anew.
@@ -143,12 +142,3 @@ def test_everybody_can_read_it(replay: Page, width: int, scheme: Any) -> None:
     assert replay.evaluate("document.documentElement.scrollWidth") <= width
     if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
         replay.screenshot(path=Path(folder) / f"bench-page-{width}-{scheme}.png", full_page=True)
-
-
-@pytest.mark.trials
-def test_a_stated_law_is_named(start: Callable[..., Any], context: BrowserContext) -> None:
-    """Next to the numbers that depend on it, and in the legend of the amplitudes."""
-    program = start("page", str(OLD_RUN), "--law", "linear")
-    page = opened(context, program.address, "() => motion && motion.stated_law === 'linear'")
-    assert page.locator("#estimates", has_text="damping rate, law linear").count() == 1
-    assert page.evaluate("amplitude.panel.series.some((s) => s.role === 'law' && s.label.includes('linear'))")

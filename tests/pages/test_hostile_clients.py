@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import http.client
 import json
 import socket
-import struct
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
-from websockets.asyncio.client import connect
 
 from storage.run_file.reading import open_run
 from tests.pages.bench import LIMIT_S, OLD_RUN, Client, fit_of
@@ -87,41 +83,6 @@ def test_no_client_disturbs_a_recording(record: Callable[..., Any]) -> None:
     assert "Traceback" not in "".join(program.messages)
     assert len([line for line in program.messages if line.startswith("springmass: page:")]) <= 2
     assert ended["by"] != "the page"
-
-
-@pytest.mark.trials
-def test_a_hundred_viewers_lose_no_sample(record: Callable[..., Any]) -> None:
-    """Each gets every sample once and in order, and the recording has every reading."""
-    program = record("--lan")
-    with Client(program.address).socket() as run:
-        viewer = Client(json.loads(run.recv())["share"])
-
-    async def watch() -> list[int]:
-        opened = {
-            "uri": f"ws://{viewer.netloc}/v2/run",
-            "origin": f"http://{viewer.netloc}",
-            "additional_headers": {"Cookie": viewer.cookie},
-            "open_timeout": LIMIT_S,
-        }
-
-        async def see(run: Any) -> int:
-            count = 0
-            while count < 300:
-                message = await run.recv()
-                if isinstance(message, bytes):
-                    _, _, first, size = struct.unpack_from("<4I", message)
-                    assert first == count
-                    count += size
-            return count
-
-        async with contextlib.AsyncExitStack() as stack:
-            runs = [await stack.enter_async_context(connect(**opened)) for _ in range(100)]
-            return await asyncio.gather(*map(see, runs))
-
-    with ThreadPoolExecutor(1) as thread:  # a browser of other tests may keep a loop running in this thread
-        assert len(thread.submit(asyncio.run, watch()).result()) == 100
-    assert program.end() == 130
-    assert len(program.whole_run()) > 300
 
 
 def answers(client: Client) -> bool:

@@ -1,4 +1,4 @@
-"""A technician's session: zero, trigger, marks, selection, reload, report, and the same run again.
+"""A technician's session: zero, trigger, marks, reload, report, and the same run again.
 
 With ``SPRINGMASS_SCREENSHOTS`` naming a folder, every step leaves pictures there, in three widths, light and dark.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import BrowserContext, Page
 
 from storage.run_file.reading import open_run
-from tests.pages.bench import FITTED, PHASE, SEEN, STAGES, answer, opened, press
+from tests.pages.bench import FITTED, PHASE, SEEN, answer, opened, press
 
 WIDTHS = {1366: 768, 768: 1024, 390: 844}
 WHOLE = "() => motion && motion.accuracy === 'standard' && motion.estimates"
@@ -55,17 +54,6 @@ def look_at(page: Page, step: str) -> None:
     page.set_viewport_size(before)
 
 
-def select(page: Page, left: float, right: float) -> None:
-    """Draw over a share of the chart with the mouse."""
-    box = page.locator("#position .u-over").bounding_box()
-    assert box is not None
-    page.mouse.move(box["x"] + left * box["width"], box["y"] + 60)
-    page.mouse.down()
-    page.mouse.move(box["x"] + right * box["width"], box["y"] + 60, steps=5)
-    page.mouse.up()
-    page.wait_for_selector("#region-estimates tr[data-name='period']")
-
-
 @pytest.mark.trials
 def test_a_session_from_the_first_minute_to_the_report(
     record: Callable[..., Any], start: Callable[..., Any], context: BrowserContext
@@ -81,11 +69,9 @@ def test_a_session_from_the_first_minute_to_the_report(
     page.wait_for_function(NOT_WHILE_BUSY)
     page.wait_for_function(PHASE.format(phase="ready"))
 
-    page.evaluate(STAGES)
     press(page, "t")
     answer(page, "1 cm", "1.5")
     page.wait_for_function(PHASE.format(phase="recording"))
-    assert "ARMED: 10 mm, 1.5 s kept" in page.evaluate("stages")
     page.wait_for_function(FITTED)
     assert page.evaluate("motion.accuracy") == "fast"
     assert "Fast accuracy" in page.inner_text("#tier")
@@ -96,20 +82,6 @@ def test_a_session_from_the_first_minute_to_the_report(
     page.wait_for_function("() => state.marks.length === 1")
     page.wait_for_function(SEEN.format(count=900))
 
-    select(page, 0.3, 0.7)
-    chart, panel = page.locator("#position").bounding_box(), page.locator("#region").bounding_box()
-    assert chart is not None
-    assert panel is not None
-    assert 0 <= panel["y"] - chart["y"] - chart["height"] < 80
-    assert page.locator("#region-fits thead th").all_inner_texts()[1:] == ["Selection", "All samples so far"]
-    box = page.locator("#position .u-over").bounding_box()
-    assert box is not None
-    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 60)
-    page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 60)
-    read, count = page.inner_text("#cursor"), page.evaluate("samples[0].count")
-    assert re.search(r"from the pin at [\d.]+ s: [\d.]+ s, −?[\d.]+ mm, slope", read)
-    page.wait_for_function(f"() => samples[0].count > {count + 60}")
-    assert page.inner_text("#cursor") == read
     look_at(page, "2-recording")
 
     page.reload()

@@ -2,7 +2,7 @@
 
 ``SPRINGMASS_TRIALS=2000 pytest -m trials -s tests/trials/test_law_coverage.py`` prints the table of
 docs/explanation/accuracy.md.
-The records are decaying cosines whose amplitude is integrated here, step by step; no code of the estimators is in it.
+The records are decaying cosines whose amplitude is integrated; no code of the estimators is in it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,19 +20,12 @@ from numpy.typing import NDArray
 from pipeline.analyse import Oscillation, analyse
 from pipeline.options import options_for
 from pipeline.track import Track
+from tests.synthetic import LAW_TRUTHS, Truth, times
 
 F8 = NDArray[np.float64]
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "40"))
 AMPLITUDE_M, OMEGA = 0.05, 8.3
-DRAGS: dict[str, dict[str, float]] = {
-    "linear": {"gamma": 0.01463},
-    "quadratic": {"beta": 0.45},
-    "linear+quadratic": {"gamma": 0.0073, "beta": 0.235},
-    "friction": {"mu": 2e-4},
-    "linear+friction": {"gamma": 0.0073, "mu": 1.5e-4},
-    "quadratic+friction": {"beta": 0.3, "mu": 1e-4},
-    "power": {"c": 0.07, "n": 1.5},
-}
+DRAGS = LAW_TRUTHS
 NOTHING = {"mu": 0.0, "gamma": 0.0, "beta": 0.0, "c": 0.0, "n": 1.0}
 WITHIN = ("linear", "quadratic", "linear+quadratic")
 SECONDS, NOISES_M = (10.0, 30.0, 120.0), (3e-4, 2.39e-3)
@@ -91,29 +83,9 @@ class Cell:
         return found
 
 
-@lru_cache(maxsize=64)
-def amplitudes(drag: str, seconds: float) -> F8:
-    """Return the amplitude at every sample, m."""
-    return decayed(AMPLITUDE_M, DRAGS[drag], seconds, 100.0)
-
-
-def decayed(start_m: float, drag: Mapping[str, float], seconds: float, rate_hz: float) -> F8:
-    """Return amplitudes at a rate, m: the classical Runge-Kutta method of order 4, a step a sample."""
-    d = {**NOTHING, **drag}
-
-    def fall(a: float) -> float:
-        a = max(a, 0.0)
-        return -(d["mu"] + (d["gamma"] + d["beta"] * a) * a + d["c"] * a ** d["n"])
-
-    h, a = 1.0 / rate_hz, start_m
-    found = np.empty(round(seconds * rate_hz))
-    for i in range(found.size):
-        found[i] = a
-        k1 = fall(a)
-        k2 = fall(a + 0.5 * h * k1)
-        k3 = fall(a + 0.5 * h * k2)
-        a = max(a + h * (k1 + 2.0 * k2 + 2.0 * k3 + fall(a + h * k3)) / 6.0, 0.0)
-    return found
+def decayed(start_m: float, drag: Mapping[str, float], seconds: float, rate_hz: float = 100.0) -> F8:
+    """Return amplitudes at a rate, m."""
+    return Truth(amplitude=start_m, **drag).amplitude_at(times(seconds, rate_hz))
 
 
 def rate_of(a: float, drag: Mapping[str, float]) -> float:
@@ -131,7 +103,7 @@ def truth(drag: str) -> dict[str, float]:
 def one_record(drag: str, seconds: float, noise_m: float, seed: int) -> tuple[list[float], list[float], list[float]]:
     """Return errors, stated uncertainties and those of the fit to compare with, of one record."""
     rng = np.random.default_rng([seed, 15, *drag.encode()])
-    size = amplitudes(drag, seconds)
+    size = decayed(AMPLITUDE_M, DRAGS[drag], seconds)
     t = np.arange(size.size) / 100.0
     y = 0.22 + size * np.cos(OMEGA * t + rng.uniform(-math.pi, math.pi)) + noise_m * rng.standard_normal(t.size)
     analysis = analyse(Track.from_arrays(t, y), options=options_for("standard"))

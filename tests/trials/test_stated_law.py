@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pipeline.analyse import Oscillation, analyse
 from pipeline.options import options_for
 from pipeline.track import Track
-from tests.trials.test_law_coverage import AMPLITUDE_M, DRAGS, NOISES_M, OMEGA, SECONDS, amplitudes, decayed, rate_of
+from tests.trials.test_law_coverage import AMPLITUDE_M, DRAGS, NOISES_M, OMEGA, SECONDS, decayed, rate_of
 
 F8 = NDArray[np.float64]
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "40"))
@@ -95,7 +95,7 @@ class Cell:
 def one_record(law: str, stated: bool, seconds: float, noise_m: float, seed: int) -> tuple[float, float, bool]:
     """Return error and u of the damping rate of one recording, and whether a warning contradicts the law."""
     rng = np.random.default_rng([seed, 44, *law.encode()])
-    size = amplitudes(law, seconds)
+    size = decayed(AMPLITUDE_M, DRAGS[law], seconds)
     t = np.arange(size.size) / RATE_HZ
     y = REST_M + size * np.cos(OMEGA * t + rng.uniform(-math.pi, math.pi)) + noise_m * rng.standard_normal(t.size)
     options = options_for("standard")
