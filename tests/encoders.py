@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import binascii
 import math
 from collections.abc import Callable
 from typing import Any
@@ -16,6 +17,21 @@ TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}
 def with_sum(body: bytes) -> bytes:
     """Return bytes followed by the low eight bits of their sum."""
     return body + bytes([sum(body) & 0xFF])
+
+
+def crc16(data: bytes) -> int:
+    """Return the CRC-16/CCITT-FALSE bit by bit: polynomial 1021, begun with FFFF, nothing reflected."""
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
+    return crc
+
+
+def sealed(body: str) -> bytes:
+    """Return a line of the line protocol, as docs/reference/line-protocol.md has it."""
+    return f"${body}*{binascii.crc_hqx(body.encode(), 0xFFFF):04X}\n".encode()
 
 
 class Distances:

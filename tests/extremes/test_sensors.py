@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from binascii import crc_hqx
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -15,18 +14,14 @@ from acquisition.block import Flag
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import SensorError
 from acquisition.live.decoding import SensorChain
-from tests.encoders import ENCODERS
+from tests.encoders import ENCODERS, sealed
 
 LAST = 2**32 - 1
 STAMP = 2**63 - 1
+ENDS_US = ("0.00", "0.01", "999999.99")
 
 
-def sealed(body: str) -> bytes:
-    """A line of the line protocol whose checksum is right."""
-    return b"$" + body.encode() + b"*%04X\n" % crc_hqx(body.encode(), 0xFFFF)
-
-
-def lines(values: list[tuple[int, int, str, str]]) -> bytes:
+def lines(values: Iterable[tuple[int, int, str, str]]) -> bytes:
     """Lines of sequence, clock, echo and temperature."""
     return b"".join(sealed(f"R1,{number},{clock},{echo},{celsius},E") for number, clock, echo, celsius in values)
 
@@ -37,13 +32,7 @@ WIRES: dict[str, tuple[str, dict[str, Any], bytes]] = {
     "every end of every field": (
         "line-protocol",
         {},
-        lines(
-            list(
-                itertools.product(
-                    (0, 1, LAST), (0, 1, LAST // 2, LAST), ("0.00", "0.01", "999999.99"), ("", "99999", "-99999")
-                )
-            )
-        ),
+        lines(itertools.product((0, 1, LAST), (0, 1, LAST // 2, LAST), ENDS_US, ("", "99999", "-99999"))),
     ),
     "a clock that stands still": ("line-protocol", {}, lines([(i, 777, "1000.00", "") for i in range(300)])),
     "a clock that leaps": ("line-protocol", {}, lines([(i, i * LAST // 7 % LAST, "9.00", "") for i in range(300)])),

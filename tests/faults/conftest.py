@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 import contextlib
 import os
 import pty
@@ -23,6 +22,7 @@ import numpy as np
 import pytest
 
 from storage.run_file.reading import open_run
+from tests.encoders import sealed
 
 RATE_HZ = 100.0
 FIRST_US, STEP_US = 1000.0, 0.25
@@ -34,8 +34,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 def line_of(number: int) -> bytes:
     """Return a reading whose echo time encodes its number, in the form of docs/reference/line-protocol.md."""
-    body = f"R1,{number},{number * 10_000},{FIRST_US + STEP_US * number:.2f},2000,E".encode("ascii")
-    return b"$%s*%04X\n" % (body, binascii.crc_hqx(body, 0xFFFF))
+    return sealed(f"R1,{number},{number * 10_000},{FIRST_US + STEP_US * number:.2f},2000,E")
 
 
 def frame_of(millimetres: int) -> bytes:

@@ -7,7 +7,6 @@ for all 50.
 
 from __future__ import annotations
 
-import binascii
 import json
 import math
 import os
@@ -23,6 +22,7 @@ from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
+from tests.encoders import sealed
 from tests.faults.conftest import frame_of
 from tests.sampling import sampled
 
@@ -36,8 +36,7 @@ HELD_BYTES = 250_000
 
 def timed_line(number: int, device_us: int, distance_m: float) -> bytes:
     """One line of the line protocol, as docs/reference/line-protocol.md has it."""
-    body = f"R1,{number},{device_us % 2**32},{2e6 * distance_m / 344.0:.2f},2150,E".encode()
-    return b"$" + body + f"*{binascii.crc_hqx(body, 0xFFFF):04X}\n".encode()
+    return sealed(f"R1,{number},{device_us % 2**32},{2e6 * distance_m / 344.0:.2f},2150,E")
 
 
 def counted_line(number: int, device_us: int, distance_m: float) -> bytes:

@@ -17,6 +17,7 @@ from acquisition.live.decoding import SensorChain
 
 ROOT = Path(__file__).resolve().parents[2]
 CPU_HZ = 16e6
+ELF = "springmass_rangefinder.elf"
 NEEDED = {
     "gcc-avr": Path("/usr/bin/avr-g++"),
     "avr-libc": Path("/usr/lib/avr/include/avr/io.h"),
@@ -26,31 +27,9 @@ NEEDED = {
 }
 
 
-@dataclass(frozen=True)
-class Built:
-    """What `make` made."""
-
-    folder: Path
-
-    @property
-    def elf(self) -> Path:
-        """The firmware with its symbols."""
-        return self.folder / "springmass_rangefinder.elf"
-
-    @property
-    def hex(self) -> Path:
-        """The firmware as it is flashed."""
-        return self.folder / "springmass_rangefinder.hex"
-
-    @property
-    def bench(self) -> Path:
-        """The program that runs it."""
-        return self.folder / "bench"
-
-
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """Build firmware and bench in a folder of this process."""
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build firmware and bench; return their folder."""
     absent = [package for package, proof in NEEDED.items() if not proof.exists()]
     absent += [tool for tool in ("make", "cc", "pkg-config") if shutil.which(tool) is None]
     if absent:
@@ -60,7 +39,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
         ["make", "-C", ROOT / "firmware", f"BUILD={folder}", "all"], capture_output=True, text=True, timeout=300
     )
     assert done.returncode == 0, done.stderr
-    return Built(folder)
+    return folder
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +86,10 @@ class Emulated:
         n = len(self.lines)
         late_ns = rng.exponential(0.2e6, n) + np.where(rng.random(n) < 0.02, rng.uniform(0.0, 30e6, n), 0.0)
         stamp = 0
-        reads = []
         for (cycle, line), late in zip(self.lines, late_ns, strict=True):
             arrived = -(-self.true_ns(cycle) // 1_000_000) * 1_000_000 + int(late)
             stamp = max(stamp, arrived)  # a read that waits holds up those behind it
-            reads.append((stamp, line))
-        for host_ns, data in reads:
-            chain.take(host_ns, data)
+            chain.take(stamp, line)
         return chain, chain.block()
 
 
@@ -121,7 +97,7 @@ Emulate = Callable[..., Emulated]
 
 
 @pytest.fixture
-def emulate(built: Built, tmp_path: Path) -> Emulate:
+def emulate(built: Path, tmp_path: Path) -> Emulate:
     """Run the firmware for some seconds of its clock; options as the bench takes them, say as (s, command)."""
 
     def run(seconds: float, *, say: tuple[tuple[float, str], ...] = (), **options: object) -> Emulated:
@@ -130,7 +106,7 @@ def emulate(built: Built, tmp_path: Path) -> Emulate:
         for name, value in options.items():
             option = "--" + name.replace("_", "-")
             words.append(option if value is True else f"{option}={value}")
-        done = subprocess.run([built.bench, built.elf, *words], capture_output=True, timeout=1200)
+        done = subprocess.run([built / "bench", built / ELF, *words], capture_output=True, timeout=1200)
         assert done.returncode == 0, done.stderr.decode(errors="replace")
         _, cycles, _, ram, _, watchdog, _, all_sent = done.stdout.decode("ascii").split()
         assert int(cycles) >= seconds * CPU_HZ * 0.99

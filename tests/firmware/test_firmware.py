@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,17 +14,12 @@ from acquisition.decoders.family import Identity
 from acquisition.decoders.line_protocol import LONGEST, LineProtocolDecoder
 from acquisition.live.firmware import HEX, MODEL, VERSION
 
-from .conftest import Built, Emulate, Emulated
+from .conftest import ELF, Emulate, Emulated
 
 pytestmark = pytest.mark.trials
 
 TICK_US = 0.5
 """What an echo time may be off, us, and a ping."""
-
-
-def matched(run: Emulated) -> list[tuple[bytes, int]]:
-    """Return the status of each reading with the row of the ping it belongs to: the same number, counted from 0."""
-    return [(status, sequence) for sequence, _, _, _, status in run.readings()]
 
 
 def statuses(run: Emulated) -> str:
@@ -73,7 +69,7 @@ def test_pings_without_an_echo_are_coded(emulate: Emulate, trouble: dict[str, ob
     run = emulate(10.0, **trouble)
     demand_true_echoes(run)
     assert set(statuses(run)) == set(seen)
-    for status, row in matched(run):
+    for row, _, _, _, status in run.readings():
         kind = run.pings.kind[row]
         assert (status == b"E") == (kind == "echo"), (row, kind, status)
         assert (status == b"B") == (kind == "ignored"), (row, kind, status)
@@ -114,19 +110,8 @@ def test_a_ghost_is_scattered_by_pings_at_random_intervals(emulate: Emulate) -> 
 
 def test_commands_set_rate_gate_spread_and_name_and_are_answered(emulate: Emulate) -> None:
     """Each by a line of what it is now; one that is none by a refusal; nothing else changes."""
-    commands = (
-        "?",
-        "R125",
-        "G200,2100",
-        "J500",
-        "Nbench-3",
-        "R9",
-        "R126",
-        "G100,900",
-        "J2001",
-        "Nname that is too long",
-        "hm",
-    )
+    commands = ("?", "R125", "G200,2100", "J500", "Nbench-3")
+    commands += ("R9", "R126", "G100,900", "J2001", "Nname that is too long", "hm")
     run = emulate(4.0, say=tuple((0.5 + 0.2 * i, text) for i, text in enumerate(commands)))
     decoder = LineProtocolDecoder()
     identities = []
@@ -137,14 +122,10 @@ def test_commands_set_rate_gate_spread_and_name_and_are_answered(emulate: Emulat
             identities.append(decoder.status.identity)
     settings = {"rate_hz": 100, "near_us": 116, "far_us": 25_000, "spread_us": 0, "thermometer": 0}
     expected = [Identity(MODEL, VERSION, "", dict(settings))] * 2
-    for name, change in (
-        ("", {"rate_hz": 125}),
-        ("", {"near_us": 200, "far_us": 2100}),
-        ("", {"spread_us": 500}),
-        ("bench-3", {}),
-    ):
+    for change in ({"rate_hz": 125}, {"near_us": 200, "far_us": 2100}, {"spread_us": 500}):
         settings |= change
-        expected.append(Identity(MODEL, VERSION, name, dict(settings)))
+        expected.append(Identity(MODEL, VERSION, "", dict(settings)))
+    expected.append(Identity(MODEL, VERSION, "bench-3", settings))
     assert identities == expected
     assert dict(decoder.faults) == {
         **dict.fromkeys(decoder.faults, 0),
@@ -209,9 +190,9 @@ def test_every_line_is_as_long_as_any_other_of_its_kind(emulate: Emulate) -> Non
     assert len(lines[0]) < LONGEST
 
 
-def test_the_firmware_is_small_and_leaves_the_watchdog_alone(built: Built, emulate: Emulate) -> None:
+def test_the_firmware_is_small_and_leaves_the_watchdog_alone(built: Path, emulate: Emulate) -> None:
     """8 KiB of flash, 512 bytes of RAM with the stack; a watchdog would lock up boards with old bootloaders."""
-    table = subprocess.run(["avr-size", "-A", built.elf], capture_output=True, text=True, check=True).stdout
+    table = subprocess.run(["avr-size", "-A", built / ELF], capture_output=True, text=True, check=True).stdout
     sizes = {row.split()[0]: int(row.split()[1]) for row in table.splitlines() if row.startswith(".")}
     assert sizes[".text"] + sizes[".data"] <= 8192
     run = emulate(6.0, temperature=20.0, lost=0.02, say=((1.0, "Nbench-3"), (2.0, "G150,9000")))
@@ -219,6 +200,6 @@ def test_the_firmware_is_small_and_leaves_the_watchdog_alone(built: Built, emula
     assert run.watchdog == 0
 
 
-def test_the_hex_that_travels_is_what_the_source_makes(built: Built) -> None:
+def test_the_hex_that_travels_is_what_the_source_makes(built: Path) -> None:
     """Byte for byte, wherever it is built; `make firmware` brings it up to date."""
-    assert built.hex.read_bytes() == HEX.read_bytes()
+    assert (built / "springmass_rangefinder.hex").read_bytes() == HEX.read_bytes()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import threading
@@ -13,8 +14,10 @@ import pytest
 
 from acquisition.live.firmware import VERSION
 from storage.run_file.reading import open_run
+from storage.wire_log.records import Kind
+from tests.wire import parse_log
 
-from .conftest import Built, read_log
+from .conftest import ELF, read_log
 
 pytestmark = pytest.mark.trials
 
@@ -25,16 +28,10 @@ M_PER_US = SPEED_M_PER_S * 0.5e-6
 
 
 @pytest.fixture
-def running(built: Built, tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[bytes]]]:
+def running(built: Path, tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[bytes]]]:
     """Give a pseudo-terminal behind which the firmware runs at the pace of the clock, one echo in fifty lost."""
     link = tmp_path / "rangefinder"
-    words: list[str | Path] = [
-        built.bench,
-        built.elf,
-        f"--pty={link}",
-        f"--log={tmp_path / 'truth.log'}",
-        "--lost=0.02",
-    ]
+    words = [built / "bench", built / ELF, f"--pty={link}", f"--log={tmp_path / 'truth.log'}", "--lost=0.02"]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL) as bench:
         for _ in range(int(LIMIT_S / 0.02)):
             if link.is_symlink():
@@ -59,21 +56,17 @@ def test_record_reads_the_firmware_in_real_time(running: tuple[Path, subprocess.
     assert done.returncode == 0, done.stderr
     with open_run(out) as run:
         run.verify()
-        samples, decoding = run.samples(), run.provenance["decoding"]
+        (log,), samples, decoding = run.originals(), run.samples(), run.provenance["decoding"]
     sent = {}
     for row in read_log(tmp_path / "truth.log", 0.0, 0, 0, True).readings():
         sent[row[0]] = (row[1] * 1e-6, float(row[2]) * M_PER_US if row[2] else np.nan)
-    # Sensor times count from the first reading; which number that was, the times themselves tell.
-    at = {round(time_s * 1e6): number for number, (time_s, _) in sent.items()}
-    # A sample's time is that at which the sound met the bob; without an echo, as long behind its ping as the last.
-    ways_s = samples.distance / SPEED_M_PER_S
-    heard = np.maximum.accumulate(np.where(np.isfinite(ways_s), np.arange(ways_s.size), -1))
-    pings_s = samples.t - np.where(heard >= 0, ways_s[heard], 0.0)
-    first = _first(pings_s, samples.distance, sent)
-    start_s = sent[first][0]
-    numbers = [at.get(round((t + start_s) * 1e6)) for t in pings_s]
-    assert None not in numbers, "a time that was not sent"
-    np.testing.assert_allclose(samples.distance, [sent[number][1] for number in numbers], rtol=0, atol=1e-9)
+    wire = b"".join(record.payload for record in parse_log(log.data) if record.kind is Kind.DATA)
+    numbers = [int(number) for number in re.findall(rb"\$R1,([0-9]+),[^*\n]*\*[0-9A-F]{4}\n", wire)]
+    times_s, distances = np.array([sent[number] for number in numbers]).T
+    np.testing.assert_allclose(samples.distance, distances, rtol=0, atol=1e-9)
+    known = np.isfinite(distances)
+    heard_s = times_s + distances / SPEED_M_PER_S  # a sample's time is that at which the sound met the bob
+    np.testing.assert_allclose(np.diff(samples.t[known]), np.diff(heard_s[known]), rtol=0, atol=2e-6)
     lost = sum(gap["lost"] for gap in decoding["gaps"])
     assert numbers[-1] - numbers[0] + 1 == len(numbers) + lost, "readings are missing and it is not said"
     assert len(numbers) > 100
@@ -82,14 +75,3 @@ def test_record_reads_the_firmware_in_real_time(running: tuple[Path, subprocess.
     if "identity" in decoding:  # said every five seconds of the emulator's time
         assert decoding["identity"]["version"] == VERSION
     assert "Traceback" not in done.stderr
-
-
-def _first(t: np.ndarray, distance: np.ndarray, sent: dict[int, tuple[float, float]]) -> int:
-    """Return the number of the reading at which the run begins: the one from which the first distances go on."""
-    known = np.flatnonzero(np.isfinite(distance))[:50]
-    for number, (start_s, _) in sent.items():
-        steps = np.rint(t[known] / 0.01).astype(int)
-        there = [sent.get(number + step, (start_s, np.nan))[1] for step in steps]
-        if np.allclose(there, distance[known], rtol=0, atol=1e-9):
-            return number
-    raise AssertionError("no such distances were sent")

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from acquisition.decoders.family import Family
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.readings import Reading
-from tests.encoders import ENCODERS
+from tests.encoders import ENCODERS, crc16
 
 FAMILIES = {family.name: family for family in families()}
 MOST_PENDING = 512
@@ -44,20 +44,10 @@ def r_lines(digits: int, unit_m: float) -> Callable[[bytes], set[float]]:
     return lambda data: {int(found[1]) * unit_m for found in form.finditer(data)}
 
 
-def ccitt(data: bytes) -> int:
-    """Return the CRC-16/CCITT-FALSE, bit by bit."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
-    return crc
-
-
 def sealed_lines(data: bytes) -> set[float]:
     """Return the echo times of every line whose CRC holds."""
     found = re.finditer(rb"\$([^$*\n]*)\*([0-9A-F]{4})\r?\n", data)
-    bodies = [each[1].split(b",") for each in found if ccitt(each[1]) == int(each[2], 16)]
+    bodies = [each[1].split(b",") for each in found if crc16(each[1]) == int(each[2], 16)]
     return {float(body[3]) for body in bodies if len(body) == 6 and body[3] and body[5] == b"E"}
 
 
