@@ -12,37 +12,29 @@ from acquisition.recordings.identify import open_recording
 PANDHI = "AyushPandhi__Pandhi_Ayush_PHY224"
 
 
-PAIRS = [
-    (f"{PANDHI}/position data.txt", f"{PANDHI}/velocity data.txt", 0.00881),
-    (f"{PANDHI}/damped position.txt", f"{PANDHI}/damped velocity.txt", 0.31433),
-    ("kamjha__PHY224/position_osc.txt", "kamjha__PHY224/velocity_osc.txt", 0.32078),
-]
-
-
-@pytest.mark.parametrize(("position", "velocity", "second"), PAIRS)
-def test_a_velocity_file_alone(recordings: Path, position: str, velocity: str, second: float) -> None:
-    """Summed up, velocity is the position within two of its printed digits, but for the offset."""
-    alone = open_recording(recordings / velocity)
-    there = open_recording(recordings / position).samples.distance
+@pytest.mark.parametrize(
+    ("position", "velocity", "second"),
+    [
+        (f"{PANDHI}/position data.txt", f"{PANDHI}/velocity data.txt", 0.00881),
+        (f"{PANDHI}/damped position.txt", f"{PANDHI}/damped velocity.txt", 0.31433),
+        ("kamjha__PHY224/position_osc.txt", "kamjha__PHY224/velocity_osc.txt", 0.32078),
+    ],
+)
+def test_a_pair(recordings: Path, position: str, velocity: str, second: float) -> None:
+    """Both files of a run join without a hole; alone, summed up, velocity is the position but for the offset."""
+    there, alone = open_recording(recordings / position), open_recording(recordings / velocity)
+    pair = open_recording(recordings / position, velocity_path=recordings / velocity)
     assert alone.channel == "velocity"
-    assert alone.samples.velocity is not None
+    for each in (alone.samples.velocity, pair.samples.velocity):
+        assert each is not None
+        assert each[1] == second
     assert np.isnan(alone.samples.velocity[0])
-    assert alone.samples.velocity[1] == second
     assert alone.samples.distance[0] == 0.0
-    assert np.ptp(alone.samples.distance - there) < 2e-5
+    assert np.ptp(alone.samples.distance - there.samples.distance) < 2e-5  # two of its printed digits
     assert alone.info.quantum_m is None
     assert "offset_unknown" in {trap.code for trap in alone.traps}
     assert not alone.samples.flags.any()
-
-
-@pytest.mark.parametrize(("position", "velocity", "second"), PAIRS)
-def test_a_pair(recordings: Path, position: str, velocity: str, second: float) -> None:
-    """Both files of a run join without a hole."""
-    pair = open_recording(recordings / position, velocity_path=recordings / velocity)
-    alone = open_recording(recordings / position)
-    assert pair.samples.velocity is not None
-    np.testing.assert_array_equal(pair.samples.distance, alone.samples.distance)
-    assert pair.samples.velocity[1] == second
-    assert pair.info.quantum_m == pytest.approx(alone.info.quantum_m)
+    np.testing.assert_array_equal(pair.samples.distance, there.samples.distance)
+    assert pair.info.quantum_m == pytest.approx(there.info.quantum_m)
     assert {trap.code for trap in pair.traps} == {"nominal_clock", "stated_error_is_not_noise"}
     assert len(pair.originals) == 2

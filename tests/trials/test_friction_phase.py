@@ -45,5 +45,4 @@ def test_period_under_friction_scatters_as_its_own_uncertainty_says() -> None:
         assert isinstance(found.motion, Oscillation)
         z.append((found.estimates["period"].value - period) / found.motion.derived.statistical["period"].u)
     rms = float(np.sqrt(np.mean(np.square(z))))
-    print(f"\n{len(z)} records: rms z {rms:.2f}, mean {np.mean(z):+.2f}")
     assert rms < 1.3

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -15,60 +12,42 @@ import pytest
 from pipeline.bench.scene import Scene
 from pipeline.track import Track
 from springmass.page.live_analysis import motion_of
+from tests.synthetic import LAW_TRUTHS, Truth, times
 
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "12"))
 CRYSTAL = 50e-6
 """Half-width of what the sensor's clock may be off; the page knows no more of it."""
 LOOKS_S = np.concatenate([np.arange(4.0, 12.0, 1.0), np.geomspace(12.0, 60.0, 18)])
 RATE_HZ = 50.0
-EMPTY = Scene.from_mapping({})
 
 pytestmark = pytest.mark.trials
 
 
-def within(share: float) -> float:
-    """Return the least share of the trials that is no proof against a probability: 3 binomial deviations below it."""
-    return share - 3.0 * math.sqrt(share * (1.0 - share) / TRIALS)
+def looks(seed: int) -> list[tuple[float, dict[str, Any]]]:
+    """Return what the page tells of a bench after so many seconds each, up to where it asks for no more.
 
-
-@dataclass
-class Bench:
-    """A simulated bench: its motion by the sensor's clock, which is off by a share nobody knows."""
-
-    truth: Any
-    sigma_m: float
-    clock: float
-    noise: np.random.Generator
-    synthetic: ModuleType
-
-    def looks(
-        self, seconds: np.ndarray, enough: Callable[[dict[str, Any]], bool]
-    ) -> list[tuple[float, dict[str, Any]]]:
-        """Return what the page tells after so many seconds each, up to where that is enough to whoever looks."""
-        t = self.synthetic.times(float(seconds[-1]), RATE_HZ)
-        y = self.truth.position(t * (1.0 - self.clock)) + self.sigma_m * self.noise.standard_normal(t.size)
-        messages = []
-        for end in seconds:
-            n = round(end * RATE_HZ)
-            track = Track(t[:n], y[:n], np.zeros(n, np.uint8), RATE_HZ, clock="device")
-            messages.append((float(end), motion_of(track, EMPTY)))
-            if "stop" in messages[-1][1] and enough(messages[-1][1]["stop"]):
-                break
-        return messages
-
-
-def bench(synthetic: ModuleType, seed: int, laws: tuple[str, ...]) -> Bench:
-    """Return a bench like those of the recordings; the seed says which."""
+    The bench is like those of the recordings, and its sensor's clock is off by a share that nobody knows.
+    """
     rng = np.random.default_rng((18, seed))
-    law = laws[seed % len(laws)]
+    law = ("linear", "quadratic", "linear+quadratic")[seed % 3]
     strength = rng.uniform(0.5, 2.0)
-    truth = synthetic.Truth(
+    truth = Truth(
         amplitude=rng.uniform(0.02, 0.08),
         omega=2.0 * math.pi / rng.uniform(0.5, 1.2),
         phase=rng.uniform(-math.pi, math.pi),
-        **{name: strength * value for name, value in synthetic.LAW_TRUTHS[law].items()},
+        **{name: strength * value for name, value in LAW_TRUTHS[law].items()},
     )
-    return Bench(truth, rng.uniform(0.3e-3, 1e-3), rng.uniform(-CRYSTAL, CRYSTAL), rng.spawn(1)[0], synthetic)
+    t = times(float(LOOKS_S[-1]), RATE_HZ)
+    sigma_m, clock = rng.uniform(0.3e-3, 1e-3), rng.uniform(-CRYSTAL, CRYSTAL)
+    y = truth.position(t * (1.0 - clock)) + sigma_m * rng.spawn(1)[0].standard_normal(t.size)
+    messages = []
+    for end in LOOKS_S:
+        n = round(end * RATE_HZ)
+        track = Track(t[:n], y[:n], np.zeros(n, np.uint8), RATE_HZ, clock="device")
+        messages.append((float(end), motion_of(track, Scene())))
+        if messages[-1][1].get("stop", {}).get("more_s") == 0.0:
+            break
+    return messages
 
 
 def foretold(messages: list[tuple[float, dict[str, Any]]]) -> tuple[float, float] | None:
@@ -88,19 +67,10 @@ def foretold(messages: list[tuple[float, dict[str, Any]]]) -> tuple[float, float
     return None
 
 
-def test_the_time_foretold_comes_true(synthetic: ModuleType) -> None:
+def test_the_time_foretold_comes_true() -> None:
     """It is right within 20 % on 95 % of the benches, from when it is no longer than the recording so far."""
-    times = []
-    for seed in range(TRIALS):
-        each = bench(synthetic, seed, ("linear", "quadratic", "linear+quadratic"))
-        messages = each.looks(LOOKS_S, lambda stop: stop["more_s"] == 0.0)
-        if (pair := foretold(messages)) is not None:
-            times.append(pair)
-    predicted, took = np.array(times).T
-    right = np.abs(predicted / took - 1.0) <= 0.2
-    print(
-        f"{TRIALS} benches: of {right.size} times foretold {right.mean():.3f} within 20 %, "
-        f"ratio {np.quantile(predicted / took, [0.025, 0.5, 0.975])}"
-    )
-    assert right.size >= 0.5 * TRIALS
-    assert right.mean() >= within(0.95)
+    pairs = [pair for seed in range(TRIALS) if (pair := foretold(looks(seed))) is not None]
+    assert len(pairs) >= 0.5 * TRIALS
+    predicted, took = np.array(pairs).T
+    least = 0.95 - 3.0 * math.sqrt(0.95 * 0.05 / TRIALS)  # no proof against 95 % within three binomial deviations
+    assert np.mean(np.abs(predicted / took - 1.0) <= 0.2) >= least

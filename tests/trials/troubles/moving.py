@@ -126,14 +126,12 @@ def _at_rest_long_before(*, mu: float, gamma: float, seconds: float) -> Make:
     return make
 
 
-def _moving(
-    key: str, *, seconds: float = 20.0, names: tuple[str, ...] = (), sigma_m: float = 3e-4, **bob: float
-) -> Make:
+def _moving(key: str, *, seconds: float = 20.0, **bob: float) -> Make:
     """A bob of another law, measured well."""
 
     def make(seed: int) -> Record:
-        b = Bench(seed, key, seconds=seconds, sigma_m=sigma_m, **bob)
-        return b.record(b.distance() + b.noise(), *names)
+        b = Bench(seed, key, seconds=seconds, **bob)
+        return b.record(b.distance() + b.noise())
 
     return make
 
@@ -229,12 +227,6 @@ def _exchanging(seed: int) -> Record:
     return b.record(b.rest_m + b.motion.position(b.t) * factor + b.noise(), "period", "offset")
 
 
-def _warming_spring(seed: int) -> Record:
-    """A spring that softens in the course of the record."""
-    b = Bench(seed, "softening", seconds=60.0, drift=-1e-4)
-    return b.record(b.distance() + b.noise())
-
-
 def _warming_air(seed: int) -> Record:
     """Air that warms by several kelvin: the scale of all distances grows, 0.18 % a kelvin."""
     b = Bench(seed, "warming", seconds=120.0)
@@ -328,7 +320,7 @@ KINDS = (
     Kind(name="slack spring: by 30 %", cause="slack", make=_slack(0.30)),
     Kind(name="spring: hardens", cause="backbone", make=_moving("hard", cubic=3.0, gamma=0.02, seconds=60.0)),
     Kind(name="spring: softens with amplitude", cause="backbone", make=_moving("soft", cubic=-6.0, seconds=60.0)),
-    Kind(name="spring: warms", cause="frequency_drift", make=_warming_spring),
+    Kind(name="spring: warms", cause="frequency_drift", make=_moving("softening", seconds=60.0, drift=-1e-4)),
     Kind(name="air: warms", cause="rest_or_scale", make=_warming_air),
     Kind(name="sensor: warms", cause="rest_or_scale", make=_warming_sensor, spread=("offset",)),
     Kind(name="rest: drifts by 5 mm", cause="rest", make=_drifting_rest("line", 5e-3), cure=True, spread=("offset",)),

@@ -96,7 +96,7 @@ def _smoothed(how: str, length: float, sigma_m: float = 3e-4) -> Make:
     return make
 
 
-def _stepped(step_m: float, *, hold_hz: float | None = None, sigma_m: float = 3e-4, cure: bool = False) -> Make:
+def _stepped(step_m: float, *, hold_hz: float | None = None, sigma_m: float = 3e-4) -> Make:
     """Distances in steps, and new ones only so often."""
 
     def make(seed: int) -> Record:
@@ -111,11 +111,11 @@ def _stepped(step_m: float, *, hold_hz: float | None = None, sigma_m: float = 3e
     return make
 
 
-def _rarely(a_period: float, seconds: float = 60.0) -> Make:
+def _rarely(a_period: float) -> Make:
     """So many samples a period."""
 
     def make(seed: int) -> Record:
-        b = Bench(seed, f"rare {a_period}", seconds=seconds, rate_hz=8.3 / (2.0 * math.pi) * a_period, omega=8.3)
+        b = Bench(seed, f"rare {a_period}", seconds=60.0, rate_hz=8.3 / (2.0 * math.pi) * a_period, omega=8.3)
         return b.record(b.distance() + b.noise())
 
     return make
@@ -147,12 +147,12 @@ def _mirror(how: str, share: float) -> Make:
     return make
 
 
-def _hum(size_m: float, *, still: bool, rate_hz: float = 120.0, mains_hz: float = 50.0) -> Make:
+def _hum(size_m: float, *, still: bool) -> Make:
     """Mains hum in the distances, of a bob that swings or hangs still."""
 
     def make(seed: int) -> Record:
-        b = Bench(seed, f"hum {size_m} {still}", rate_hz=rate_hz)
-        hum = size_m * np.sin(2 * math.pi * mains_hz * b.t + b.rng.uniform(0, 6))
+        b = Bench(seed, f"hum {size_m} {still}", rate_hz=120.0)
+        hum = size_m * np.sin(2 * math.pi * 50.0 * b.t + b.rng.uniform(0, 6))
         if still:
             return Record(t=b.t, y=b.rest_m + hum + b.noise(), truth={"offset": b.rest_m})
         return b.record(b.distance() + hum + b.noise())
@@ -175,7 +175,7 @@ def _growing_noise(seed: int) -> Record:
     return b.record(d + b.noise() * np.exp((d - b.rest_m) / 0.02))
 
 
-def _coloured(rho: float, sigma_m: float = 1e-3) -> Make:
+def _coloured(rho: float) -> Make:
     """Noise of which every sample remembers the one before."""
 
     def make(seed: int) -> Record:
@@ -185,7 +185,7 @@ def _coloured(rho: float, sigma_m: float = 1e-3) -> Make:
         last = 0.0
         for k, value in enumerate(white):
             last = noise[k] = rho * last + math.sqrt(1.0 - rho * rho) * value
-        return b.record(b.distance() + sigma_m * noise[500:])
+        return b.record(b.distance() + 1e-3 * noise[500:])
 
     return make
 
