@@ -58,10 +58,10 @@ def synthetic() -> ModuleType:
 @pytest.fixture(scope="session")
 def windows() -> Callable[..., Demodulated]:
     """Return a function that makes the demodulated windows of a run from its amplitudes, phases and rests."""
-    return _windows
+    return demodulated
 
 
-def _windows(
+def demodulated(
     t: ArrayLike,
     amplitude: ArrayLike,
     *,

@@ -6,6 +6,7 @@ import contextlib
 import os
 import pty
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -85,6 +86,25 @@ def on_a_terminal(send: Send, *, polled: bool = False) -> Iterator[str]:
         sensor.stop()
         os.close(slave)
         os.close(master)
+
+
+@contextmanager
+def on_a_socket(send: Send) -> Iterator[str]:
+    """Yield the address of a server whose first connection gets what a sensor sends."""
+    sensors = []
+    with socket.create_server(("127.0.0.1", 0)) as listener, contextlib.ExitStack() as stack:
+        listener.settimeout(LIMIT_S)
+
+        def serve() -> None:
+            connection = stack.enter_context(listener.accept()[0])
+            sensors.append(Sensor(connection.fileno(), send, polled=False))
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield f"socket://127.0.0.1:{listener.getsockname()[1]}"
+        thread.join()
+        for sensor in sensors:
+            sensor.stop()
 
 
 class Feeder:

@@ -5,14 +5,10 @@ The wire forms are written here, from the pages of the sensors, and share no cod
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import grp
 import os
-import socket
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +18,18 @@ import serial
 
 from springmass.cli import main
 from storage.run_file.reading import open_run
-from tests.faults.conftest import RATE_HZ, Send, Sensor, frame_of, line_of, numbers_of, on_a_terminal, whole_numbers_of
+from tests.faults.conftest import (
+    RATE_HZ,
+    Send,
+    frame_of,
+    line_of,
+    numbers_of,
+    on_a_socket,
+    on_a_terminal,
+    whole_numbers_of,
+)
 from tests.sampling import sampled
 
-WAIT_S = 60.0
 FIRST_MM, DIFFERENT = 300, 1000
 """Binary readings count up from here in millimetres, and begin again after so many."""
 
@@ -38,25 +42,6 @@ def ffhls(number: int) -> bytes:
 def us100(number: int) -> bytes:
     """The reply of a US-100: millimetres, without a header or a checksum."""
     return bytes(divmod(FIRST_MM + number % DIFFERENT, 256))
-
-
-@contextmanager
-def on_a_socket(send: Send) -> Iterator[str]:
-    """Yield the address of a server whose first connection gets what a sensor sends."""
-    sensors = []
-    with socket.create_server(("127.0.0.1", 0)) as listener, contextlib.ExitStack() as stack:
-        listener.settimeout(WAIT_S)
-
-        def serve() -> None:
-            connection = stack.enter_context(listener.accept()[0])
-            sensors.append(Sensor(connection.fileno(), send, polled=False))
-
-        thread = threading.Thread(target=serve)
-        thread.start()
-        yield f"socket://127.0.0.1:{listener.getsockname()[1]}"
-        thread.join()
-        for sensor in sensors:
-            sensor.stop()
 
 
 def recorded(port: str, family: str, out: Path, seconds: float = 0.8) -> Any:

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
-import pty
 import re
-import socket
 import subprocess
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,7 +23,7 @@ from springmass import load, sample_data
 from springmass.cli import main
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
-from tests.faults.conftest import line_of, on_a_terminal, whole_numbers_of
+from tests.faults.conftest import line_of, on_a_socket, on_a_terminal, whole_numbers_of
 from tests.sampling import sampled
 
 RUN_S = 3.0
@@ -108,49 +105,17 @@ def test_what_comes_back_on_the_port_changes_no_reading_before(bench: Any, tmp_p
 @pytest.mark.trials
 def test_a_connection_that_says_nothing_any_more_is_a_sensor_gone(bench: Any, tmp_path: Path) -> None:
     """Over TCP: open to the end, silent for its last half; the connection is probed by the system meanwhile."""
-    out = tmp_path / "run.h5"
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        mute, over = threading.Event(), threading.Event()
-
-        def serve() -> None:
-            connection, _ = listener.accept()
-            number = 0
-            with connection, contextlib.suppress(OSError):
-                while not over.wait(0.01):
-                    if not mute.is_set():
-                        connection.sendall(line_of(number))
-                        number += 1
-
-        thread = threading.Thread(target=serve)
-        thread.start()
-        recording = bench.record(f"socket://127.0.0.1:{listener.getsockname()[1]}", out, "--seconds", "4")
+    out, mute = tmp_path / "run.h5", threading.Event()
+    with on_a_socket(lambda number: b"" if mute.is_set() else line_of(number)) as address:
+        recording = bench.record(address, out, "--seconds", "4")
         recording.until_bytes(HALF_SECOND // 2)
         mute.set()
         code = recording.ended(ANSWER_S)
-        over.set()
-        thread.join()
     assert code == 4
     whole_numbers_of(out)
 
 
-@pytest.fixture
-def terminals() -> Iterator[Callable[[], tuple[str, int]]]:
-    """Return a function that makes a port, and a descriptor that writes to it."""
-    open_: list[int] = []
-
-    def make() -> tuple[str, int]:
-        master, slave = pty.openpty()
-        open_.extend((master, slave))
-        return os.ttyname(slave), master
-
-    yield make
-    for descriptor in open_:
-        os.close(descriptor)
-
-
-def test_an_adapter_is_known_by_its_serial_number(
-    monkeypatch: pytest.MonkeyPatch, terminals: Callable[[], tuple[str, int]]
-) -> None:
+def test_an_adapter_is_known_by_its_serial_number(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is found under whatever name it came back; another on its name is opened only where it stays."""
     plugged: list[SimpleNamespace] = []
 
@@ -158,7 +123,9 @@ def test_an_adapter_is_known_by_its_serial_number(
         plugged[:] = [SimpleNamespace(device=name, description="", vid=0x0403, pid=0x6001, serial_number=number)]
 
     monkeypatch.setattr(list_ports, "comports", lambda: list(plugged))
-    (first, _), (second, sender) = terminals(), terminals()
+    stack = contextlib.ExitStack()
+    first = stack.enter_context(on_a_terminal(lambda _: b""))
+    second = stack.enter_context(on_a_terminal(lambda _: b"at its new name\n"))
     plug(first, "A1")
     port = SerialPort(first, 9600)
     plug(first, "B2")
@@ -166,8 +133,7 @@ def test_an_adapter_is_known_by_its_serial_number(
         port.reopen()
     plug(second, "A1")
     assert port.reopen() == "identified"
-    os.write(sender, b"at its new name\n")
-    assert port.read(5.0) == b"at its new name\n"
+    assert b"at its new name\n" in port.read(5.0)
     plug(first, "B2")
     for _ in range(9):
         with pytest.raises(PortError):
@@ -181,3 +147,4 @@ def test_an_adapter_is_known_by_its_serial_number(
     with pytest.raises(PortError):
         port.reopen()
     port.close()
+    stack.close()

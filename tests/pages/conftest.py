@@ -236,14 +236,3 @@ def show(page: Page) -> Callable[[Path, str], None]:
         page.goto(path.as_uri())
 
     return shown
-
-
-@pytest.fixture
-def clipped(page: Page, show: Callable[[Path, str], None]) -> Callable[[Path, str], list[str]]:
-    """Return a function that names what of a page lies outside a medium, is cut off, or is not shown."""
-
-    def outside(path: Path, width: str) -> list[str]:
-        show(path, width)
-        return list(page.evaluate(OUTSIDE))
-
-    return outside

@@ -12,7 +12,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page
 
 from springmass.report.html import script_sha256
-from tests.pages.conftest import WIDTHS
+from tests.pages.conftest import OUTSIDE, WIDTHS
 from tests.sampling import sampled
 
 NAMES = ("analyse", "course", "warned", "compare", "simulate")
@@ -23,9 +23,10 @@ PageOf = Callable[[str], Path]
 
 
 @pytest.mark.parametrize(("name", "width"), sampled(itertools.product(NAMES, WIDTHS)))
-def test_nothing_is_clipped(clipped: Callable[..., list[str]], page_of: PageOf, name: str, width: str) -> None:
+def test_nothing_is_clipped(page: Page, show: Show, page_of: PageOf, name: str, width: str) -> None:
     """Nothing lies outside the medium or is cut off, and every picture is shown."""
-    assert clipped(page_of(name), width) == []
+    show(page_of(name), width)
+    assert page.evaluate(OUTSIDE) == []
 
 
 @pytest.mark.parametrize(("name", "scheme"), sampled(itertools.product(NAMES, ("light", "dark")), 3))

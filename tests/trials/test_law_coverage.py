@@ -10,21 +10,21 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.analyse import Oscillation, analyse
+from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.options import options_for
 from pipeline.track import Track
 from tests.synthetic import LAW_TRUTHS, Truth, times
 
 F8 = NDArray[np.float64]
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "40"))
-AMPLITUDE_M, OMEGA = 0.05, 8.3
+REST_M, AMPLITUDE_M, OMEGA = 0.22, 0.05, 8.3
 DRAGS = LAW_TRUTHS
 NOTHING = {"mu": 0.0, "gamma": 0.0, "beta": 0.0, "c": 0.0, "n": 1.0}
 WITHIN = ("linear", "quadratic", "linear+quadratic")
@@ -100,13 +100,18 @@ def truth(drag: str) -> dict[str, float]:
     return {"amplitude": AMPLITUDE_M, "damping_rate": rate, "gamma": d.get("gamma", 0.0), "beta": d.get("beta", 0.0)}
 
 
+def analysed(drag: str, seconds: float, noise_m: float, seed: int, stated: str | None = None) -> Analysis:
+    """Return the analysis of one record, with or without a stated law."""
+    rng = np.random.default_rng([seed, 15, *drag.encode()])
+    t = times(seconds)
+    wave = np.cos(OMEGA * t + rng.uniform(-math.pi, math.pi))
+    y = REST_M + decayed(AMPLITUDE_M, DRAGS[drag], seconds) * wave + noise_m * rng.standard_normal(t.size)
+    return analyse(Track.from_arrays(t, y), options=replace(options_for("standard"), stated=stated))
+
+
 def one_record(drag: str, seconds: float, noise_m: float, seed: int) -> tuple[list[float], list[float], list[float]]:
     """Return errors, stated uncertainties and those of the fit to compare with, of one record."""
-    rng = np.random.default_rng([seed, 15, *drag.encode()])
-    size = decayed(AMPLITUDE_M, DRAGS[drag], seconds)
-    t = np.arange(size.size) / 100.0
-    y = 0.22 + size * np.cos(OMEGA * t + rng.uniform(-math.pi, math.pi)) + noise_m * rng.standard_normal(t.size)
-    analysis = analyse(Track.from_arrays(t, y), options=options_for("standard"))
+    analysis = analysed(drag, seconds, noise_m, seed)
     motion: Any = analysis.motion
     assert isinstance(motion, Oscillation)
     # Clock and scale are exact here: what the record's own scatter says is held against it.

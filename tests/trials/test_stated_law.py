@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -18,15 +18,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.analyse import Oscillation, analyse
-from pipeline.options import options_for
-from pipeline.track import Track
-from tests.trials.test_law_coverage import AMPLITUDE_M, DRAGS, NOISES_M, OMEGA, SECONDS, decayed, rate_of
+from pipeline.analyse import Oscillation
+from tests.trials.test_law_coverage import (
+    AMPLITUDE_M,
+    DRAGS,
+    NOISES_M,
+    OMEGA,
+    REST_M,
+    SECONDS,
+    analysed,
+    decayed,
+    rate_of,
+)
 
 F8 = NDArray[np.float64]
 TRIALS = int(os.environ.get("SPRINGMASS_TRIALS", "40"))
 LAWS = ("linear", "quadratic", "friction")
-REST_M, RATE_HZ = 0.22, 100.0
+RATE_HZ = 100.0
 MOST_WIDTH, LEAST_95 = 1.1, 0.93
 STEP = 1e-3
 """Of every parameter, for the derivatives of the bound; halved or doubled it moves no bound by a thousandth."""
@@ -94,14 +102,7 @@ class Cell:
 
 def one_record(law: str, stated: bool, seconds: float, noise_m: float, seed: int) -> tuple[float, float, bool]:
     """Return error and u of the damping rate of one recording, and whether a warning contradicts the law."""
-    rng = np.random.default_rng([seed, 44, *law.encode()])
-    size = decayed(AMPLITUDE_M, DRAGS[law], seconds)
-    t = np.arange(size.size) / RATE_HZ
-    y = REST_M + size * np.cos(OMEGA * t + rng.uniform(-math.pi, math.pi)) + noise_m * rng.standard_normal(t.size)
-    options = options_for("standard")
-    if stated:
-        options = replace(options, stated=law)
-    analysis = analyse(Track.from_arrays(t, y), options=options)
+    analysis = analysed(law, seconds, noise_m, seed, law if stated else None)
     motion: Any = analysis.motion
     assert isinstance(motion, Oscillation)
     against = any(finding.code in ("stated_law_rejected", "no_law_fits") for finding in analysis.findings)
