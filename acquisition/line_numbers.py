@@ -10,21 +10,20 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from acquisition.units import SPELLINGS
+
 LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 TIMES_US = {"us": 1.0, "ms": 1e3, "s": 1e6}
 
-_WORDS_OF_UNITS = {
-    "m": "m meter meters metre metres metro metros metri",
-    "cm": "cm cms centimeter centimeters centimetre centimetres centimetro centimetros centimetri zentimeter",
-    "mm": "mm millimeter millimeters millimetre millimetres milimetro milimetros millimetri",
-    "in": "in inch inches zoll pulgada pulgadas polegada polegadas pouce pouces",
-    "us": "us µs μs usec micros microsecond microseconds microsegundos mikrosekunden",
-    "ms": "ms msec millis millisecond milliseconds milisegundos millisekunden",
-    "s": "s sec secs second seconds seg segundos sekunden secondes",
+_OTHERS = {
     "C": "c degc °c celsius",
     "other": "f degf °f % v mv hz khz mhz pa hpa kpa mbar bar deg rad g kg n ft feet foot yd lux lx db dbm rpm baud",
 }
-UNITS = {word: unit for unit, words in _WORDS_OF_UNITS.items() for word in words.split()}
+UNITS = {
+    **{form: unit for unit in (*LENGTHS_M, *TIMES_US) for word in SPELLINGS[unit] for form in (word, f"{word}s")},
+    **{unit: unit for unit in (*LENGTHS_M, *TIMES_US)},
+    **{word: unit for unit, words in _OTHERS.items() for word in words.split()},
+}
 """Units by the words for them; ``other`` is a unit of something else, so its number is no distance."""
 
 # Words before a number, as beginnings or whole.

@@ -24,6 +24,8 @@ from acquisition.readings import carried
 
 FALSE_ECHO_M = 5e-3
 """Mean distance of the false echoes beyond the bob, m."""
+TEMPERATURE_C = 21.3
+"""Temperature that the sensor sends, at which sound has the usual 344 m/s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,10 +123,6 @@ class VirtualRangefinder:
             self._cluster_remaining = int(self._rng.integers(3, 18))
             self._cluster_m = FALSE_ECHO_M * float(self._rng.uniform(0.5, 1.5))
         return 0.0
-
-
-TEMPERATURE_C = 21.3
-"""Temperature that the sensor sends, at which sound has the usual 344 m/s."""
 
 
 class VirtualPort:

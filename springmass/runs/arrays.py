@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from acquisition import units
 from acquisition.block import Block, SourceInfo
-from acquisition.recordings import units
 from acquisition.recordings.recording import Trap
 from acquisition.recordings.tables.headings import heading_of, is_time
 from pipeline.errors import TrackError

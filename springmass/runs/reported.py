@@ -10,7 +10,7 @@ from decimal import Decimal, InvalidOperation
 
 import numpy as np
 
-from acquisition.recordings.units import measure_of, time_unit
+from acquisition.units import measure_of, time_unit
 from pipeline.analyse import Oscillation
 from pipeline.findings.finding import Finding, by_severity, word
 from pipeline.numerics.estimate import Estimate

@@ -55,17 +55,14 @@ def run_writer(
     original files, and finishes the file. Raises RunExists and WriteFailed like :func:`write_run`.
     """
     with whole_h5(Path(path), overwrite=overwrite) as file:
-        run = RunWriter(Path(path), file, sigma_m)
-        yield run
-        if not run.finished:
-            raise ValueError(f"{path}: the run file was not finished; call RunWriter.finish")
+        yield RunWriter(Path(path), file, sigma_m)
 
 
 class RunWriter:
     """Writes a run file piece by piece with one chunk of samples in memory; made by :func:`run_writer`."""
 
     def __init__(self, path: Path, file: Any, sigma_m: float | None) -> None:
-        self.path, self.finished = path, False
+        self.path = path
         self._file, self._sigma_m = file, sigma_m
         self._first: int | None = None
         self._quantity = "length"
@@ -133,7 +130,6 @@ class RunWriter:
                 **header,
             )
             _write_header(self._file, text)
-        self.finished = True
 
     def _demand_fit(self, block: Block, expected: int) -> None:
         if block.first != expected or block.first < 0:

@@ -15,6 +15,9 @@ from storage.schema import ValueRefused
 from storage.wire_log.records import HIGHEST_CHANNEL, Kind, LogHeader, Record, demand_calibration, event_content
 from storage.wire_log.scanning import FOREIGN, LogContents
 
+FIRST_NOTES, LAST_NOTES = 10_000, 100
+"""Number of marks and events that are kept; those between the first and the last ones are only counted."""
+
 
 class Part(NamedTuple):
     """A part of a sensor's data: the sensor's channel in the header, and the number of the part, counted from 1."""
@@ -64,10 +67,6 @@ class Parts:
 def goes_on(facts: Mapping[str, Any]) -> bool:
     """Return whether the part goes on after an event "reopened"."""
     return facts.get("sensor") == "continued" and "://" in str(facts.get("port", ""))
-
-
-FIRST_NOTES, LAST_NOTES = 10_000, 100
-"""Number of marks and events that are kept; those between the first and the last ones are only counted."""
 
 
 class Note(NamedTuple):

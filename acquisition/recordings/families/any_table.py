@@ -35,7 +35,7 @@ from acquisition.recordings.tables.layout import (
 )
 from acquisition.recordings.tables.table import Header
 from acquisition.recordings.tables.text import Text, decode, in_turn
-from acquisition.recordings.units import measure_of, time_unit
+from acquisition.units import measure_of, time_unit
 
 _MONITOR = re.compile(
     r"^\[?(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]+)?(\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)(?:[^\S\n]*->|\])[^\S\n]*",

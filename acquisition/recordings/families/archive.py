@@ -24,13 +24,13 @@ from acquisition.recordings.tables.text import HEAD_BYTES
 MOST_BYTES = 1 << 28
 """Maximum unpacked size of all parts of a file, bytes; one hour of a phone's sensor data takes a tenth of it."""
 _MAGIC = b"PK\x03\x04"
-_NOT_INSIDE = ("motion-sensor", "workbook", "zip")  # the first sums velocities only in a file of its own
+NOT_INSIDE = ("motion-sensor", "workbook", "zip")  # the first sums velocities only in a file of its own
 _MOST_MEMBERS = 2000
 _DAMAGE = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError, ValueError)
 """Exceptions that zipfile raises for damaged or encrypted files and for unknown kinds of compression."""
 
 
-def tables_of_parts(
+def _tables_of_parts(
     path: str, parts: Iterable[tuple[str, Callable[[], Sequence[Table]] | None]], what: str
 ) -> list[Table]:
     """Return the tables of all parts of a file: each part is a run, unless there is only one.
@@ -112,14 +112,22 @@ def _evidence(head: bytes) -> str:
     return "it begins with the bytes of a zip archive" if head.startswith(_MAGIC) and not others else ""
 
 
-def _tables(path: str, data: bytes) -> list[Table]:
-    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in _NOT_INSIDE]
+def tables_inside(
+    path: str, parts: Iterable[tuple[str, bytes]], what: str, but: Sequence[str] = NOT_INSIDE
+) -> list[Table]:
+    """Return the tables of all parts of a file, given by name and content and read by their formats but for some."""
+    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.name not in but]
 
     def reader(name: str, data: bytes) -> Callable[[], Sequence[Table]] | None:
         family = next((each for each in families if each.recognises(data[:HEAD_BYTES])), None)
-        return None if family is None else partial(family.tables, f"{path}, file {name}", data)
+        return None if family is None else partial(family.tables, f"{path}, {what} {name}", data)
 
-    return tables_of_parts(path, ((name, reader(name, part)) for name, part in members(path, data)), "file")
+    return _tables_of_parts(path, ((name, reader(name, data)) for name, data in parts), what)
 
 
-FORMAT = ColumnFormat("zip", "a zip archive of recordings, each a run: phyphox's CSV export", _evidence, _tables)
+FORMAT = ColumnFormat(
+    "zip",
+    "a zip archive of recordings, each a run: phyphox's CSV export",
+    _evidence,
+    lambda path, data: tables_inside(path, members(path, data), "file"),
+)

@@ -14,8 +14,8 @@ from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.table import Header
-from acquisition.recordings.units import TIMES, time_unit
 from acquisition.regular_file import open_regular_text
+from acquisition.units import TIMES, time_unit
 
 
 class _Column(msgspec.Struct, forbid_unknown_fields=True):

@@ -31,7 +31,7 @@ from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.layout import columns_of, find_table, runs_forward
 from acquisition.recordings.tables.table import Header, Table
-from acquisition.recordings.units import LENGTHS
+from acquisition.units import LENGTHS
 
 _TITLE = "motion sensor data file"
 _UNIT = rf"\(({'|'.join(LENGTHS)})"

@@ -1,7 +1,7 @@
 """Workbooks, xlsx and xls (python-calamine): every sheet with rows of numbers is a run.
 
-Cells are binary numbers without printed decimals; a column has as many decimals as its longest number needs for the
-fifteen digits that a workbook shows. Times of day and dates are separate types of cells. A file of a few bytes can make
+Cells are binary numbers; they are printed with as many decimals as the longest number of their column needs for the
+fifteen digits that a workbook shows, and read like a text. A file of a few bytes can make
 calamine reserve any amount of memory, and crash its process if there is not enough, so calamine runs in a child process
 with limits of time and memory.
 """
@@ -11,21 +11,18 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
-from functools import partial
 
 from acquisition.errors import FormatError
 from acquisition.recordings.families import workbook_child
-from acquisition.recordings.families.archive import tables_of_parts
-from acquisition.recordings.identify import foreign_format, formats
-from acquisition.recordings.tables.format import ColumnFormat, tables_of_text
-from acquisition.recordings.tables.rows import Sheet
+from acquisition.recordings.families.archive import NOT_INSIDE, tables_inside
+from acquisition.recordings.identify import foreign_format
+from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.table import Table
 
 MOST_BYTES = 1 << 27
 """Maximum size of a workbook, bytes."""
 MOST_LETTERS = 1 << 27
-"""Maximum number of characters of all cells; a number counts as eight."""
+"""Maximum number of characters of all cells."""
 MEMORY_BYTES = 1 << 30
 """Memory limit of the child process, bytes: a million rows of three columns take 600 MB."""
 TIME_LIMIT_S = 60.0
@@ -34,7 +31,6 @@ TIME_LIMIT_S = 60.0
 _ZIP = b"PK\x03\x04"
 _OLE = bytes.fromhex("d0cf11e0a1b11ae1")
 _REMEDY = "export the sheet as CSV"
-_HEAD_LINES = 300
 
 
 def _evidence(head: bytes) -> str:
@@ -47,18 +43,11 @@ def _evidence(head: bytes) -> str:
 def _tables(path: str, data: bytes) -> list[Table]:
     if len(data) > MOST_BYTES:
         raise FormatError(path, f"expected a workbook of at most {MOST_BYTES} bytes, got {len(data)}", _REMEDY)
-    families = [each for each in formats() if isinstance(each, ColumnFormat) and each.header is not None]
-
-    def reader(name: str, sheet: Sheet) -> Callable[[], list[Table]] | None:
-        lines = sheet.head(_HEAD_LINES)
-        header = next((each.header for each in families if lines and each.header and each.header(lines)), None)
-        return None if header is None else partial(tables_of_text, f"{path}, sheet {name}", sheet, header, "rows")
-
-    return tables_of_parts(path, ((name, reader(name, sheet)) for name, sheet in _sheets(path, data)), "sheet")
+    return tables_inside(path, _sheets(path, data), "sheet", (*NOT_INSIDE, "sketch"))
 
 
-def _sheets(path: str, data: bytes) -> list[tuple[str, Sheet]]:
-    """Return the name and the cells of every sheet, as read by the child process."""
+def _sheets(path: str, data: bytes) -> list[tuple[str, bytes]]:
+    """Return the name of every sheet and its cells as text between tabs, as read by the child process."""
     # With -P the folder of the script is not searched for modules. subprocess also works inside a worker of a pool.
     command = [sys.executable, "-P", workbook_child.__file__, str(MEMORY_BYTES), str(MOST_LETTERS)]
     try:
@@ -77,7 +66,7 @@ def _sheets(path: str, data: bytes) -> list[tuple[str, Sheet]]:
         raise foreign_format(path, b"") or FormatError(
             path, f"calamine cannot read it ({answer['refused'][:200]})", _REMEDY
         )
-    return [(name, Sheet(tuple(map(tuple, columns)))) for name, columns in answer["sheets"]]
+    return [(name, text.encode("utf-8", "replace")) for name, text in answer["sheets"]]
 
 
 FORMAT = ColumnFormat(

@@ -4,7 +4,8 @@ This file is run as a script, by its path. It imports neither numpy nor the pack
 between a checkout and a wheel, so that it starts in a few hundredths of a second. Its arguments are the memory limit,
 in bytes, and the maximum number of characters to write.
 
-The JSON is ``{"sheets": [[name, columns], ...]}``, each column a list of numbers and texts, or ``{"refused": reason}``.
+The JSON is ``{"sheets": [[name, text], ...]}``, each text with a line for each row and tabs between its cells, or
+``{"refused": reason}``.
 """
 
 from __future__ import annotations
@@ -17,28 +18,36 @@ import sys
 from typing import Any
 
 _DIGITS = 15
-_BLANK = str.maketrans("\t\r\n", "   ")
+_MOST_DECIMALS = 12  # a column whose numbers need more decimals has exponents
+_BLANK = str.maketrans('\t\r\n"', "   '")
 
 Cell = float | str
 
 
-def read_sheets(data: bytes, most_letters: int) -> list[tuple[str, list[list[Cell]]]]:
-    """Return the name and the columns of every sheet; raise an error if all texts together have too many characters."""
+def read_sheets(data: bytes, most_letters: int) -> list[tuple[str, str]]:
+    """Return the name and the text of every sheet; raise an error if all texts together have too many characters."""
     from python_calamine import CalamineWorkbook
 
     book = CalamineWorkbook.from_object(io.BytesIO(data))
     sheets = []
     letters = 0
     for name in book.sheet_names:
-        rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
-        columns = []
-        for column in zip(*rows, strict=True):
-            columns.append([_plain(cell) for cell in column])
-            letters += sum(len(cell) if isinstance(cell, str) else 8 for cell in columns[-1])
+        columns: list[Any] = [*zip(*book.get_sheet_by_name(name).to_python(skip_empty_area=False), strict=True)]
+        for at, column in enumerate(columns):  # in place, so that the cells that were printed need no memory
+            columns[at] = _printed([_plain(cell) for cell in column])
+            letters += sum(map(len, columns[at]))
             if letters > most_letters:
                 raise ValueError("its cells are too many or too long")
-        sheets.append((name, columns))
+        sheets.append((name, "".join("\t".join(row) + "\n" for row in zip(*columns, strict=True))))
     return sheets
+
+
+def _printed(column: list[Cell]) -> list[str]:
+    """Return the cells of a column as text, its numbers with the same number of decimals."""
+    numbers = [f"{cell:.{_DIGITS}g}" for cell in column if not isinstance(cell, str)]
+    most = max((_DIGITS if "e" in each else len(each.partition(".")[2]) for each in numbers), default=0)
+    form = f".{most}f" if most <= _MOST_DECIMALS else f".{_DIGITS - 1}e"
+    return [cell if isinstance(cell, str) else format(cell, form) for cell in column]
 
 
 def _plain(cell: object) -> Cell:

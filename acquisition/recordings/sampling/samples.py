@@ -83,17 +83,6 @@ def place(rows: Rows, timing: Timing) -> F8:
     return place_unread(t, unread, grid) if unread.any() else t
 
 
-def flags_of(t: F8, value: F8, unread: B1, rate_hz: float) -> U8:
-    """Return the flags for faults in the times and values."""
-    flags = time_flags(t, 1.0 / rate_hz)
-    missing = np.isnan(value)
-    if missing.any():
-        flags[missing] |= Flag.MISSING.value
-    if unread.any():
-        flags[unread] |= UNREAD_FLAGS
-    return flags
-
-
 def row_traps(rows: Rows, timed: B1, zeros: int) -> Iterator[Trap]:
     """Report the rows that could not be read; ``timed`` marks the rows with a time, which become samples."""
     if zeros:

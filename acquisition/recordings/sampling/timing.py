@@ -17,6 +17,14 @@ from acquisition.recordings.recording import Trap
 _USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
 _SHARE_ON_GRID = 0.5
 _PROBE = 2048
+_PLACEHOLDER_S = 1.0  # the step that LabVIEW writes if no rate was set
+_SHARE_OF_JITTER = 0.2
+_ANY_RATE_HZ = 100.0  # an example: the rate of many sensors
+_FEWEST_BURSTS = 20  # minimum number of bursts for which their interval can be determined
+_SHORT_STEP = 0.25  # maximum step within a burst, relative to the mean step
+_CLEAR_STEPS = 0.95  # minimum share of steps that are clearly within a burst or between two bursts
+_REGULAR_INTERVALS = 0.9  # minimum share of intervals that differ from the median by less than half of it
+_SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; two rows may be two sensors
 
 
 class Grid(NamedTuple):
@@ -98,16 +106,6 @@ def _mean_step(apart: F8, resolution: float) -> tuple[float, float]:
         if steps_in_all * relative_u < 0.5 <= steps_in_all:
             step, relative_u = length / round(steps_in_all), resolution / length
     return step, relative_u
-
-
-_PLACEHOLDER_S = 1.0  # the step that LabVIEW writes if no rate was set
-_SHARE_OF_JITTER = 0.2
-_ANY_RATE_HZ = 100.0  # an example: the rate of many sensors
-_FEWEST_BURSTS = 20  # minimum number of bursts for which their interval can be determined
-_SHORT_STEP = 0.25  # maximum step within a burst, relative to the mean step
-_CLEAR_STEPS = 0.95  # minimum share of steps that are clearly within a burst or between two bursts
-_REGULAR_INTERVALS = 0.9  # minimum share of intervals that differ from the median by less than half of it
-_SAME_TIME = 3.0  # minimum rows per burst if all its rows have the same time; two rows may be two sensors
 
 
 def snap(t: F8, grid: Grid, resolution: float) -> tuple[F8, B1]:

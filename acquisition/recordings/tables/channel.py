@@ -12,13 +12,21 @@ import numpy as np
 from acquisition.block import B1, F8, I8, U8, Block, ClockKind, Flag, Kind, SourceInfo
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Original, Recording, Trap
-from acquisition.recordings.sampling.samples import flags_of, line_of, place, row_traps, sample_traps, value_traps
+from acquisition.recordings.sampling.samples import (
+    UNREAD_FLAGS,
+    line_of,
+    place,
+    row_traps,
+    sample_traps,
+    time_flags,
+    value_traps,
+)
 from acquisition.recordings.sampling.timing import Rows, Timing, find_timing
 from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
 from acquisition.recordings.tables.text import says_simulated
-from acquisition.recordings.units import TIMES, Measure, time_unit
+from acquisition.units import TIMES, Measure, time_unit
 
 _LONGEST_S = 1e10
 """Times beyond three hundred years are no times."""
@@ -109,7 +117,9 @@ def read_samples(
         problem = f'expected numbers as "{column.name}", got NaN in all {value.size} rows'
         raise FormatError(path, problem, "record the run again", line=line_of(rows.lines, 0))
     lines = None if rows.lines is None else rows.lines[timed]
-    flags = flags_of(t, value, unread[timed], timing.rate_hz)
+    flags = time_flags(t, 1.0 / timing.rate_hz)
+    flags[np.isnan(value)] |= Flag.MISSING.value
+    flags[unread[timed]] |= UNREAD_FLAGS
     if difference and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
     found += _jumps(t, timing.rate_hz, lines)

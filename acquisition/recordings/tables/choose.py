@@ -15,7 +15,7 @@ from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.timing import median, rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
-from acquisition.recordings.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
+from acquisition.units import MEASURES, TIMES, Measure, measure_of, time_unit, unit_words
 
 _SLOW_S = 0.999
 """Time steps of a second or more without a unit may be milliseconds, so their unit must be stated."""

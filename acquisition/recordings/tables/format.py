@@ -12,10 +12,10 @@ from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.recording import Recording, Survey, Trap
 from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.choose import Answers
-from acquisition.recordings.tables.rows import Sheet, read_rows
+from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Column, Header, Stated, Table, names_apart, set_back, side_by_side
 from acquisition.recordings.tables.text import Text, head_lines, text_of
-from acquisition.recordings.units import NUMBER
+from acquisition.units import NUMBER
 
 _HEAD_LINES = 300
 _MOST_RUNS = 5000
@@ -34,15 +34,12 @@ class ColumnFormat:
         does not. It never raises.
     tables : callable
         Takes the path and the bytes of a file and returns its tables, with all their numbers.
-    header : callable, optional
-        For families of text: takes the first lines and returns what they say. Sheets of a workbook are tried with it.
     """
 
     name: str
     title: str
     evidence: Callable[[bytes], str]
     tables: Callable[[str, bytes], Sequence[Table]]
-    header: Callable[[Sequence[str]], Header | None] | None = None
 
     def recognises(self, head: bytes) -> bool:
         """Return whether there is evidence for this family."""
@@ -123,12 +120,12 @@ def text_format(
         text = text_of(path, data)
         return tables_of_text(path, prepare(text) if prepare else text, header, expected, blocks)
 
-    return ColumnFormat(name, title, evidence, tables, header)
+    return ColumnFormat(name, title, evidence, tables)
 
 
 def tables_of_text(
     path: str,
-    text: Text | Sheet,
+    text: Text,
     header: Callable[[Sequence[str]], Header | None],
     expected: str,
     blocks: Callable[[Text, Header], Iterator[tuple[int, Header]]] | None = None,
@@ -141,7 +138,7 @@ def tables_of_text(
     if found.refused is not None:
         raise FormatError(path, *found.refused, line=found.lines + 1)
     begins = [(0, found)]
-    if blocks is not None and isinstance(text, Text):
+    if blocks is not None:
         begins += islice(blocks(text, found), _MOST_RUNS)
     if len(begins) > _MOST_RUNS:
         raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
@@ -153,7 +150,7 @@ def tables_of_text(
     return tables
 
 
-def _tables(path: str, text: Text | Sheet, begin: int, header: Header, stop: int | None) -> list[Table]:
+def _tables(path: str, text: Text, begin: int, header: Header, stop: int | None) -> list[Table]:
     """Read the rows below a header that begins at a line."""
     read = read_rows(path, text, begin + header.lines, header.delimiter, stop=stop, clock=header.clock)
     stated = {each.name: getattr(header, each.name) for each in fields(Stated)}

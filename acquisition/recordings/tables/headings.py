@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from acquisition.recordings.units import measure_of, time_unit, unit_words
+from acquisition.units import measure_of, time_unit, unit_words
 
 
 def words(text: str) -> frozenset[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from acquisition.block import F8
 from acquisition.recordings.tables.cells import CLOCK, parse_number
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time, is_uncertainty, split_heading
-from acquisition.recordings.units import measure_of, time_unit
+from acquisition.units import measure_of, time_unit
 
 _MARKS = ("\t", ";", ",", "")
 _PROBE, _FEWEST, _SOUND = 20, 3, 0.8

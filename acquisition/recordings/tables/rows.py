@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import zip_longest
 
 import numpy as np
@@ -17,7 +16,6 @@ from acquisition.recordings.tables.cells import (
     EXPONENT,
     I1,
     UNREAD,
-    cell,
     clock_times,
     is_cut,
     read_cells,
@@ -28,29 +26,13 @@ from acquisition.recordings.tables.text import Text
 
 _MOST_EMPTY = 4_000_000
 """Cells that rows may lack, in addition to one for every byte, before the table counts as damaged."""
-_DIGITS, _MOST_DECIMALS = 15, 12  # the significant digits that spreadsheet programs show; more decimals: an exponent
 _REMEDY = "export the numbers without thousands separators"
 _THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}((?:[,. ']|\xc2?\xa0|\xe2\x80[\xaf\x99])\d{3})+([.,]\d*)?")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sheet:
-    """The cells of a sheet of a workbook, by column: numbers, or text."""
-
-    columns: tuple[tuple[float | str, ...], ...]
-
-    def head(self, limit: int) -> list[str]:
-        """Return the first rows as lines of text between tabs, like those of a :class:`Text`."""
-        return ["\t".join(map(_printed, row)) for row in zip(*(column[:limit] for column in self.columns), strict=True)]
-
-
-def _printed(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.{_DIGITS}g}"
-
-
 def read_rows(
     path: str,
-    text: Text | Sheet,
+    text: Text,
     first: int,
     mark: str,
     *,
@@ -61,8 +43,6 @@ def read_rows(
 
     The cells of column ``clock`` are times of day.
     """
-    if isinstance(text, Sheet):
-        return _rows_of_sheet(text, first, clock)
     stop = len(text) if stop is None else stop
     first = min(first, stop)
     pieces: list[list[tuple[F8, I1, B1]]] = []  # for each column
@@ -122,27 +102,6 @@ def count_from_first(column: Column) -> None:
         at = column.values[known]
         days = np.concatenate(([0.0], np.cumsum(np.diff(at) < -43200.0)))
         column.values[known] = np.round(at - at[0] + 86400.0 * days, column.forms[known].max())
-
-
-def _rows_of_sheet(sheet: Sheet, first: int, clock: int | None) -> Table:
-    columns = []
-    for at, cells in enumerate(sheet.columns):
-        below = cells[first:]
-        if at == clock:
-            values, decimals, _ = clock_times([_printed(each).encode("latin-1", "replace") for each in below])
-        else:
-            numbers = [_printed(each) for each in cells if not isinstance(each, str)]
-            most = max((_DIGITS if "e" in each else len(each.partition(".")[2]) for each in numbers), default=0)
-            form = most if most <= _MOST_DECIMALS else _DIGITS - 1 + EXPONENT
-            read = [cell(each) if isinstance(each, str) else (each, form) for each in below]
-            values = np.array([value for value, _ in read], np.float64)
-            decimals = np.array([form for _, form in read], np.int8)
-        columns.append(Column("", "", values, decimals))
-    filled = np.any([column.forms != EMPTY for column in columns], axis=0)
-    columns = [Column("", "", column.values[filled], column.forms[filled]) for column in columns]
-    if clock is not None:
-        count_from_first(columns[clock])
-    return Table(tuple(columns), lines=Lines(first + 1 + np.flatnonzero(filled), columns[0].forms == UNREAD))
 
 
 def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -> tuple[Trap, ...]:

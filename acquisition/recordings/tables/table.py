@@ -15,7 +15,7 @@ from acquisition.recordings.recording import Trap
 from acquisition.recordings.sampling.timing import Formula, median
 from acquisition.recordings.tables.cells import EMPTY, I1
 from acquisition.recordings.tables.headings import Heading, role_of, unique
-from acquisition.recordings.units import Measure, measure_of
+from acquisition.units import Measure, measure_of
 
 _SET_BACK, _MOST_SET, _FEWEST_ROWS = 50.0, 3, 50
 """A clock was set back if it steps back by so many usual steps, at most so often, with so many rows in each part."""

@@ -29,12 +29,12 @@ _FACTORS = {
     "ft": 0.3048,
     "km/h": 1 / 3.6,
 }
-_SPELLINGS = {
+SPELLINGS = {
     "um": ("µm", "μm", "micrometer", "micrometre"),
-    "mm": ("millimeter", "millimetre", "毫米"),
-    "cm": ("centimeter", "centimetre", "厘米"),
-    "m": ("meter", "metre", "metri", "米"),
-    "in": ("inch", "inche"),
+    "mm": ("millimeter", "millimetre", "milimetro", "millimetri", "毫米"),
+    "cm": ("cms", "centimeter", "centimetre", "centimetro", "centimetri", "zentimeter", "厘米"),
+    "m": ("meter", "metre", "metro", "metri", "米"),
+    "in": ("inch", "inche", "zoll", "pulgada", "polegada", "pouce"),
     "ft": ("feet", "foot"),
     "ns": ("nanosecond", "nano"),
     "us": ("µs", "μs", "usec", "microsecond", "micro", "microsegundo", "mikrosekunde", "mikrosekunden"),
@@ -51,7 +51,8 @@ _SPELLINGS = {
     "mV": ("mv", "millivolt"),
     "N": ("newton",),
 }
-_WORDS = {word: symbol for symbol, words in _SPELLINGS.items() for word in words}
+"""Words for units in the singular, in lower case."""
+_WORDS = {word: symbol for symbol, words in SPELLINGS.items() for word in words}
 _PLAIN = str.maketrans("⁻−²¹·⋅", "--21  ")
 _SECONDS = r"(?:s|sec|secs|second|seconds)"
 _PER_SECOND = re.compile(
