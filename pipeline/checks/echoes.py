@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pipeline.motion.averaged import Phase
@@ -19,17 +17,6 @@ COUNTED = {
     for quality in Quality
     if quality not in (Quality.GAP_BEFORE, Quality.MALFORMED)
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Clusters:
-    """Clusters of false echoes."""
-
-    count: int  # number of clusters
-    samples: int  # number of false echoes in clusters
-    # Number of clusters whose middle is within an eighth of a period of a turning point; half of them by chance.
-    turning: int
-    shift_m: float  # increase of the mean amplitude if all false echoes were used, m
 
 
 def count_quality(flags: U8) -> dict[str, int]:
@@ -66,24 +53,30 @@ def echoes_by_chance(before: U8, demodulated: Demodulated) -> bool:
     )
 
 
-def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> Clusters:
-    """Count clusters of false echoes.
+def find_clusters(track: Track, demodulated: Demodulated, phase: Phase) -> dict[str, float]:
+    """Return the number of clusters of false echoes, of echoes in them, and of clusters nearer to a turning point.
+
+    By chance half of them are. ``shift_m`` is the increase of the mean amplitude if all false echoes were used. Without
+    clusters nothing is returned.
 
     The shift is the first-order change of a least-squares fit by the residuals r of the false echoes:
     :math:`2\\sum r_i\\cos\\varphi_i/N`. The sum is over the false echoes; N is the number of samples fitted, including
     them.
     """
     rows = np.flatnonzero((demodulated.flags & np.uint8(Quality.FALSE_ECHO)) != 0)
-    if not rows.size:
-        return Clusters(0, 0, 0, 0.0)
-    angle = phase.total(track.t[rows])
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(rows) > CLUSTER) + 1])
-    sizes = np.diff(np.concatenate([starts, [rows.size]]))
+    starts = np.append(0, np.flatnonzero(np.diff(rows) > CLUSTER) + 1)
+    sizes = np.diff(np.append(starts, rows.size))
     clusters = sizes >= CLUSTER
+    if not clusters.any():
+        return {}
+    angle = phase.total(track.t[rows])
     middles = angle[(starts + sizes // 2)[clusters]]
-    turning = np.cos(2.0 * middles) >= 0.0
     fitted = int(np.count_nonzero((demodulated.flags & UNUSABLE) == 0)) + rows.size
     residual = demodulated.residual[rows]
     residual[~np.isfinite(residual)] = 0.0
-    shift = 2.0 * float(residual @ np.cos(angle)) / fitted
-    return Clusters(int(np.count_nonzero(clusters)), int(sizes[clusters].sum()), int(np.count_nonzero(turning)), shift)
+    return {
+        "clusters": int(np.count_nonzero(clusters)),
+        "in_clusters": int(sizes[clusters].sum()),
+        "turning": int(np.count_nonzero(np.cos(2.0 * middles) >= 0.0)),
+        "shift_m": 2.0 * float(residual @ np.cos(angle)) / fitted,
+    }

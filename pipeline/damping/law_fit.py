@@ -139,7 +139,7 @@ def fit_law(law: Law, t: F8, y: F8, u: F8) -> Fit:
     """
     if len(law.parameters) == 1 and not law.rate(y, y[:1]).any():  # a constant amplitude is a mean and needs no search
         line = solve_weighted(np.ones((t.size, 1)), y, u)
-        return Fit(line.values, line.covariance, line.residual / u, line.chi2, True, "", 1)
+        return Fit(line.values, line.covariance, line.residual / u, line.chi2, True, "")
     length = math.sqrt(float(y @ y) / y.size) or 1.0
 
     def both(theta: F8) -> tuple[F8, F8]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from pipeline.bench.instrument import Instrument
-from pipeline.checks.echoes import Clusters, count_quality
+from pipeline.checks.echoes import count_quality
 from pipeline.checks.residual import COARSE
 from pipeline.numerics.levels import NEGLIGIBLE, SIGNIFICANT
 from pipeline.registry.found import Found
@@ -19,7 +19,7 @@ def sample_findings(
     conditioned: Conditioned,
     flags: U8,
     noise_m: float,
-    clusters: Clusters | None = None,
+    clusters: Mapping[str, float] | None = None,
     swing_m: tuple[float, float] | None = None,
     *,
     by_chance: bool = False,
@@ -48,10 +48,7 @@ def sample_findings(
         levels = {f"level_{i}_m": level for i, level in enumerate(conditioned.plateaus_m, 1)}
         yield Found("clipped", {"samples": counts["clipped"], "n": n, **levels, **move})
     if (echoes := counts["false_echo"]) and not by_chance:
-        numbers = {"samples": echoes, "n": n, "share": echoes / n}
-        if clusters is not None and clusters.count:
-            numbers |= {"clusters": clusters.count, "in_clusters": clusters.samples, "turning": clusters.turning}
-            numbers["shift_m"] = clusters.shift_m
+        numbers = {"samples": echoes, "n": n, "share": echoes / n, **(clusters or {})}
         yield Found("false_echoes", numbers, "warning" if echoes > NEGLIGIBLE * n else "info")
     if counts["missing"]:
         yield Found("missing_samples", {"samples": counts["missing"], "n": n}, "info")

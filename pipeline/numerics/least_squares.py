@@ -42,7 +42,6 @@ class Fit:
     cost: float  # sum of squared residuals
     converged: bool
     tried: str  # what was done and how it ended, worded for a finding
-    steps: int  # number of evaluations of the residuals
 
 
 def minimise(
@@ -80,7 +79,7 @@ def minimise(
         if residual.size < theta.size or theta.size == 0:
             raise ValueError(f"a fit needs as many residuals as parameters, got {residual.size} for {theta.size}")
         if not np.all(np.isfinite(residual)):
-            return _failed(theta, residual, f"no finite value at {_shown(theta)}", 1)
+            return _failed(theta, residual, f"no finite value at {_shown(theta)}")
         slopes = jacobian or (lambda at: central_differences(residuals, at))
         return _searched(residuals, slopes, theta, residual, precision, steps)
 
@@ -111,7 +110,7 @@ def _searched(
     x, _, report, *_ = leastsq(values, theta, Dfun=slopes, full_output=True, **ends)
     slope = derivatives(x)
     if not np.isfinite(slope).all():
-        return _failed(x, report["fvec"], f"no finite derivative at {_shown(x)}", 1)
+        return _failed(x, report["fvec"], f"no finite derivative at {_shown(x)}")
     # Where the search finds no further step, its end may be less precise than where it runs out of steps.
     precision = precision if report["nfev"] >= steps else max(precision, PRECISION)
     return _judged(x, report["fvec"], slope, largest, report["nfev"], precision)
@@ -136,8 +135,8 @@ def _judged(values: F8, residual: F8, slope: F8, largest: F8, steps: int, precis
     elif not independent:
         ended = f"a minimum after {steps} steps, but there parameters depend on each other"
     else:
-        return Fit(values, root @ root.T, residual, cost, True, f"a minimum after {steps} steps", steps)
-    return _failed(values, residual, f"{ended}: {_shown(values)}", steps)
+        return Fit(values, root @ root.T, residual, cost, True, f"a minimum after {steps} steps")
+    return _failed(values, residual, f"{ended}: {_shown(values)}")
 
 
 def central_differences(function: Callable[[F8], F8], theta: F8) -> F8:
@@ -170,10 +169,10 @@ def _lengths(slope: F8) -> F8:
     return np.asarray(np.sqrt(np.einsum("np,np->p", slope, slope)))
 
 
-def _failed(values: F8, residual: F8, ended: str, steps: int) -> Fit:
+def _failed(values: F8, residual: F8, ended: str) -> Fit:
     cost = float(residual @ residual)
     nothing = np.full((values.size, values.size), np.nan)
-    return Fit(values, nothing, residual, cost if np.isfinite(cost) else np.inf, False, ended, steps)
+    return Fit(values, nothing, residual, cost if np.isfinite(cost) else np.inf, False, ended)
 
 
 def _shown(theta: F8) -> str:

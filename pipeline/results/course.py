@@ -16,7 +16,9 @@ from pipeline.numerics.robust import mad_sigma
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 
 FEW = 4  # minimum number of runs in a group for a median
-LARGEST_BENCH = 50  # maximum number of runs compared as those of one bench; of a larger group only far runs are named
+# Maximum number of runs compared as those of one bench, which takes 0.3 s as measured if they disagree; of a larger
+# group only far runs are named.
+LARGEST_BENCH = 50
 LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
 MATES = 4  # good runs against which two far runs are exchanged
 
@@ -128,7 +130,8 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
 
     A run with an implausible mass takes no part in the rest. Runs far from the median of their spring or disc are
     suspect. The runs of one spring at one bench are compared as in file mode, which names two that were exchanged; a
-    run without which the others agree is suspect too.
+    run without which the others agree is suspect too. Then far runs of two benches are exchanged in pairs, next to good
+    runs.
     """
     found = {run.name: Suspect(run.name, run.implausible) for run in runs if run.implausible}
     plausible = [run for run in runs if not run.implausible]

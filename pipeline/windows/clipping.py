@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,8 +107,13 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
     cuts = []
     for end in ends:
         beyond = _beyond(fit, [end]) & fit.judged
-        cuts.append(_described(end, fit, windows, conditioned, beyond))
-        flags[windows.rows[beyond]] |= np.uint8(Quality.CLIPPED)
+        rows, height = windows.rows[beyond], end.sign * fit.model[beyond]
+        t, y = conditioned.track.t[rows], (fit.model + fit.residual)[beyond]
+        level_m = float(np.median(y[height >= np.median(height)])) + windows.level
+        from_m = float(end.sign * end.level + windows.level)
+        which: Literal["far", "near"] = "far" if end.sign > 0.0 else "near"
+        cuts.append(Cut(which, from_m, level_m, int(t.size), float(t.min()), float(t.max())))
+        flags[rows] |= np.uint8(Quality.CLIPPED)
     levels_m = tuple(cut.level_m for cut in cuts)
     return replace(conditioned, flags=flags, plateaus_m=levels_m, clipped_from_m=(), cuts=tuple(cuts))
 
@@ -184,14 +190,6 @@ def _beyond(fit: _Fit, ends: list[_End]) -> Bools:
     wider[:, 1:] |= beyond[:, :-1]
     wider[:, :-1] |= beyond[:, 1:]
     return wider
-
-
-def _described(end: _End, fit: _Fit, windows: Windows, conditioned: Conditioned, beyond: Bools) -> Cut:
-    t = conditioned.track.t[windows.rows[beyond]]
-    height, y = end.sign * fit.model[beyond], (fit.model + fit.residual)[beyond]
-    level = float(np.median(y[height >= np.median(height)])) + windows.level
-    start = float(end.sign * end.level + windows.level)
-    return Cut("far" if end.sign > 0.0 else "near", start, level, int(t.size), float(t.min()), float(t.max()))
 
 
 def _median_of_rows(values: F8, chosen: Bools) -> F8:

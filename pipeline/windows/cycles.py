@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
@@ -104,20 +103,12 @@ def _spectral_line(t: F8, y: F8, recorded: F8, rate_hz: float) -> tuple[float, f
     values -= centred * (float(centred @ values) / float(centred @ centred))
     threshold = math.log(n / IMPROBABLE)
     # Without the Hann window lines are narrow and may be lost between two bins, so the bins must be closer.
-    for taper, finer in ((_hann, 1), (np.ones, 4)):
+    for taper, finer in ((np.hanning, 1), (np.ones, 4)):
         window = taper(n)
         frequency_hz, power, ratio = _peak(values * window, rate_hz, finer)
         if ratio >= threshold:
             return frequency_hz, 2.0 * math.sqrt(power) / float(window.sum())
     return NoOscillation("no line stands out of the spectrum's noise: there is no oscillation to be seen")
-
-
-@functools.lru_cache(2)
-def _hann(n: int) -> F8:
-    """Return the Hann window of n samples; it is cached, because the runs of a course have the same length."""
-    window = np.hanning(n)
-    window.setflags(write=False)
-    return window
 
 
 def _bridged(grid: F8, t: F8, y: F8, recorded: F8, hole_s: float) -> F8:

@@ -3,7 +3,7 @@
 No library fits every period robustly. In the bundled damped recording, clusters of false echoes lie at the turning
 points. One least-squares fit of a damped sine gives an amplitude with an error of 3.68 mm there; the demodulation's
 error is 0.01 mm (``docs/decisions/0004-demodulation-first.md``). :mod:`pipeline.windows.sinusoids` contains the linear
-fit and the tuning of its basis. This module contains the passes: let clusters go, rescue, clip, tune, clip.
+fit and the tuning of its basis. This module contains the passes: ignore clusters, rescue, clip, tune, clip.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ WEAK = 7.0
 # Relative error of a window's sinusoid after two passes, as measured on computed records without noise (`python -m
 # tests.golden --only noise`).
 ROUNDING = 2e-6
-# Scatter relative to the amplitude; only computed records have less. The bundled recordings have 6e-3, as measured by
+# Scatter relative to the amplitude; only computed records have less. The bundled recordings have 2e-3, as measured by
 # `springmass analyse`.
 FINEST = 1e-4
 # Residuals beyond this many standard deviations are false echoes and are excluded from the fit: a normal one has a
@@ -91,7 +91,7 @@ def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
     basis = windows.basis(tuning.turning, tuning.decay)
     rough = retune(windows, solve(basis, windows.usable), tuning.angular_frequency, degree=1)
     basis = windows.decaying(basis, rough.decay)
-    solution, spread = _let_go(windows, basis, conditioned.noise_m)
+    solution, spread = _ignore_clusters(windows, basis, conditioned.noise_m)
     _rescue(windows, basis, solution, spread, tuning)
     _clip(windows, basis, solution, spread, rough)
     weights = solution.weights
@@ -131,7 +131,7 @@ def follow(cycles: Cycles, windows: Demodulated, recorded: F8) -> Cycles:
     return replace(cycles, bounds=bounds[np.concatenate([[True], bounds[1:] > bounds[:-1]])])
 
 
-def _let_go(windows: Windows, basis: F8, noise_m: float) -> tuple[Solution, F8]:
+def _ignore_clusters(windows: Windows, basis: F8, noise_m: float) -> tuple[Solution, F8]:
     """Fit every window; where the scatter exceeds the noise, use weights that ignore clusters of echoes.
 
     Returns the fits and the spreads (w,) of the samples about them.

@@ -76,7 +76,8 @@ def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
         )
     start_time = str(loaded.provenance.get("start_time", ""))
     written = writer(str(loaded.path), loaded.samples, loaded.info, loaded.title, start_time)
-    targets = [_beside(out, added) for added, _ in written.files]
+    stem = out.stem.removesuffix("_position")  # run_velocity.txt stands beside run.txt or run_position.txt
+    targets = [out.with_name(f"{stem}{added}{out.suffix}") if added else out for added, _ in written.files]
     _demand_free(targets, overwrite)
     for target, (_, data) in zip(targets, written.files, strict=True):
         write_whole(target, data, overwrite=overwrite)
@@ -84,11 +85,6 @@ def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
     for sentence in written.lost:
         tell(f"{out}: {sentence}")
     return OK
-
-
-def _beside(out: Path, added: str) -> Path:
-    """Name the second file of a pair: run_velocity.txt beside run.txt or run_position.txt."""
-    return out.with_name(f"{out.stem.removesuffix('_position')}{added}{out.suffix}") if added else out
 
 
 def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:

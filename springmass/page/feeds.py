@@ -115,9 +115,8 @@ class LogFeed:
 
 
 def _zero_of(event: Mapping[str, Any]) -> dict[str, float]:
-    """Return rest position and noise in m from an event of kind still; empty if it does not state both."""
-    numbers = {name: event["facts"].get(name) for name in ("rest_m", "noise_m")}
-    return numbers if all(isinstance(value, float) for value in numbers.values()) else {}
+    """Return rest position and noise in m, as far as an event of kind still states them."""
+    return {name: x for name in ("rest_m", "noise_m") if isinstance(x := event["facts"].get(name), float)}
 
 
 def _calibration(numbers: Mapping[str, Any] | None) -> str:

@@ -139,21 +139,19 @@ class Tee:
         """
         back.reads.append(read)
         sensor, last = self._sensors[port], self._last[port]
-        if not sensor.port.is_network or last is None:
-            self._begin_part(port, back)
-            return True
-        try:
-            readings = back.decoder.feed(*read[1:])
-        except Exception as error:
-            self._failures.note("decoder", error)
-            readings = NO_READINGS
-        if readings and sensor.runs_on(last, readings[0]):
-            self._interrupt(port, back.host_ns, "reopened", {**back.facts, "sensor": "continued"})
-            return True
-        if readings or sum(len(data) for _, _, data in back.reads) >= UNDECIDED_BYTES:
-            self._begin_part(port, back)
-            return True
-        return False
+        if sensor.port.is_network and last is not None:
+            try:
+                readings = back.decoder.feed(*read[1:])
+            except Exception as error:
+                self._failures.note("decoder", error)
+                readings = NO_READINGS
+            if not readings and sum(len(data) for _, _, data in back.reads) < UNDECIDED_BYTES:
+                return False
+            if readings and sensor.runs_on(last, readings[0]):
+                self._interrupt(port, back.host_ns, "reopened", {**back.facts, "sensor": "continued"})
+                return True
+        self._begin_part(port, back)
+        return True
 
     def _settle(self, port: int) -> None:
         """Record in the channel before what a port sent that came back and went, or the recording ended, undecided."""

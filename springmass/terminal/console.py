@@ -73,22 +73,17 @@ class Console:
         self._stream.flush()
 
     def _draw(self) -> None:
+        from rich.console import Console as RichConsole
+        from rich.live import Live
         from rich.text import Text
 
         self._drawing = False
         if self._live is None:
-            self._live = self._begin()
+            rich = RichConsole(file=self._stream, force_terminal=True)
+            # The other streams are not redirected, so that nothing else has to wait for this terminal.
+            self._live = Live(console=rich, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
+            self._live.start()
         self._live.update(Text("\n".join(self._lines), no_wrap=True, overflow="crop"), refresh=True)
-
-    def _begin(self) -> Live:
-        from rich import console
-        from rich.live import Live
-
-        rich = console.Console(file=self._stream, force_terminal=True)
-        # The other streams are not redirected, so that nothing else has to wait for this terminal.
-        live = Live(console=rich, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
-        live.start()
-        return live
 
     def _settle(self) -> None:
         live, self._live = self._live, None

@@ -27,17 +27,16 @@ def simulation(found: Simulation, mass_kg: float | None, over: Against | None = 
     period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
     turns = max(2, int(TURNS * period / exact.spacing_s) + 1)
     end = PERIODS * period if exact.t[-1] > 2 * PERIODS * period else None
-    label = "E / mJ" if mass_kg is not None else "E per mass / (mJ/kg)"
-    shown = slice(0, turns)
-    beside_run = _measured(found, mass_kg, over, exact.t[-1])
+    label, kg = ("E per mass / (mJ/kg)", 1.0) if mass_kg is None else ("E / mJ", mass_kg)
+    beside_run = _measured(found, kg, over, exact.t[-1], TURNS * period)
     of_position = _both(runs, "y / mm", lambda of, n: (of.t[:n], of.y[:n] * 1e3), beside_run[:1])
     of_velocity = _both(runs, "v / (m/s)", lambda of, n: (of.t[:n], of.v[:n]), beside_run[1:2])
-    of_energy = _both(runs, label, lambda of, n: _energy(of, n, mass_kg), beside_run[2:3], log=True)
+    of_energy = _both(runs, label, lambda of, n: _energy(of, n, kg), beside_run[2:3], log=True)
     of_phase = _both(
         runs,
         "v / (m/s)",
-        lambda of, n: (of.y[:n][shown] * 1e3, of.v[:n][shown]),
-        _measured_phase(beside_run, TURNS * period),
+        lambda of, n: (of.y[: min(n, turns)] * 1e3, of.v[: min(n, turns)]),
+        beside_run[3:],
         equal=True,
     )
     beside = "Each method beside the exact motion" + (", and the measured run." if beside_run else ".")
@@ -80,33 +79,29 @@ def _both(
     return tuple(panels)
 
 
-def _energy(of: Trajectory, count: int, mass_kg: float | None) -> tuple[F8, F8]:
+def _energy(of: Trajectory, count: int, mass_kg: float) -> tuple[F8, F8]:
     """Return times and energies in mJ, up to the end of a run or until its amplitude exceeds ``GROWN``."""
     relative = of.relative_energy()[:count]
     grown = np.flatnonzero(relative > GROWN**2)
     end = max(2, int(grown[0])) if grown.size else count
     rows = np.unique(np.linspace(0, end - 1, min(end, POINTS)).astype(np.intp))
     start = of.problem.amplitude_m() * of.problem.equation.angular_frequency_per_s
-    return of.t[rows], 0.5e3 * (1.0 if mass_kg is None else mass_kg) * start * start * relative[rows]
+    return of.t[rows], 0.5e3 * mass_kg * start * start * relative[rows]
 
 
-def _measured(found: Simulation, mass_kg: float | None, over: Against | None, end_s: float) -> list[Series]:
-    """Return displacement in mm, velocity in m/s and energy in mJ of a measured run from its start to a time."""
+def _measured(found: Simulation, mass_kg: float, over: Against | None, end_s: float, turns_s: float) -> list[Series]:
+    """Return a measured run to its end: displacement in mm, velocity in m/s, energy in mJ, and its first turns."""
     if over is None:
         return []
     rows = over.free[0] <= end_s
     t, y, v = (each[rows] for each in over.free)
     omega = found.problem.equation.angular_frequency_per_s
-    energy = 0.5e3 * (1.0 if mass_kg is None else mass_kg) * (v**2 + (omega * y) ** 2)
-    return [Series("measured", t, each) for each in (y * 1e3, v, energy)]
-
-
-def _measured_phase(measured: Sequence[Series], end_s: float) -> list[Series]:
-    if not measured:
-        return []
-    displacement, velocity, _ = measured
-    rows = displacement.x <= end_s
-    return [Series("measured", displacement.y[rows], velocity.y[rows])]
+    energy = 0.5e3 * mass_kg * (v**2 + (omega * y) ** 2)
+    first = t <= turns_s
+    return [
+        *(Series("measured", t, each) for each in (y * 1e3, v, energy)),
+        Series("measured", y[first] * 1e3, v[first]),
+    ]
 
 
 def _error(found: Simulation, runs: Eulers) -> tuple[Panel, ...]:

@@ -23,7 +23,7 @@ from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.results.effects import Effect
 from pipeline.track import F8
 from springmass.errors import ProgramError
-from springmass.runs.json_results import picked
+from springmass.runs.json_results import picked, plain
 
 DEFAULT_TOLERANCE = 1e-6
 FINE = 24.0  # states per radian; interpolation between them has an error of 1e-8 of the amplitude
@@ -344,16 +344,16 @@ def _measured_growth(problem: Problem, integrator: Integrator, step_s: float, st
 def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | None, band: Band | None) -> dict[str, Any]:
     """Return a simulation as the JSON of ``springmass simulate``, compared with no run."""
     solution, check = found.solution, found.check
-    return {
+    content = {
         "schema": 1,
         "method": solution.integrator.name,
         "step_s": solution.step_s,
         "steps": solution.parts * (len(found.trajectory.y) - 1),
         "samples": len(found.trajectory.y),
         "spacing_s": found.trajectory.spacing_s,
-        "stable_step_s": _finite(solution.integrator.stable_step(solution.problem)),
-        "predicted_error": _finite(solution.error),
-        "predicted_velocity_error": _finite(solution.velocity_error),
+        "stable_step_s": solution.integrator.stable_step(solution.problem),
+        "predicted_error": solution.error,
+        "predicted_velocity_error": solution.velocity_error,
         "no_estimate": solution.no_estimate or None,
         "measured_error": None if check is None else check.error,
         "measured_velocity_error": None if check is None else check.velocity_error,
@@ -368,6 +368,7 @@ def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | Non
         "against": None,
         "band": None if band is None else _band_summary(band, found.trajectory.t),
     }
+    return {name: plain(value) for name, value in content.items()}
 
 
 def _band_summary(band: Band, t: F8) -> dict[str, Any]:
@@ -381,7 +382,3 @@ def _band_summary(band: Band, t: F8) -> dict[str, Any]:
     phase = band.phase_at(t)
     widths["phase_half_width_95_rad"] = float(0.5 * np.max(phase[3] - phase[0]))
     return {"members": band.members, "seed": band.seed, "quantities": list(band.quantities), **widths}
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
