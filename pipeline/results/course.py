@@ -11,16 +11,15 @@ import numpy as np
 
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate
-from pipeline.numerics.levels import NEGLIGIBLE, OUTLIER
+from pipeline.numerics.levels import FEWEST_FOR_MEDIAN, NEGLIGIBLE, OUTLIER
 from pipeline.numerics.robust import mad_sigma
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 
-FEW = 4  # minimum number of runs in a group for a median
+FEW = FEWEST_FOR_MEDIAN + 1  # minimum number of runs in a group: the others without one run have a median
 # Maximum number of runs compared as those of one bench, which takes 0.3 s as measured if they disagree; of a larger
 # group only far runs are named.
 LARGEST_BENCH = 50
 LITTLE = 0.005  # relative spread of one bench's constants up to which no run is blamed: springs are not ideal
-MATES = 4  # good runs against which two far runs are exchanged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +186,7 @@ def judged(runs: Sequence[CourseRun]) -> tuple[tuple[Suspect, ...], tuple[Disagr
                 (run for run in good if run.spring == one.spring),
                 key=lambda run: run.bench not in (one.bench, two.bench),
             )
-            comparison = _compared([one, two, *mates[:MATES]])
+            comparison = _compared([one, two, *mates[:FEW]])
             if comparison is not None and set(comparison.exchanged) == {one.name, two.name}:
                 exchange(one.name, two.name, "the others")
     return tuple(found[run.name] for run in runs if run.name in found), tuple(disagreements)

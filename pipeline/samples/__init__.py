@@ -1,4 +1,4 @@
-"""Samples: which of them a fit may use, and whether rows were lost, duplicated or out of order.
+"""Samples: which of them a fit may use, whether rows are duplicated or out of order, and when the bob comes to rest.
 
 Every sample keeps its place; a flag states what is wrong with it.
 """

@@ -125,7 +125,7 @@ def _of_segment(
         cells.pop()
     if cells and cells[-1] == "Comment":
         cells.pop()
-    table = read_rows(path, text, segment.next + 1, mark, stop=stop)
+    table = read_rows(path, text, segment.next + 1, stop, mark)
     none = Column("", "", np.empty(0), np.empty(0, np.int8))
     read = [*table.columns, *[none] * (len(cells) - len(table.columns))]
     beside = tuple(replace(column, name=name) for name, column in zip(cells, read, strict=False))

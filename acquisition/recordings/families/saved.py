@@ -201,7 +201,7 @@ def _cassy_text(path: str, text: Text) -> list[Table]:
     # Settings follow the rows and contain no tabs; if their first line has no end, it is an incomplete row.
     tab = text.at(text.data.rfind(b"\t"))
     stop = tab + 1 if tab + 2 < len(text) or text.ended else len(text)
-    table = read_rows(path, text, at + 1, "\t", stop=stop)
+    table = read_rows(path, text, at + 1, stop, "\t")
     return side_by_side(replace(table, ragged=True), _described(path, lines[:at], len(row)))
 
 

@@ -69,15 +69,9 @@ def clock_s(cell: str) -> tuple[str, float, int] | None:
 
 def clock_times(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
     """Return times of day in seconds, the decimals of each, and a mask without commas, as :func:`read_cells` does."""
-    plain = [each.strip(b'"') for each in cells]
-    if all(len(each) >= 8 and each[2:3] == each[5:6] == b":" and each[6:8].isdigit() for each in plain):
-        hours, minutes = (read_cells([each[at : at + 2] for each in plain])[0] for at in (0, 3))
-        values, decimals, _ = read_cells([each[6:] for each in plain])
-        if (decimals >= 0).all() and np.isfinite(hours + minutes).all():
-            return hours * 3600.0 + minutes * 60.0 + values, decimals, np.zeros(values.size, bool)
-    values, decimals = np.full(len(plain), np.nan), np.full(len(plain), UNREAD, np.int8)
-    for row, each in enumerate(plain):
-        if (time := clock_s(each.decode("latin-1"))) is not None:
+    values, decimals = np.full(len(cells), np.nan), np.full(len(cells), UNREAD, np.int8)
+    for row, each in enumerate(cells):
+        if (time := clock_s(each.strip(b'"').decode("latin-1"))) is not None:
             _, values[row], decimals[row] = time
     return values, decimals, np.zeros(values.size, bool)
 

@@ -118,41 +118,30 @@ def text_format(
 
     def tables(path: str, data: bytes) -> list[Table]:
         text = text_of(path, data)
-        return tables_of_text(path, prepare(text) if prepare else text, header, expected, blocks)
+        text = prepare(text) if prepare else text
+        head = text.head(_HEAD_LINES)
+        found = header(head or [""])
+        if found is None or not head:
+            raise FormatError(path, f"expected {expected}", "export the run again", line=1)
+        if found.refused is not None:
+            raise FormatError(path, *found.refused, line=found.lines + 1)
+        begins = [(0, found), *islice(blocks(text, found) if blocks else (), _MOST_RUNS)]
+        if len(begins) > _MOST_RUNS:
+            raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
+        titles, several = " / ".join([each.title for _, each in begins if each.title][:4]), len(begins) > 1
+        ends = [*(begin for begin, _ in begins[1:]), len(text)]
+        return [
+            table
+            for (begin, own), end in zip(begins, ends, strict=True)
+            for table in _tables(path, text, begin, replace(own, title=titles, run=own.run if several else ""), end)
+        ]
 
     return ColumnFormat(name, title, evidence, tables)
 
 
-def tables_of_text(
-    path: str,
-    text: Text,
-    header: Callable[[Sequence[str]], Header | None],
-    expected: str,
-    blocks: Callable[[Text, Header], Iterator[tuple[int, Header]]] | None = None,
-) -> list[Table]:
-    """Read a text or a sheet: its header, the rows below it, and further runs with their headers."""
-    head = text.head(_HEAD_LINES)
-    found = header(head or [""])
-    if found is None or not head:
-        raise FormatError(path, f"expected {expected}", "export the run again", line=1)
-    if found.refused is not None:
-        raise FormatError(path, *found.refused, line=found.lines + 1)
-    begins = [(0, found)]
-    if blocks is not None:
-        begins += islice(blocks(text, found), _MOST_RUNS)
-    if len(begins) > _MOST_RUNS:
-        raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
-    title, several = " / ".join([each.title for _, each in begins if each.title][:4]), len(begins) > 1
-    ends = [*(begin for begin, _ in begins[1:]), None]
-    tables: list[Table] = []
-    for (begin, own), end in zip(begins, ends, strict=True):
-        tables += _tables(path, text, begin, replace(own, title=title, run=own.run if several else ""), end)
-    return tables
-
-
-def _tables(path: str, text: Text, begin: int, header: Header, stop: int | None) -> list[Table]:
+def _tables(path: str, text: Text, begin: int, header: Header, stop: int) -> list[Table]:
     """Read the rows below a header that begins at a line."""
-    read = read_rows(path, text, begin + header.lines, header.delimiter, stop=stop, clock=header.clock)
+    read = read_rows(path, text, begin + header.lines, stop, header.delimiter, header.clock)
     stated = {each.name: getattr(header, each.name) for each in fields(Stated)}
     common = replace(read, **{**stated, "traps": (*header.traps, *read.traps)})
     tables = side_by_side(common, header.headings, header.run)

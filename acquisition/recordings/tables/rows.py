@@ -30,20 +30,11 @@ _REMEDY = "export the numbers without thousands separators"
 _THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}((?:[,. ']|\xc2?\xa0|\xe2\x80[\xaf\x99])\d{3})+([.,]\d*)?")
 
 
-def read_rows(
-    path: str,
-    text: Text,
-    first: int,
-    mark: str,
-    *,
-    stop: int | None = None,
-    clock: int | None = None,
-) -> Table:
-    """Read the rows from line ``first`` on, as columns without names; blank lines are no rows.
+def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: int | None = None) -> Table:
+    """Read the rows from line ``first`` to before line ``stop``, as columns without names; blank lines are no rows.
 
     The cells of column ``clock`` are times of day.
     """
-    stop = len(text) if stop is None else stop
     first = min(first, stop)
     pieces: list[list[tuple[F8, I1, B1]]] = []  # for each column
     sizes: list[int] = []
