@@ -56,26 +56,9 @@ def maxbotix(digits: int, step_m: float, none: int, tail: str = "") -> Callable[
     return lambda: Distances(lambda d: f"R{steps(d, step_m, 1, none - 1, none):0{digits}d}{tail}\r".encode())
 
 
-def ffhls() -> Encoder:
-    """Return an encoder of FF H L SUM."""
-    return Distances(lambda d: with_sum(b"\xff" + steps(d, 1e-3, 0, 10_000, 0).to_bytes(2, "big")))
-
-
-def us100() -> Encoder:
-    """Return an encoder of two bytes without a header."""
-    return Distances(lambda d: steps(d, 1e-3, 20, 4500, 0).to_bytes(2, "big"))
-
-
-def urm37() -> Encoder:
-    """Return an encoder of 22 H L SUM."""
-    return Distances(lambda d: with_sum(b"\x22" + steps(d, 1e-2, 1, 1000, 0xFFFF).to_bytes(2, "big")))
-
-
-def sen0149() -> Encoder:
-    """Return an encoder of 55 AA address length command H L SUM."""
-    return Distances(
-        lambda d: with_sum(bytes([0x55, 0xAA, 0x11, 2, 2]) + steps(d, 1e-3, 1, 12_000, 0xFFFF).to_bytes(2, "big"))
-    )
+def binary(header: bytes, step_m: float, lowest: int, highest: int, none: int) -> Callable[[], Encoder]:
+    """Return a maker of frames of a header, two bytes and the low eight bits of the sum of all."""
+    return lambda: Distances(lambda d: with_sum(header + steps(d, step_m, lowest, highest, none).to_bytes(2, "big")))
 
 
 class TextLines:
@@ -113,9 +96,9 @@ ENCODERS: dict[str, Callable[..., Encoder]] = {
     "maxbotix-xl-long": maxbotix(4, 0.01, 1068),
     "maxbotix-hr": maxbotix(4, 0.001, 5000),
     "maxbotix-wr": maxbotix(4, 0.001, 9999),
-    "ffhls": ffhls,
-    "us100": us100,
-    "urm37": urm37,
-    "sen0149": sen0149,
+    "ffhls": binary(b"\xff", 1e-3, 0, 10_000, 0),
+    "us100": lambda: Distances(lambda d: steps(d, 1e-3, 20, 4500, 0).to_bytes(2, "big")),
+    "urm37": binary(b"\x22", 1e-2, 1, 1000, 0xFFFF),
+    "sen0149": binary(bytes([0x55, 0xAA, 0x11, 2, 2]), 1e-3, 1, 12_000, 0xFFFF),
     "text-lines": TextLines,
 }

@@ -70,14 +70,10 @@ def test_one_version_is_stated() -> None:
     assert f"version: {newest[1]}\ndate-released: {newest[2]}\n" in citation
 
 
-def test_the_two_commands_of_the_readme_are_targets() -> None:
-    """`make demo` and `make test`, and every other target that a page names, stand in the Makefile."""
+def test_every_target_that_a_page_names_is_there() -> None:
+    """It stands in the Makefile."""
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     targets = set(re.findall(r"^([a-z][a-z-]*):", makefile, re.MULTILINE))
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    first_screen = "\n".join(readme.splitlines()[:45])
-    assert "make demo" in first_screen
-    assert "make test" in first_screen
     for page in PAGES:
         for block in re.findall(r"`+(make [^`]+)`", page.read_text(encoding="utf-8")):
             for name in re.findall(r"make ([a-z][a-z-]*)", block):

@@ -14,9 +14,8 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -45,22 +44,12 @@ FENCE = re.compile(r"^```(?P<language>python|console)[ \t]*\n(?P<body>.*?)^```[ 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="the console blocks are written for a POSIX shell")
 
 
-@dataclass(frozen=True)
-class Block:
+class Block(NamedTuple):
     """A fenced block and the line it begins on."""
 
     language: str
     body: str
     line: int
-
-
-@dataclass(frozen=True)
-class Command:
-    """A line after ``$ `` and the output stated beneath it."""
-
-    line: int
-    text: str
-    expected: str
 
 
 def blocks_of(page: str) -> list[Block]:
@@ -72,12 +61,12 @@ def blocks_of(page: str) -> list[Block]:
     ]
 
 
-def commands_of(block: Block) -> Iterator[Command]:
-    """Yield the commands of a console block."""
+def commands_of(block: Block) -> Iterator[tuple[int, str, str]]:
+    """Yield the commands of a console block: the line, what follows ``$ ``, and the output stated beneath it."""
     lines = block.body.splitlines()
     starts = [i for i, line in enumerate(lines) if line.startswith("$ ")]
     for start, stop in zip(starts, [*starts[1:], len(lines)], strict=True):
-        yield Command(block.line + start, lines[start][2:], "\n".join(lines[start + 1 : stop]))
+        yield block.line + start, lines[start][2:], "\n".join(lines[start + 1 : stop])
 
 
 @pytest.fixture
@@ -132,10 +121,10 @@ def run_python(page: str, block: Block, names: dict[str, object]) -> None:
 def run_console(page: str, block: Block, folder: Path, status: int) -> int:
     """Run a console block's commands and return the exit code of the last."""
     commands = list(commands_of(block))
-    for command, following in zip(commands, [*commands[1:], None], strict=True):
-        where = f"{page}, line {command.line}: {command.text}"
+    for (line, command, stated), following in zip(commands, [*commands[1:], None], strict=True):
+        where = f"{page}, line {line}: {command}"
         done = subprocess.run(
-            ["/bin/sh", "-c", f"(exit {status}); {command.text}"],
+            ["/bin/sh", "-c", f"(exit {status}); {command}"],
             cwd=folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -143,11 +132,11 @@ def run_console(page: str, block: Block, folder: Path, status: int) -> int:
             check=False,
         )
         status = done.returncode
-        expected = following is not None and following.text == "echo $?"
+        expected = following is not None and following[1] == "echo $?"
         assert status == 0 or expected, f"{where}: exit code {status}\n{done.stdout}"
-        if command.expected.strip():
-            same = doctest.OutputChecker().check_output(plain(command.expected), plain(done.stdout), OPTIONS)
-            assert same, f"{where}\nstated:\n{command.expected}\ngot:\n{done.stdout}"
+        if stated.strip():
+            same = doctest.OutputChecker().check_output(plain(stated), plain(done.stdout), OPTIONS)
+            assert same, f"{where}\nstated:\n{stated}\ngot:\n{done.stdout}"
     return status
 
 

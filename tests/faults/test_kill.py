@@ -12,7 +12,6 @@ import signal
 import struct
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -39,23 +38,13 @@ def record(port: int, log: str, mode: str) -> None:
         os.write(1, struct.pack("<II", status.records, status.synced_records))
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What a killed child left: packets sent to it, read by it, acknowledged as written and as synced."""
-
-    sent: int
-    taken: int
-    written: int
-    synced: int
-
-
 def packet(number: int) -> bytes:
     """Return a packet that contains its number."""
     return struct.pack("<Q", number) + bytes([number % 256]) * (PACKET - 8)
 
 
-def trial(log: Path, mode: str, rng: np.random.Generator) -> Outcome:
-    """Feed a recording child and kill it at a random moment."""
+def trial(log: Path, mode: str, rng: np.random.Generator) -> tuple[int, int, int]:
+    """Feed a recording child, kill it at a random moment, and return what it had read, written and synced."""
     port, feed = os.pipe()
     command = [sys.executable, "-B", __file__, str(port), str(log), mode]
     with subprocess.Popen(command, stdout=subprocess.PIPE, pass_fds=[port]) as child:
@@ -78,7 +67,7 @@ def trial(log: Path, mode: str, rng: np.random.Generator) -> Outcome:
     remaining = b"".join(iter(lambda: os.read(port, 1 << 16), b""))
     os.close(port)
     written, synced = struct.unpack("<II", output[: len(output) // 8 * 8][-8:])
-    return Outcome(sent, sent - len(remaining) // PACKET, written, synced)
+    return sent - len(remaining) // PACKET, written, synced
 
 
 @pytest.mark.trials
@@ -90,14 +79,14 @@ def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, 
     lost = []
     for number in range(kills):
         log = tmp_path / f"{number}.wire"
-        outcome = trial(log, mode, rng)
+        taken, written, synced = trial(log, mode, rng)
         contents = read_log(log)
         reads = [record.payload for record in contents if record.kind is Kind.DATA]
         assert reads == [packet(n) for n in range(len(reads))], "a wrong record"
         assert contents.header == HEADER
         assert contents.damage.lost == contents.damage.skipped_bytes == 0
-        assert contents.damage.records >= outcome.written >= outcome.synced, outcome
-        lost.append(outcome.taken - len(reads))
+        assert contents.damage.records >= written >= synced
+        lost.append(taken - len(reads))
     assert mode == "flood" or max(lost) <= 1, lost
     assert min(lost) >= 0
 
