@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pty
+import resource
 import signal
 import socket
 import subprocess
@@ -48,6 +49,17 @@ def usual_signals() -> None:
     """Give the signals their usual effect: a child inherits what the caller of the tests ignores."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """Let no file grow beyond so many bytes: a disk that is full for this process."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 class Sensor:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import fcntl
-import resource
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +11,7 @@ import pytest
 from springmass.cli import main
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, USAGE
 from tests.courses import contents, short_course
+from tests.faults.conftest import files_up_to
 from tests.sampling import sampled
 
 RUNS = 3
@@ -23,17 +21,6 @@ RUNS = 3
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of recordings."""
     return short_course(tmp_path_factory.mktemp("course") / "runs", RUNS)
-
-
-@contextlib.contextmanager
-def files_up_to(size: int) -> Iterator[None]:
-    """Let no file grow beyond so many bytes: a disk that is full for this process."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def passed(runs: Path, out: Path, *options: str) -> int:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import errno
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,27 +17,10 @@ from storage.run_file.reading import open_run
 from storage.wire_log.appending import LogFile, open_log_file
 from storage.wire_log.records import Kind, LogHeader, SensorEntry
 from storage.wire_log.scanning import read_log
+from tests.faults.conftest import files_up_to
 
 HEADER = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr"),), mono_ns=0, unix_ns=0)
 LIMIT = 400_000
-
-
-def record_under_a_limit(log: str) -> None:
-    """Record under a file-size limit until the recorder says that it stopped; print what it says, build the run."""
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, LIMIT))
-    recorder = Recorder(log, HEADER, SystemClock(), sync_every_s=0.003)
-    number = 0
-    while not recorder.status.error:
-        recorder.put(0, number * 100_000_000, b"R%04d\r" % (number % 5000))
-        number += 1
-        recorder.drain()
-    try:
-        recorder.close()
-    except WriteFailed as error:
-        print(error)
-    recover(recorder.contents())
 
 
 class Faulty:
@@ -67,14 +48,22 @@ def reads_of(log: Path) -> list[bytes]:
     return [record.payload for record in read_log(log) if record.kind is Kind.DATA]
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="the system has no file-size limit")
 def test_a_log_at_the_file_size_limit_becomes_its_run_file(tmp_path: Path) -> None:
     """The run file packs the log, so it finds room under the same limit and holds what was recorded."""
-    log = tmp_path / "run.wire"
-    command = [sys.executable, "-B", __file__, str(log)]
-    (line,) = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    log, number = tmp_path / "run.wire", 0
+    with files_up_to(LIMIT):
+        recorder = Recorder(log, HEADER, SystemClock(), sync_every_s=0.003)
+        while not recorder.status.error:
+            recorder.put(0, number * 100_000_000, b"R%04d\r" % (number % 5000))
+            number += 1
+            recorder.drain()
+        with pytest.raises(WriteFailed) as caught:
+            recorder.close()
+        recover(recorder.contents())
+    line = str(caught.value)
     assert line.startswith(f"{log}: the wire log could not be continued (File too large); check the disk")
     assert f"{read_log(log).damage.records} records" in line
+    assert "\n" not in line
     assert log.stat().st_size == LIMIT
     with open_run(tmp_path / "run.h5") as run:
         run.verify()
@@ -111,7 +100,3 @@ def test_a_disk_full_from_the_start_leaves_nothing_behind(tmp_path: Path) -> Non
     with pytest.raises(WriteFailed, match="No space left on device"):
         Recorder(log, HEADER, VirtualClock(), open_file=lambda path: Faulty(path, rng, 50))
     assert not log.exists()
-
-
-if __name__ == "__main__":
-    record_under_a_limit(sys.argv[1])

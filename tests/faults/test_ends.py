@@ -81,17 +81,6 @@ def failing(display: str) -> Iterator[dict[str, Any]]:
             yield {}
 
 
-DISPLAYS = [
-    *PATCHES,
-    "reader of stderr gone",
-    "nobody reads stderr",
-    "stderr on a full disk",
-    "stderr closed",
-    "terminal closed",
-    "no room for the analysis",
-]
-
-
 def end_by_signal(number: signal.Signals, times: int = 1) -> Callable[[Any], None]:
     """Return how a recording is ended by a signal, which ``timeout`` and some terminals send twice."""
 
@@ -143,7 +132,14 @@ def play(bench: Any, folder: Path, display: str, end: str) -> None:
 
 
 @pytest.mark.trials
-@pytest.mark.parametrize("display", DISPLAYS)
+@pytest.mark.parametrize(
+    "display",
+    [
+        *PATCHES,
+        *("reader of stderr gone", "nobody reads stderr", "stderr on a full disk", "stderr closed", "terminal closed"),
+        "no room for the analysis",
+    ],
+)
 def test_no_display_ends_a_recording(bench: Any, tmp_path: Path, display: str) -> None:
     """Whatever becomes of stderr or of the live analysis, the seconds end the run, with all its readings."""
     play(bench, tmp_path, display, "seconds")

@@ -17,19 +17,13 @@ DECLARED = [
     *(each for extra in PROJECT["project"]["optional-dependencies"].values() for each in extra),
     *(each for each in PROJECT["dependency-groups"]["test-core"] if isinstance(each, str)),
 ]
-
-
-@pytest.fixture(scope="module")
-def installed() -> dict[str, Version]:
-    """Return the versions in constraints-lowest.txt by name."""
-    lines = (ROOT / "constraints-lowest.txt").read_text(encoding="utf-8").splitlines()
-    pins = [line.split("==") for line in lines if not line.startswith("#")]
-    return {canonicalize_name(name): Version(version) for name, version in pins}
+PINS = [line.split("==") for line in (ROOT / "constraints-lowest.txt").read_text().splitlines() if "==" in line]
+INSTALLED = {canonicalize_name(name): Version(version) for name, version in PINS}
 
 
 @pytest.mark.parametrize("declared", DECLARED)
-def test_the_smallest_version_declared_is_the_one_that_is_tested(declared: str, installed: dict[str, Version]) -> None:
+def test_the_smallest_version_declared_is_the_one_that_is_tested(declared: str) -> None:
     """Each requirement has one lower bound, and the constraints hold it."""
     requirement = Requirement(declared)
     (bound,) = (each.version for each in requirement.specifier if each.operator == ">=")
-    assert installed[canonicalize_name(requirement.name)] == Version(bound)
+    assert INSTALLED[canonicalize_name(requirement.name)] == Version(bound)
