@@ -100,9 +100,11 @@ def truth(drag: str) -> dict[str, float]:
     return {"amplitude": AMPLITUDE_M, "damping_rate": rate, "gamma": d.get("gamma", 0.0), "beta": d.get("beta", 0.0)}
 
 
-def analysed(drag: str, seconds: float, noise_m: float, seed: int, stated: str | None = None) -> Analysis:
-    """Return the analysis of one record, with or without a stated law."""
-    rng = np.random.default_rng([seed, 15, *drag.encode()])
+def analysed(
+    drag: str, seconds: float, noise_m: float, seed: int, *, stated: str | None = None, salt: int = 15
+) -> Analysis:
+    """Return the analysis of one record, with or without a stated law; another salt draws other records."""
+    rng = np.random.default_rng([seed, salt, *drag.encode()])
     t = times(seconds)
     wave = np.cos(OMEGA * t + rng.uniform(-math.pi, math.pi))
     y = REST_M + decayed(AMPLITUDE_M, DRAGS[drag], seconds) * wave + noise_m * rng.standard_normal(t.size)

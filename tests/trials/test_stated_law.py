@@ -102,7 +102,7 @@ class Cell:
 
 def one_record(law: str, stated: bool, seconds: float, noise_m: float, seed: int) -> tuple[float, float, bool]:
     """Return error and u of the damping rate of one recording, and whether a warning contradicts the law."""
-    analysis = analysed(law, seconds, noise_m, seed, law if stated else None)
+    analysis = analysed(law, seconds, noise_m, seed, stated=law if stated else None, salt=44)
     motion: Any = analysis.motion
     assert isinstance(motion, Oscillation)
     against = any(finding.code in ("stated_law_rejected", "no_law_fits") for finding in analysis.findings)
