@@ -22,6 +22,7 @@ from tests.courses import contents, short_course
 TRIALS = max(1, int(os.environ.get("SPRINGMASS_KILLS", "12")) // 12)
 LIMIT_S = 300.0
 RUNS = 24 if "SPRINGMASS_KILLS" in os.environ else 6
+DASK_RUNS = 250 if "SPRINGMASS_KILLS" in os.environ else RUNS  # three tasks, or one
 OPTIONS = ("--reports", "0", "--accuracy", "fast")
 
 
@@ -88,3 +89,29 @@ def test_a_killed_pass_is_completed(place, tmp_path, who):
         assert contents(out) == clean
         with (out / "results.csv").open(newline="") as file:
             assert [row["run"] for row in csv.DictReader(file)] == [f"run{i:03d}" for i in range(RUNS)]
+
+
+def used_s(pid: int) -> float:
+    """Return the processor time that a process has used, s."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.trials
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="finds the worker that is at work by /proc")
+def test_a_worker_of_dask_killed_in_the_middle_is_replaced(tmp_path, cluster):
+    """The worker at work is killed: its task of a hundred runs goes to another, and the results are the same."""
+    runs = short_course(tmp_path / "runs", DASK_RUNS)
+    (tmp_path / "clean").mkdir()
+    assert main(["batch", str(runs), "-o", str(tmp_path / "clean" / "out"), "--jobs", "1", *OPTIONS]) == 0
+    address, pids = cluster
+    before = {pid: used_s(pid) for pid in pids}
+    process = started(runs, tmp_path / "out", "--dask", address)
+    victim = None
+    while process.poll() is None and victim is None:
+        victim = next((pid for pid in pids if used_s(pid) - before[pid] > 0.8), None)  # imports alone are less
+        time.sleep(0.01)
+    if victim is not None:
+        os.kill(victim, signal.SIGKILL)
+    assert process.wait(LIMIT_S) == 0
+    assert contents(tmp_path / "out") == contents(tmp_path / "clean" / "out")
