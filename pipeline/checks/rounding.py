@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pipeline.checks.residual import Misfit, Outcome
@@ -33,7 +35,8 @@ def rounding(samples: Conditioned, fitted: Fitted) -> Outcome | None:
         u_rate = max(u_rate, float(abs(fit.slopes_of_rate() @ moved)))
     if u_amplitude_m <= NEGLIGIBLE * best.joint["A0"].u and u_rate <= NEGLIGIBLE * best.damping_rate().u:
         return None
-    u_rest_m = 0.5 * float(abs(errors.mean()))
+    # The windows' uncertainties include it too: only what exceeds that of their mean is added.
+    u_rest_m = math.sqrt(max(0.25 * float(abs(errors.mean())) ** 2 - fitted.rest.mean.u**2, 0.0))
     return Outcome(
         "", misfit=Misfit(name="rounding", amplitude_m=u_amplitude_m, offset_m=u_rest_m, damping_rate=u_rate)
     )

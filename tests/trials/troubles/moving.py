@@ -332,10 +332,10 @@ KINDS = (
         cure=True,
         spread=("offset",),
     ),
-    Kind(name="rest: one step of 3 mm", cause="rest", make=_drifting_rest("step", 3e-3), cure=True),
+    Kind(name="rest: one step of 3 mm", cause="rest", make=_drifting_rest("step", 3e-3)),  # u of the rest spans both
     Kind(name="mode: sideways, 2 mm", cause="mode", make=_second_mode(0.71, 2e-3), cure=True),
     Kind(name="mode: sideways, 6 mm", cause="mode", make=_second_mode(0.62, 6e-3), cure=True),
-    Kind(name="mode: beats, 3 mm", cause="mode", make=_second_mode(1.06, 3e-3), cure=True),
+    Kind(name="mode: beats, 3 mm", cause="mode", make=_second_mode(1.06, 3e-3)),
     Kind(name="mode: beats slower than the record", cause="mode", make=_second_mode(1.012, 2e-3, 30.0)),
     Kind(name="energy goes to and fro", cause="modulated", make=_exchanging),
     Kind(name="driven: near resonance", cause="driven", make=_steered("near")),

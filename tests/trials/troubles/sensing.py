@@ -241,7 +241,7 @@ KINDS = (
     Kind(name="held: 25 Hz", cause="held", make=_stepped(0.0, hold_hz=25.0)),
     Kind(name="steps: 1 mm", cause="quantised", make=_stepped(0.001, sigma_m=1e-4), cure=True),
     Kind(name="steps: 3 mm", cause="quantised", make=_stepped(0.003), cure=True),
-    Kind(name="steps: 1 cm", cause="quantised", make=_stepped(0.01), cure=True),
+    Kind(name="steps: 1 cm", cause="quantised", make=_stepped(0.01)),
     Kind(name="steps: 1 inch", cause="quantised", make=_stepped(0.0254)),
     Kind(name="rare: 3.4 a period", cause="few_samples", make=_rarely(3.4)),
     Kind(name="rare: 2.3 a period", cause="few_samples", make=_rarely(2.3)),

