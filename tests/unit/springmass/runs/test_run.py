@@ -32,10 +32,11 @@ def still() -> sm.Run:
 
 @pytest.fixture
 def pyplot(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """Return pyplot without a window, closed at the end."""
+    """Return pyplot without a window and without the figures of examples that ran before, closed at the end."""
     monkeypatch.setenv("MPLBACKEND", "Agg")
     from matplotlib import pyplot
 
+    pyplot.close("all")
     yield pyplot
     pyplot.close("all")
 
