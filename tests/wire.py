@@ -1,4 +1,4 @@
-"""Wire logs of tests: logs from bytes, records appended one by one, and a disk in memory that fails as it is told."""
+"""Wire logs for tests: logs from bytes, records appended one by one, and a disk in memory that fails on request."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Disk:
         return taken
 
     def sync(self) -> None:
-        """Refuse if told to."""
+        """Fail if the test asked for it."""
         self._pass("sync", self.syncs_pass)
         if self.sync_trouble:
             raise self.sync_trouble

@@ -47,7 +47,7 @@ class Ambient:
 
         If the record used another speed of sound than that of the scene's air, the difference is not corrected; it is
         the half-width of a rectangular distribution. If the scene states no air temperature, that of a room is used, 20
-        +- 3 degC. If neither record nor scene tells of a rangefinder, the distances need not come from echoes, and
+        +- 3 degC. If neither record nor scene names a rangefinder, the distances need not come from echoes, and
         their scale is exact.
         """
         if instrument.u_scale > 0:

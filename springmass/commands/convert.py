@@ -91,7 +91,7 @@ def _demand_free(targets: Sequence[Path], overwrite: bool) -> None:
     """Check before the work, so that of a pair either both files are written or none."""
     for target in () if overwrite else targets:
         if target.exists():
-            raise ProgramError(f"{target}: stands there already; choose another place or add --overwrite")
+            raise ProgramError(f"{target}: the file exists already; choose another place or add --overwrite")
 
 
 def _give_back(loaded: Loaded, out: Path, overwrite: bool) -> list[Path]:

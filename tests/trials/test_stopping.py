@@ -24,7 +24,7 @@ pytestmark = pytest.mark.trials
 
 
 def looks(seed: int) -> list[tuple[float, dict[str, Any]]]:
-    """Return what the page tells of a bench after so many seconds each, up to where it asks for no more.
+    """Return what the page says of a bench after each of some durations, until it needs no more samples.
 
     The bench is like those of the recordings, and its sensor's clock is off by a share that nobody knows.
     """
