@@ -45,8 +45,6 @@ def judge(
     if lost is not None:
         missing = {"places": lost.places, "share": lost.share}
         outcomes.append(Outcome("lost_rows", missing, Misfit(name="lost_rows", clock=lost.share)))
-    if (rounded := rounding(samples, fitted)) is not None:
-        outcomes.append(rounded)
     if fitted.method != "equation":
         residual = residual_of(samples, fitted, filter_)
         for test in TESTS:
@@ -60,4 +58,5 @@ def judge(
     if "model_misfit" in numbers:
         numbers["model_misfit"]["scatter_excess_m"] = fitted.damping.scatter.excess or None
     found = tuple(Found(code, each) for code, each in numbers.items())
-    return found, tuple(one.misfit for one in outcomes if one.misfit is not None)
+    misfits = (*(one.misfit for one in outcomes), rounding(samples, fitted))
+    return found, tuple(misfit for misfit in misfits if misfit is not None)

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from pipeline.checks.residual import Misfit, Outcome
+from pipeline.checks.residual import Misfit
 from pipeline.motion.averaged import Fitted
 from pipeline.numerics.levels import NEGLIGIBLE
 from pipeline.samples.condition import Conditioned
 from pipeline.windows.rounding import rounding_errors
 
 
-def rounding(samples: Conditioned, fitted: Fitted) -> Outcome | None:
+def rounding(samples: Conditioned, fitted: Fitted) -> Misfit | None:
     """Return what rounding adds to the uncertainties; None if it is negligible.
 
     The rest position lies at the same place between two steps in all windows, so the errors of their amplitudes are one
@@ -37,6 +37,4 @@ def rounding(samples: Conditioned, fitted: Fitted) -> Outcome | None:
         return None
     # The windows' uncertainties include it too: only what exceeds that of their mean is added.
     u_rest_m = math.sqrt(max(0.25 * float(abs(errors.mean())) ** 2 - fitted.rest.mean.u**2, 0.0))
-    return Outcome(
-        "", misfit=Misfit(name="rounding", amplitude_m=u_amplitude_m, offset_m=u_rest_m, damping_rate=u_rate)
-    )
+    return Misfit(name="rounding", amplitude_m=u_amplitude_m, offset_m=u_rest_m, damping_rate=u_rate)
