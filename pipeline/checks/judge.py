@@ -21,7 +21,7 @@ from pipeline.registry.found import Found
 from pipeline.samples.condition import Conditioned
 from pipeline.windows.lost_rows import LostRows
 
-# The tests of the residual in order. Each may accuse a run that follows its model with an equal share of FALSE_ALARM.
+# The tests of the residual in order. Those that decide by a probability alone get an equal share of FALSE_ALARM.
 TESTS: tuple[Callable[[Residual, float], Outcome | None], ...] = (
     folded_shape,
     held,

@@ -24,7 +24,7 @@ NOTICEABLE = 0.01
 # Ratio of a model's residual to the noise above which the part that the model does not describe is larger than the
 # noise, because variances add (ISO/IEC Guide 98-3).
 MISFIT = math.sqrt(2.0)
-# Standard deviations from which a normal deviate is an outlier: probability 6e-7, so none in a million samples.
+# Standard deviations from which a normal deviate is an outlier: probability 6e-7, so one in two million samples.
 OUTLIER = 5.0
 # Standard uncertainties by which one pair of values differs significantly: probability 0.3 %.
 SIGNIFICANT = 3.0

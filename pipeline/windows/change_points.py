@@ -32,7 +32,7 @@ def find_changes(t: F8, y: F8, u: F8) -> list[int]:
 
     with the correlation :math:`\\rho \\ge 0` of neighbouring residuals. So points with more scatter than stated, with
     correlation, or with a curve that p cannot follow carry less weight. F is compared with the quantile of the F
-    distribution with m and :math:`\\nu/\\lambda` degrees of freedom, at ``false_alarm`` over the number of tests.
+    distribution with m and :math:`\\nu/\\lambda` degrees of freedom, at :data:`FALSE_ALARM` over the number of tests.
     This is Bonferroni's bound for normal noise of unknown variance; it is conservative where the variance is known.
 
     The intervals are seeded [1]_: intervals of each length begin a quarter of this length apart. The series is split at

@@ -70,8 +70,8 @@ def find_cuts(conditioned: Conditioned, cycles: Cycles, demodulated: Demodulated
 
     Every window's sinusoid is fitted to the middle of its swing. Let :math:`z_j` be the shortfall of the median of
     crest j in standard uncertainties. Crests 1 to n are cut if n maximises :math:`\\sum_{j \\le n} z_j/\\sqrt n` and
-    this exceeds what noise reaches at any n with probability ``false_alarm`` (Bonferroni's bound). The first crests are
-    taken because a bob with decaying amplitude reaches a fixed object at first and later no longer.
+    this exceeds what noise reaches at any n with probability :data:`FALSE_ALARM` (Bonferroni's bound). The first crests
+    are taken because a bob with decaying amplitude reaches a fixed object at first and later no longer.
 
     A fixed object removes the motion beyond its level l, so the shortfall is :math:`\\max(0, h - l)` at height h. The
     level l minimises the residual, which must be less than that of :math:`c_2 h^2 + c_3 h^3`. The latter describes a

@@ -71,10 +71,10 @@ def simulate(
     integrator: str | Integrator = method if isinstance(method, str) else _own(method)
     if tolerance is None and method == "auto":
         tolerance = default_tolerance(band)
-    named = method if isinstance(method, str) else "auto"
-    wrong, _ = instability(ready.problem, named, spacing_s if tolerance is None else None)
-    if wrong:
-        raise DynamicsError(f'{wrong}; give times with a smaller step, a tolerance, or method="strang"')
+    if isinstance(method, str):
+        wrong, _ = instability(ready.problem, method, spacing_s if tolerance is None else None)
+        if wrong:
+            raise DynamicsError(f'{wrong}; give times with a smaller step, a tolerance, or method="strang"')
     solution = solve(ready.problem, integrator, spacing_s, times.size - 1, tolerance)
     around = np.zeros((4, times.size)) if band is None else band.displacement_at(times)
     of = {"displacement": solution.trajectory.y, "u_displacement": 0.5 * (around[2] - around[1])}

@@ -7,7 +7,6 @@ take longer to begin (``benchmarks/many.py``). Their samples are in memory toget
 from __future__ import annotations
 
 import json
-import re
 import shlex
 import sys
 from collections.abc import Sequence
@@ -35,7 +34,7 @@ from springmass.parameters import argument, flag, option, output
 from springmass.runs.inputs import files_of
 from springmass.runs.json_results import rejected
 from springmass.runs.options import How
-from springmass.runs.outputs import distinct_names, in_a_name, make_folder
+from springmass.runs.outputs import distinct_names, in_a_name, make_folder, safe_name
 from springmass.runs.questions import for_command, option_words
 from springmass.runs.run import Failed, Run, Task, analyse_all, law_lines
 from springmass.runs.scenes import read_scenes
@@ -114,7 +113,7 @@ def _results_name(run: Run) -> str:
     """
     path, channel = run.loaded.path, run.how.channel
     name = "stdin" if str(path) == STDIN else path.stem if run.loaded.format in ("run", "wire") else path.name
-    safe = "" if channel is None else re.sub(r"[^A-Za-z0-9.+-]+", "_", channel).strip("._")[:60]
+    safe = "" if channel is None else safe_name(channel)
     return in_a_name(f"{name}.{safe}" if safe else name, ".results")
 
 

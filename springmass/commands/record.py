@@ -8,7 +8,7 @@ import queue
 import shlex
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -149,7 +149,7 @@ def record(*, options: RecordOptions = RecordOptions(), page_options: PageOption
         page = None
         try:
             if options.page:
-                given = option_words({each.name: getattr(page_options, each.name) for each in fields(page_options)})
+                given = option_words(vars(page_options))
                 process = PageProcess(given, log, queue.SimpleQueue(), STOPS, session.failures, console.line)
                 page = beside.enter_context(process)
             ended = _Bench(session, options, log, console, release, page).record()
@@ -386,9 +386,8 @@ def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> I
         for address, family in zip(addresses, families * (len(addresses) // len(families)), strict=True):
             baud = options.baud or family.baud
             port = SerialPort(address, baud)
-            sensor = Sensor(family, port, options.rate_hz, given, calibration, baud, options.clock_ppm)
-            opened.callback(lambda each: each.port.close(), sensor)
-            sensors.append(sensor)
+            opened.callback(port.close)
+            sensors.append(Sensor(family, port, options.rate_hz, given, calibration, baud, options.clock_ppm))
         if virtual is not None:
             virtual.start()
             release.begin()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.findings.finding import kinds
@@ -98,6 +98,7 @@ def sentence(text: str) -> str:
 
 
 Grade = Literal["sound", "uncertain", "do not quote"]
+GRADES: tuple[Grade, ...] = get_args(Grade)
 UNCERTAIN = 0.05  # u over the value from which fewer than two digits are certain
 MEANINGLESS = 0.5  # u over the value from which zero is within two standard uncertainties
 _PARTS = frozenset({"times", "frequency", "distances", "scene"})
@@ -119,16 +120,13 @@ class Trust:
     why: str = ""
 
 
-GRADES: tuple[Grade, ...] = ("sound", "uncertain", "do not quote")
-
-
 def trust_of(analysis: Analysis) -> dict[str, Trust]:
     """Return the trust in every quantity of Table 1 by its name; empty if nothing oscillates.
 
-    A number is uncertain if it depends on an assumption that a warning names, or if fewer than two of its digits are
-    certain, or common to all amplitudes of which it is the average. It is not to be quoted if an error concerns it, if
-    zero is within two standard uncertainties, or if the recording contradicts the law that was stated for it. The worst
-    of these decides; every reason is kept.
+    A number is uncertain if it depends on an assumption that a warning names, if fewer than two of its digits are
+    certain, or if it is an average over amplitudes at which it differs by more than 5 %. It is not to be quoted if an
+    error concerns it, if zero is within two standard uncertainties, or if the recording contradicts the law that was
+    stated for it. The worst of these decides; every reason is kept.
     """
     motion = analysis.motion
     if not isinstance(motion, Oscillation):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -22,6 +21,7 @@ from springmass.report.words import summary as in_words
 from springmass.runs.comparing import Compared
 from springmass.runs.frames import smoothed_or_why
 from springmass.runs.json_results import plain
+from springmass.runs.outputs import safe_name
 from springmass.runs.rows import results_csv
 from springmass.runs.run import Run
 from storage.atomic import whole_folder, write_whole
@@ -130,7 +130,7 @@ def _stems(names: Sequence[str]) -> list[str]:
         return [""]
     stems: list[str] = []
     for i, name in enumerate(names, 1):
-        safe = re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("._")[:60] or f"run{i}"
+        safe = safe_name(name) or f"run{i}"
         taken = {stem.lower() for stem in stems}
         stems.append(f"{safe}_" if f"{safe}_".lower() not in taken else f"{safe}_{i}_")
     return stems

@@ -51,7 +51,7 @@ _NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := exponents_of(u
 _NAMES[(0.0,) * 5] = ""
 
 
-ROUNDING = 1e-13  # part of a value: a u below it is what cancelled correlations leave, as of period times frequency
+ROUNDING = 1e-13  # share of the value; a smaller u is left by correlations that cancel, as in period times frequency
 
 
 class Value(UFloat):  # type: ignore[misc]
@@ -145,7 +145,7 @@ def _unit_of(other: Any) -> str | None:
 
 
 def _unit(name: str, left: Any, right: Any) -> str | None:
-    """Return the unit of a sum, a product or a power; None if it is none of those that results have."""
+    """Return the unit of a sum, a product or a power; None if results have no such unit."""
     units = _unit_of(left), _unit_of(right)
     if name in ("add", "sub"):
         return units[0] if units[0] == units[1] else None

@@ -19,7 +19,7 @@ from pipeline.results.curves import Smoothed
 from pipeline.track import Quality
 from springmass.runs.arrays import ABOUT, about_json
 from springmass.runs.estimates import Value
-from springmass.runs.json_results import picked
+from springmass.runs.json_results import EXPANDED, picked
 from springmass.runs.loading import Loaded
 
 if TYPE_CHECKING:
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from springmass.runs.run import Run
-
-
-EXPANDED = ("dof", "coverage_factor", "expanded")
 
 
 def estimates_frame(run: Run, *, correlations: bool = False) -> pd.DataFrame:

@@ -21,6 +21,7 @@ from springmass import __version__
 from springmass.runs.loading import Loaded
 
 SCHEMA = 3
+EXPANDED = ("dof", "coverage_factor", "expanded")  # of a budget, for its expanded uncertainty
 
 
 def rejected(findings: Sequence[Mapping[str, str]]) -> list[str]:
@@ -117,7 +118,7 @@ def _budgets(analysis: Analysis) -> dict[str, Any]:
     return {
         name: {
             **plain(budget.estimate),
-            **plain(picked(budget, ("dof", "coverage_factor", "expanded"))),
+            **plain(picked(budget, EXPANDED)),
             "inputs": [_contribution(c) for c in budget.contributions],
         }
         for name, budget in analysis.motion.derived.budgets.items()
@@ -139,8 +140,8 @@ def _correlations(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
 
 def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
     if not wanted or not isinstance(analysis.motion, Oscillation):
-        nothing: dict[str, Any] = {"selected": None, "admissible": [], "stated": None, "law": None}
-        return nothing | {"weights": {}, "of_law": [], "coefficients": {}, "laws": {}}
+        none = dict.fromkeys(("selected", "stated", "law"))
+        return {**none, "admissible": [], "weights": {}, "of_law": [], "coefficients": {}, "laws": {}}
     damping, derived = analysis.motion.damping, analysis.motion.derived
     keys, coefficients = ("reduced_chi2", "dof", "bic", "rejected"), parameters_json(derived.coefficients)
     laws = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,6 +17,11 @@ from springmass.runs.loading import Loaded
 from storage.run_file.writing import write_run
 
 LONGEST_NAME = 255
+
+
+def safe_name(text: str) -> str:
+    """Return a text as a part of a file's name: at most 60 letters, digits and signs; empty if it has none."""
+    return re.sub(r"[^A-Za-z0-9.+-]+", "_", text).strip("._")[:60]
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:

@@ -141,7 +141,7 @@ def _laws(
         {
             "name": law,
             "status": status(law),
-            "look": "selected" if status(law) in ("selected", "stated") else "rejected" if fit.rejected else "",
+            "look": "rejected" if fit.rejected else "selected" if law == found.selected else "",
             "fit": fit,
             "chi2": _difference(fit.reduced_chi2 * fit.dof - chi2),
             "bic": _difference(fit.bic - found.best.bic),

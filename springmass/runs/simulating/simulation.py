@@ -166,7 +166,8 @@ def default_tolerance(band: Band | None) -> float:
 def instability(problem: Problem, method: str, step_s: float | None) -> tuple[str, str]:
     """Say what is wrong with a step beyond the limit of its method, and return the limit, s, rounded down.
 
-    Both are empty if it is stable, and the limit if there is none. Without a step it may be as short as needed.
+    Both are empty if the step is stable; the limit is empty too if no step is. Without a step it may be as short as
+    needed.
     """
     integrator = None if method == "auto" else get_integrator(method)
     limit = math.inf if integrator is None else integrator.stable_step(problem)
