@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.damping.law_fit import NEGATIVE, LawFit, choose, fit_law, least_chi2, mean_squared_rate, weigh
+from pipeline.damping.law_fit import NEGATIVE, LawFit, choose, fit_law, least_chi2, weigh
 from pipeline.damping.laws import LAWS, Drag, Law, find_law, free_power
 from pipeline.errors import AnalysisError
 from pipeline.numerics.least_squares import Fit
-from pipeline.numerics.levels import STRONG
+from pipeline.numerics.levels import OUTLIER, STRONG
 from pipeline.numerics.regression import Scatter, chi2_quantile, correlation_length, scatter
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
@@ -71,10 +71,6 @@ class Damping:
         """Return the fit of the law whose rate has exactly these powers of the amplitude; None if it has no fit."""
         fits = (fit for fit in self.fits.values() if isinstance(fit.law, Drag) and set(fit.law.powers) == set(powers))
         return next(fits, None)
-
-    def squared_rate(self, t: F8) -> float:
-        """Return :func:`pipeline.damping.law_fit.mean_squared_rate` of the selected law at times t (n,) in s."""
-        return mean_squared_rate(self.best, self.best.amplitude(t - self.t0))
 
 
 def fit_laws(
@@ -236,7 +232,7 @@ def _corner(fits: Mapping[str, LawFit], points: _Points) -> Scatter | None:
     typical, noise = mad_sigma(residual), float(np.median(points.noise))
     excess = math.sqrt(typical**2 - noise**2) if typical > 1.3 * noise else 0.0
     u = np.hypot(points.noise, excess)
-    kept = np.abs(residual) <= 5.0 * u
+    kept = np.abs(residual) <= OUTLIER * u
     if np.count_nonzero(kept) < 0.8 * kept.size:
         return None
     return Scatter(u, excess, kept, correlation_length(residual[kept] / u[kept]))

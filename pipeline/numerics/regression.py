@@ -9,6 +9,7 @@ import numpy as np
 from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 
+from pipeline.numerics.levels import OUTLIER
 from pipeline.numerics.robust import mad_sigma, median
 from pipeline.track import F8
 
@@ -105,7 +106,7 @@ def scatter(t: F8, y: F8, u: F8, *, degree: int = DEGREE) -> Scatter:
         excess = _excess(residual, u, spread)
         settled = excess == 0.0 and total is u
         total = np.hypot(u, excess) if excess else u
-        before, kept = kept, np.abs(residual) <= 5.0 * np.maximum(total, 1e-300)
+        before, kept = kept, np.abs(residual) <= OUTLIER * np.maximum(total, 1e-300)
         if settled and np.array_equal(before, kept):
             break
         if np.count_nonzero(kept) <= degree + 2:

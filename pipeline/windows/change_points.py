@@ -16,8 +16,8 @@ I8 = NDArray[np.int64]
 # between two lengths [1]_. Fewer than 8 points leave no degrees of freedom. Over more than 32 periods, drag and drift
 # are no longer cubic.
 LENGTHS = (10, 18, 32)
-# Minimum share of the intervals without a jump, whose scatter is typical. A jump lies in at most two thirds of the
-# intervals (see `_scatter`), so the probability that a typical interval contains it is zero.
+# Share of the intervals whose scatter is taken as typical: a jump lies in at most two thirds of them (see `_scatter`),
+# so the rest is free of it with a probability of one.
 UNDISTURBED = 1 / 3
 
 

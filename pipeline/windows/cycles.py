@@ -42,7 +42,6 @@ class NoOscillation:
     """The reason why no oscillation was found in a record."""
 
     why: str  # reason, in one sentence
-    code: str = "no_oscillation"  # code of the finding that states it
 
 
 def find_cycles(conditioned: Conditioned) -> Cycles | NoOscillation:

@@ -83,8 +83,8 @@ def demodulate(conditioned: Conditioned, cycles: Cycles) -> Demodulated:
     clusters that move with the bob and last a fifth of a period or more, so they may bias the first fit of a window.
     Weights of Cauchy's form, with a scale that shrinks from round to round, release the fit from them. Windows that
     disagree with their neighbours are fitted again from the neighbours' values. Then residuals beyond
-    :data:`CLIP_SIGMAS` are excluded permanently. A second pass uses the decay :math:`g` of each window. Without it, the conjugate line
-    would bias the amplitude by the fraction :math:`g/2\\omega`.
+    :data:`CLIP_SIGMAS` are excluded permanently. A second pass uses the decay :math:`g` of each window. Without it, the
+    conjugate line would bias the amplitude by the fraction :math:`g/2\\omega`.
     """
     windows = Windows.cut(conditioned, cycles.bounds)
     tuning = Tuning.constant(2.0 * math.pi * cycles.frequency_hz, len(windows.y))

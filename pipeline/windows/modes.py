@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.levels import OUTLIER
 from pipeline.numerics.robust import mad_sigma
 from pipeline.track import F8
 from pipeline.windows.demodulate import Demodulated
@@ -82,7 +83,7 @@ def _smooth(powers: F8, y: F8) -> F8:
     design, most = powers[1:-1], 2 * powers.shape[1]
     values = np.linalg.lstsq(design, y, rcond=None)[0]
     away = np.abs(y - design @ values)
-    kept = away <= 5.0 * mad_sigma(away)
+    kept = away <= OUTLIER * mad_sigma(away)
     if np.count_nonzero(kept) > most and not kept.all():
         values = np.linalg.lstsq(design[kept], y[kept], rcond=None)[0]
     return np.asarray(powers @ values)

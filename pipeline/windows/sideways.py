@@ -26,9 +26,9 @@ from pipeline.track import F8, UNUSABLE
 from pipeline.windows.demodulate import Demodulated
 from pipeline.windows.modes import C16, Carrier, Mode, Sideways
 
-# Multiples of the main frequency that bent scales and springs cause; they share half of the probability FALSE_ALARM.
+# Multiples of the main frequency that bent scales and springs cause; they share the probability CHANCE.
 HARMONICS = (2, 3)
-FALSE_ALARM = 0.01  # probability that a mode or a harmonic is found in a record without any; each has half of it
+CHANCE = 0.005  # probability that a mode is found in a record without any; as much again for a harmonic
 # Maximum degree of the polynomial for a mode's amplitude and phase. With 3, damping rates beside a mode move by 0.4 u,
 # as measured by `python -m tests.golden --only damped`.
 ENVELOPE = 4
@@ -63,7 +63,7 @@ def find_sideways(conditioned: Conditioned, demodulated: Demodulated) -> Sideway
     blocks = Blocks.of(t[believed], residual[believed], turn / 12.0, conditioned.track.rate_hz)
     band = _band(carrier, blocks)
     multiples = tuple(turns * carrier.angular_frequency / (2.0 * math.pi) for turns in HARMONICS)
-    if not worth_a_look(blocks, band, multiples, 0.5 * FALSE_ALARM):
+    if not worth_a_look(blocks, band, multiples, CHANCE):
         return Sideways((), carrier)
     return _Search(carrier, blocks, band).run()
 
@@ -96,7 +96,7 @@ class _Search:
         self.hole(*((turns * self.main_hz, width) for turns in HARMONICS))
         for _ in range(ROUNDS):
             peak = strongest(self.blocks, self.left, self.basis, self.band)
-            if peak is None or peak.false_alarm > 0.5 * FALSE_ALARM:
+            if peak is None or peak.false_alarm > CHANCE:
                 break
             mode, columns = self.free(peak)
             if not self.band.inside(np.array([mode.frequency_hz]))[0]:
@@ -133,7 +133,7 @@ class _Search:
         """Test the multiples of the main frequency one after another, each beyond those found before it."""
         trials = [self.blank(turns, turns * self.main_hz) for turns in HARMONICS if self.sought(turns * self.main_hz)]
         taken, fallen = np.empty((self.t.size, 0)), 0.0
-        least = evidence_for(0.5 * FALSE_ALARM, len(HARMONICS))
+        least = evidence_for(CHANCE, len(HARMONICS))
         for trial in trials:
             both = np.concatenate([taken, self.columns_of(trial)], axis=1)
             _, _, fitted = self.fit(both)
