@@ -82,9 +82,9 @@ class Stops:
 
     @contextlib.contextmanager
     def raising(self, now: bool) -> Iterator[None]:
-        """Raise KeyboardInterrupt for signals in this context and requests before it, or defer them until the next.
+        """Raise KeyboardInterrupt for signals in this context and requests made before it, or defer them.
 
-        A context that defers forgets the signals that come after the last one in it that raises.
+        With ``now`` false, signals wait for the next context inside with ``now``; if none follows, they raise nothing.
         """
         before, self._raises = self._raises, now
         try:

@@ -128,9 +128,8 @@ def outline(analysis: Analysis) -> str:
         return ""
     span = t[-1] - t[0]
     # A bin shorter than a period would not show the outline.
-    count = (
-        int(np.clip(span / period.value, FEWEST_BINS, BINS)) if (period := analysis.estimates.get("period")) else BINS
-    )
+    period = analysis.estimates.get("period")
+    count = BINS if period is None else int(np.clip(span / period.value, FEWEST_BINS, BINS))
     ends = np.searchsorted(t, t[0] + span * np.arange(count + 1) / count)
     filled = np.flatnonzero(np.diff(ends))
     low, high = (edge.reduceat(y, ends[filled]) for edge in (np.minimum, np.maximum))
@@ -144,7 +143,7 @@ def outline(analysis: Analysis) -> str:
 
 
 POINTS = 8  # of one run
-LARGEST = 1e100  # whose square is still finite
+LARGEST = 1e100  # maximum magnitude of a number in a row, whose square is still finite; larger ones are left out
 
 
 def drag_points(analysis: Analysis) -> list[list[float]]:

@@ -15,7 +15,7 @@ from pipeline.bench.scene import PLACES
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
-from springmass.charts.several import drag_points, outline
+from springmass.charts.several import LARGEST, drag_points, outline
 from springmass.course.plan import Job, code_sha256, digest_of
 from springmass.course.rows import ESTIMATES
 from springmass.errors import internal_error, quietly
@@ -25,8 +25,6 @@ from springmass.runs.questions import for_course
 from springmass.runs.run import Failed, Run, analyse_all
 from storage.errors import WriteFailed
 
-LARGEST = 1e100
-"""Maximum magnitude of numbers in a row, whose square is still finite. Larger estimates are left out."""
 DIGITS = 6  # decimal places of a correlation
 TIME = "by springmass batch"  # in place of a time, so that a pass at any time gives the same bytes
 

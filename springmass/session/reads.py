@@ -20,6 +20,7 @@ from acquisition.readings import NO_READINGS, Read, Reading
 from springmass.session.failures import Failures
 from springmass.session.sensors import Sensor
 from storage.recorder import Recorder
+from storage.recovery.report import SILENCE_S, SILENT_PERIODS
 from storage.wire_log.records import HIGHEST_CHANNEL
 
 HEARD_BYTES = 4096
@@ -28,8 +29,6 @@ HELD_SAMPLES = 1 << 15
 """Maximum samples per sensor waiting for the display: five minutes at 100 Hz if a display hangs, in 8 MB."""
 UNDECIDED_BYTES = 4096
 """Number of bytes from a network port without a reading after which its sensor counts as another part."""
-SILENCE_S, SILENT_PERIODS = 1.5, 5.0
-"""A sensor counts as absent if it was silent at the end for longer than this time, s, and this many periods."""
 
 
 @dataclass(slots=True)

@@ -129,15 +129,15 @@ class LossCount:
         another = [facts for facts in begins if facts.get("sensor") == "another"]
         overflows = [facts for _, kind, facts in events if kind == "overflow"]
         return Losses(
-            (end_ns - start_ns) * 1e-9,
-            max(gone_s, 0.0) if last and gone else None,
-            why[-1] if last and why else "",
-            tuple(_number(facts, "gap_s") for _, kind, facts in events if kind == "reopened" and goes_on(facts)),
-            str(another[0].get("why") or "by its serial number") if another else "",
-            self._total,
-            self._longest,
-            sum(int(_number(facts, "records")) for facts in overflows),
-            sum(int(_number(facts, "bytes")) for facts in overflows),
+            seconds=(end_ns - start_ns) * 1e-9,
+            gone_s=max(gone_s, 0.0) if last and gone else None,
+            why=why[-1] if last and why else "",
+            away=tuple(_number(facts, "gap_s") for _, kind, facts in events if kind == "reopened" and goes_on(facts)),
+            another=str(another[0].get("why") or "by its serial number") if another else "",
+            no_target_s=self._total,
+            longest_no_target_s=self._longest,
+            dropped_reads=sum(int(_number(facts, "records")) for facts in overflows),
+            dropped_bytes=sum(int(_number(facts, "bytes")) for facts in overflows),
         )
 
     def _add(self, stretches: np.ndarray[Any, Any]) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 
 from storage.run_file.reading import open_run
-from tests.encoders import sealed
+from tests.encoders import sealed, with_sum
 
 RATE_HZ = 100.0
 FIRST_US, STEP_US = 1000.0, 0.25
@@ -41,8 +41,7 @@ def line_of(number: int) -> bytes:
 
 def frame_of(millimetres: int) -> bytes:
     """Return four bytes of an A02YYUW: header, millimetres, sum."""
-    high, low = divmod(millimetres, 256)
-    return bytes([0xFF, high, low, (0xFF + high + low) % 256])
+    return with_sum(bytes([0xFF, *divmod(millimetres, 256)]))
 
 
 def usual_signals() -> None:

@@ -1,9 +1,9 @@
 """Workbooks, xlsx and xls (python-calamine): every sheet with rows of numbers is a run.
 
-Cells are binary numbers; they are printed with as many decimals as the longest number of their column needs for the
-fifteen digits that a workbook shows, and read like a text. A file of a few bytes can make
-calamine reserve any amount of memory, and crash its process if there is not enough, so calamine runs in a child process
-with limits of time and memory.
+Cells are binary numbers. Each column is printed as text with one number of decimals, enough for the fifteen digits that
+a workbook shows, and the text is read like a file. A workbook of a few bytes can make calamine reserve any amount of
+memory, and crash its process if there is not enough, so calamine runs in a child process with limits of time and
+memory.
 """
 
 from __future__ import annotations

@@ -46,9 +46,9 @@ def find_rate(t: F8, resolution: float, rate_hz: float | None = None) -> tuple[f
     """Infer the rate from printed times (s) with a last digit of ``resolution``; None without two different times.
 
     Times may repeat, run backward or be missing. If the rate is known, only grids of this rate are tried. Return the
-    rate in Hz, the relative half-width of the range of rates that are compatible with the rounding of the times, and
-    the grid from which the times were rounded, or None if they fit no grid. The rate is certain if no grid with a rate
-    one hertz higher or lower fits equally well.
+    rate in Hz, the relative half-width of the range of rates that are compatible with the rounding of the times, the
+    grid from which the times were rounded, or None if they fit no grid, and whether the rate is certain: no grid with
+    a rate one hertz higher or lower fits equally well.
     """
     times = t if (t[1:] > t[:-1]).all() else np.unique(t[np.isfinite(t)])
     if times.size < 2:

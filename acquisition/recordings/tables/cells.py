@@ -147,7 +147,8 @@ def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
 def scaled(values: F8, decimals: I1 | None, power: int) -> F8:
     """Return numbers times ten to a power, rounded only once if they are printed without exponents.
 
-    A number printed with d decimals is a whole number over 10**d, so its product is one over 10**(d - power).
+    A number printed with d decimals is a whole number over 10**d, so the product is a whole number over
+    10**(d - power), and is rounded to that.
     """
     result: F8 = values * 10.0**power if power >= 0 else values / 10.0**-power
     if decimals is None or not power or decimals.max(initial=0) >= EXPONENT:

@@ -228,14 +228,14 @@ def set_back(table: Table) -> list[Table]:
     clear = bool((steps[back - 1] < -_SET_BACK * usual).all())
     if not 1 <= back.size <= _MOST_SET or not clear or min(np.diff(edges)) < _FEWEST_ROWS:
         return [table]
+    numbers, words, *at_the_end = table.lines
     return [
         replace(
             table,
             columns=tuple(each.part(start, stop) for each in table.columns),
             times=table.times.part(start, stop),
-            lines=Lines(table.lines.numbers[start:stop], table.lines.words[start:stop], *table.lines[2:])
-            if stop == t.size
-            else Lines(table.lines.numbers[start:stop], table.lines.words[start:stop]),
+            # Only the last part ends where the file ends.
+            lines=Lines(numbers[start:stop], words[start:stop], *(at_the_end if stop == t.size else ())),
             beside=tuple(each.part(start, stop) for each in table.beside),
             run=f"{table.run}, part {number}" if table.run else f"Part {number}",
         )
