@@ -23,7 +23,7 @@ from pathlib import Path
 
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
-from springmass.session.progress import Progress
+from springmass.session.live_state import Progress
 from springmass.session.sensors import Sensor
 from springmass.session.session import RunLimits, RunListeners, Session
 from storage.recovery.recover import recover

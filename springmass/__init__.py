@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from pipeline.bench.scene import Scene
     from pipeline.damping.laws import LAWS
     from pipeline.damping.laws.of_function import make_law
+    from springmass.api.analysing import analyse, compare, load
+    from springmass.api.blocks import source
     from springmass.api.courses import batch, results
     from springmass.api.simulation import simulate
-    from springmass.api.source import source
-    from springmass.api.sources import analyse, compare, load
     from springmass.api.stream import Stream
     from springmass.errors import Error
     from springmass.runs.loading import sample_data
@@ -39,15 +39,15 @@ else:
         "Scene": "pipeline.bench.scene",
         "Sensor": "acquisition.decoders.family:Family",
         "Stream": "springmass.api.stream",
-        "analyse": "springmass.api.sources",
+        "analyse": "springmass.api.analysing",
         "batch": "springmass.api.courses",
-        "compare": "springmass.api.sources",
-        "load": "springmass.api.sources",
+        "compare": "springmass.api.analysing",
+        "load": "springmass.api.analysing",
         "make_law": "pipeline.damping.laws.of_function",
         "results": "springmass.api.courses",
         "sample_data": "springmass.runs.loading",
         "simulate": "springmass.api.simulation",
-        "source": "springmass.api.source",
+        "source": "springmass.api.blocks",
     }
 
     def __getattr__(name):

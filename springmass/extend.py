@@ -13,7 +13,7 @@ from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
 from acquisition.decoders.frames import FramedDecoder, LineSplitter, SumFrames, with_sum
 from acquisition.errors import FormatError, NeedsAnswer, SensorError
 from acquisition.readings import Reading, Readings
-from acquisition.recordings.families.declared import dialect
+from acquisition.recordings.families.user_dialects import dialect
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Format, Original, Recording, SurveyFormat, Trap
 from acquisition.recordings.sampling.timing import Formula

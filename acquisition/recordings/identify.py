@@ -1,7 +1,7 @@
 """The formats of recordings, the identification of a file's format, and a remedy for known files that none reads.
 
 The module of a format is imported on demand. Another package adds a format with an entry point in the group
-``springmass.formats``; a user can declare one without code (:mod:`acquisition.recordings.families.declared`).
+``springmass.formats``; a user can declare one without code (:mod:`acquisition.recordings.families.user_dialects`).
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def _loaders() -> dict[str, Callable[[], Format]]:
     """Return what loads each format, in the order in which they are tried: the user's first, the general ones last."""
     loaders: dict[str, Callable[[], Format]] = {}
     if (folder := dialect_folder()).is_dir():
-        for each in import_module("acquisition.recordings.families.declared").dialects():
+        for each in import_module("acquisition.recordings.families.user_dialects").dialects():
             if each.name in (*_MODULES, "table", "sketch"):
                 where = folder / f"{each.name}.toml"
                 raise AcquisitionError(f'{where}: expected a new name, got the format "{each.name}"; rename the file')

@@ -9,14 +9,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Unpack
 
 from failure import Error
-from springmass.api.sources import Analysing, AnyScene, analyse
-from springmass.course.rows import NUMBERS, WHOLE, columns_of, read_rows
+from springmass.api.analysing import Analysing, AnyScene, analyse
+from springmass.course.results_csv import NUMBERS, WHOLE, columns_of, read_rows
 from springmass.course.worker import row_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from springmass.api.sources import AnySource
+    from springmass.api.analysing import AnySource
 
 
 def batch(

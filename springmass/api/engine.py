@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
-from springmass.api.sources import load
+from springmass.api.analysing import load
 from springmass.runs.inputs import kind_of
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import DynamicsError
-from springmass.api.sources import AnyScene
+from springmass.api.analysing import AnyScene
 from springmass.runs.scenes import scene_from
 from springmass.runs.simulating.simulation import band_of, default_tolerance, instability, prepare, solve
 

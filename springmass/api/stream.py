@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.errors import AnalysisError
-from springmass.api.sources import AnyScene
+from springmass.api.analysing import AnyScene
 from springmass.runs.options import How
 from springmass.runs.run import Run
 from springmass.runs.scenes import scene_from

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from springmass.commands.options import File, refuse
 from springmass.course.page import GROUPS, PAGE
 from springmass.course.plan import plan, template
-from springmass.course.rows import CSV, FAILED
+from springmass.course.results_csv import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell

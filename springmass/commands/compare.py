@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
 from springmass.commands.options import Figures, File, Json, Scenes, Strict, refuse
-from springmass.course.rows import COURSE, is_course, read_rows
+from springmass.course.results_csv import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
 from springmass.parameters import Share, argument, option, output
 from springmass.runs.comparing import Compared, beside, compare_runs, comparison_json

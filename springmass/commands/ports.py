@@ -12,7 +12,7 @@ from acquisition.live.serial_port import list_ports
 from springmass.commands.options import Json
 from springmass.errors import OK, suggest
 from springmass.parameters import flag, option
-from springmass.session.finding import listen
+from springmass.session.detect import listen
 from springmass.terminal.printing import wrapped
 
 

@@ -28,7 +28,7 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.options import File, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
-from springmass.page.process import PageProcess
+from springmass.page.recorder_side import PageProcess
 from springmass.parameters import (
     PartsPerMillion,
     Positive,
@@ -43,16 +43,16 @@ from springmass.runs.outputs import made_now
 from springmass.runs.questions import option_words
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.bench import EXAMPLE, REST_M, Release, bench_position
-from springmass.session.finding import name_sensors
-from springmass.session.operator import Closed, Operator
-from springmass.session.output import default_name, demand_new
+from springmass.session.bench_requests import Closed, Operator
+from springmass.session.detect import name_sensors
+from springmass.session.file_names import default_name, demand_new
 from springmass.session.sensors import Sensor
 from springmass.session.session import BYTES_PER_READ, Ended, RunLimits, RunListeners, Session
 from springmass.session.trigger import Disarmed, Trigger
 from springmass.stops import STOPS, EndReason
 from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys
-from springmass.terminal.recording import ProgressLine
+from springmass.terminal.progress_line import ProgressLine
 from springmass.terminal.style import style_of, watched
 from storage.errors import WriteFailed, one_line
 from storage.recorder import check_disk

@@ -15,7 +15,7 @@ from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.compare import SpringRun
 from pipeline.results.course import Agreement, CourseRun, Disagreement, Suspect, agreement, judged
-from springmass.course.rows import COURSE
+from springmass.course.results_csv import COURSE
 from springmass.errors import UNREADABLE, ProgramError
 
 BENCHES = ("bench", "group", "section", COURSE)

@@ -16,7 +16,7 @@ from pipeline.results.course import LITTLE
 from springmass.charts.chart import Chart
 from springmass.charts.several import course, drag_map
 from springmass.course.benches import BENCHES, CourseComparison
-from springmass.course.rows import COURSE, FAILED
+from springmass.course.results_csv import COURSE, FAILED
 from springmass.report.advice import sentence
 from springmass.terminal.printing import visible_lines
 from storage.atomic import write_whole

@@ -22,7 +22,7 @@ from acquisition.recordings.identify import dialect_folder
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.registry.laws import ANY_LAW, law_names
-from springmass.course.rows import RESERVED
+from springmass.course.results_csv import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
 from springmass.runs.inputs import InputFile, files_of

@@ -14,7 +14,7 @@ from springmass.course.benches import compare_rows
 from springmass.course.executors import outcomes, workers
 from springmass.course.page import line_of, mark, write_groups, write_page
 from springmass.course.plan import Job, Plan, code_sha256, names_of
-from springmass.course.rows import COURSE, FAILED, write_rows
+from springmass.course.results_csv import COURSE, FAILED, write_rows
 from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
 from springmass.errors import ProgramError, complain, manner

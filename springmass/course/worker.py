@@ -17,7 +17,7 @@ from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
 from springmass.charts.several import LARGEST, drag_points, outline
 from springmass.course.plan import Job, code_sha256, digest_of
-from springmass.course.rows import ESTIMATES
+from springmass.course.results_csv import ESTIMATES
 from springmass.errors import internal_error, quietly
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.html import SHARED

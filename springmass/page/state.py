@@ -14,7 +14,7 @@ from springmass.page.feeds import LogFeed
 from springmass.page.live_analysis import Watcher
 from springmass.page.view import View
 from springmass.runs.scenes import about_of, write_about
-from springmass.session.progress import free_bytes
+from springmass.session.live_state import free_bytes
 
 ASIDE = "discarded"
 """Folder next to the runs for discarded runs."""

@@ -27,7 +27,7 @@ from pipeline.streaming import LiveMotion, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
 from springmass.session.failures import Failures, Worker
-from springmass.session.progress import SECOND_NS, LiveState, Progress, free_bytes, trouble_of
+from springmass.session.live_state import SECOND_NS, LiveState, Progress, free_bytes, trouble_of
 from springmass.session.reads import Tee
 from springmass.session.sensors import ANSWERED, Sensor, meeting
 from springmass.session.trigger import Disarmed, Trigger, Watch

@@ -14,7 +14,7 @@ import pytest
 
 from springmass.cli import main
 from springmass.course.benches import compare_rows
-from springmass.course.rows import COURSE, read_rows
+from springmass.course.results_csv import COURSE, read_rows
 from tests.courses import write_recording
 from tests.synthetic import Truth, noisy, times
 

@@ -22,7 +22,7 @@ import numpy as np
 from acquisition.block import B1, F8, I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.recording import Original, Recording, Survey, Trap
-from acquisition.recordings.sampling.samples import IRREGULAR, UNREAD_FLAGS, time_flags
+from acquisition.recordings.sampling.flags import IRREGULAR, UNREAD_FLAGS, time_flags
 from acquisition.recordings.sampling.timing import median
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
 from acquisition.recordings.tables.channel import Samples, check_values, read_channel

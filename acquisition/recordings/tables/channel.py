@@ -12,7 +12,7 @@ import numpy as np
 from acquisition.block import B1, F8, I8, U8, Block, ClockKind, Flag, Kind, SourceInfo
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import Original, Recording, Trap
-from acquisition.recordings.sampling.samples import (
+from acquisition.recordings.sampling.flags import (
     UNREAD_FLAGS,
     line_of,
     place,

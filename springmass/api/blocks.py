@@ -18,15 +18,15 @@ from acquisition.decoders.registry import get_family
 from acquisition.live.serial_port import SerialPort
 from acquisition.replay import Replay
 from pipeline.bench.scene import Scene
-from springmass.api.sources import AnyScene, Reading
+from springmass.api.analysing import AnyScene, Reading
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.runs.loading import Loaded, load, to_track
 from springmass.runs.options import ReadOptions
 from springmass.runs.outputs import made_now, save_run
 from springmass.runs.scenes import scene_from
 from springmass.runs.simulating.bench import bench_position
-from springmass.session.finding import name_sensors
-from springmass.session.output import demand_new
+from springmass.session.detect import name_sensors
+from springmass.session.file_names import demand_new
 from springmass.session.sensors import Sensor
 from springmass.session.session import Session
 from storage.recorder import Recorder

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.streaming import LiveMotion, NotYet
-from springmass.session.progress import Progress, TroubleKind
+from springmass.session.live_state import Progress, TroubleKind
 from springmass.terminal.console import Console
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 

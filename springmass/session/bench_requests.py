@@ -22,7 +22,7 @@ from storage.errors import WriteFailed
 from storage.recorder import Recorder
 
 if TYPE_CHECKING:
-    from springmass.page.process import PageProcess
+    from springmass.page.recorder_side import PageProcess
 
 LOOK_S = 0.05
 PREVIEW_NS = 600_000_000_000
