@@ -28,13 +28,13 @@ _MODULES = {
     "tdms": "tdms",
     "workbook": "workbook",
     "zip": "archive",
-    "capstone": "dialects:CAPSTONE",
-    "datastudio": "dialects:DATASTUDIO",
-    "vernier": "dialects:VERNIER",
-    "logger-pro": "saved:LOGGER_PRO",
-    "phyphox": "saved:PHYPHOX",
-    "cassy": "saved:CASSY",
-    "tracker": "saved:TRACKER",
+    "capstone": "pasco:CAPSTONE",
+    "datastudio": "pasco:DATASTUDIO",
+    "vernier": "vernier:VERNIER",
+    "logger-pro": "vernier:LOGGER_PRO",
+    "phyphox": "phyphox",
+    "cassy": "cassy",
+    "tracker": "tracker",
 }
 """For each name of a format its module in ``families``, and the format's name there if it is not FORMAT."""
 

@@ -1,1 +1,1 @@
-"""One module per family of recordings; families of text that differ only in their headings share ``dialects``."""
+"""One module per program or format of file that makes recordings; ``user_dialects`` has those that a user declares."""

@@ -25,11 +25,12 @@ from acquisition.recordings.recording import Original, Recording, Survey, Trap
 from acquisition.recordings.sampling.flags import IRREGULAR, UNREAD_FLAGS, time_flags
 from acquisition.recordings.sampling.timing import median
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
-from acquisition.recordings.tables.channel import Samples, check_values, read_channel
+from acquisition.recordings.tables.channel import check_values, read_channel
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.layout import columns_of, find_table, runs_forward
+from acquisition.recordings.tables.samples import Samples
 from acquisition.recordings.tables.table import Header, Table
 from acquisition.units import LENGTHS
 

@@ -1,4 +1,4 @@
-"""Turn printed columns into samples with times and flags, and report their peculiarities."""
+"""Find times for rows that were not read, flag repeated and backward times and gaps, and report what is peculiar."""
 
 from __future__ import annotations
 
