@@ -133,7 +133,7 @@ def concatenate(blocks: Iterable[Block]) -> Block:
     )
 
 
-Kind = Literal["live", "replay", "simulated"]
+SourceKind = Literal["live", "replay", "simulated"]
 ClockKind = Literal["nominal", "device", "host"]
 
 
@@ -159,7 +159,7 @@ class SourceInfo:
         Error of a distance as stated in the recording, m; None if not stated. It may differ from the noise.
     """
 
-    kind: Kind
+    kind: SourceKind
     name: str
     rate_hz: float
     sigma_m: float | None = None

@@ -18,7 +18,7 @@ import numpy as np
 
 from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import Clock
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Sensor
 from acquisition.errors import SensorError
 from acquisition.readings import carried
 
@@ -130,7 +130,7 @@ class VirtualPort:
 
     def __init__(
         self,
-        family: Family,
+        family: Sensor,
         rangefinder: VirtualRangefinder,
         clock: Clock,
         *,

@@ -24,7 +24,7 @@ from pathlib import Path
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from springmass.session.live_state import Progress
-from springmass.session.sensors import Sensor
+from springmass.session.sensors import OpenSensor
 from springmass.session.session import RunLimits, RunListeners, Session
 from storage.recovery.recover import recover
 from storage.wire_log.scanning import read_log
@@ -145,7 +145,7 @@ def recover_here(log: Path) -> Cost:
 def record(hours: float, points: int) -> tuple[list[tuple[float, float]], int, int, Cost]:
     """Record; return (hours, MB) at ``points`` times, readings in the log, dropped records, and recovery cost."""
     clock = LockstepClock()
-    session = Session([Sensor(get_family("line-protocol"), SimulatedPort(clock))], clock, kind="simulated")
+    session = Session([OpenSensor(get_family("line-protocol"), SimulatedPort(clock))], clock, kind="simulated")
     seconds = hours * 3600.0
     seen: list[tuple[float, float]] = []
 

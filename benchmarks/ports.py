@@ -31,12 +31,12 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
 from acquisition.live.decoding import SensorChain
-from acquisition.live.reader import Line, PortReader
+from acquisition.live.reader import PortLine, PortReader
 from acquisition.live.serial_port import SerialPort
 from acquisition.readings import Read
 from springmass.session.reads import Tee
 from storage.recorder import Recorder
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
 
 PLANS = ((1, 100.0), (1, 1000.0), (16, 100.0))
@@ -105,7 +105,7 @@ def measure(*, ports: int, rate_hz: float, seconds: float) -> Figures:
         chains = [SensorChain(family, rate_hz=rate_hz) for _ in paths]
         tee = TimedTee(chains)
         tee.start(recorder, chains, 0)
-        reader = PortReader([Line(SerialPort(path, BAUD), i) for i, path in enumerate(paths)], tee, clock)
+        reader = PortReader([PortLine(SerialPort(path, BAUD), i) for i, path in enumerate(paths)], tee, clock)
         reader.start()
         over = threading.Event()
         over.wait(SETTLE_S)
@@ -132,7 +132,7 @@ def measure(*, ports: int, rate_hz: float, seconds: float) -> Figures:
         reader.stop()
         received += sum(len(block) for _, block in tee.blocks())
         recorder.close()
-        recorded = sum(r.payload.count(b"\n") for r in read_log(recorder.path) if r.kind is Kind.DATA)
+        recorded = sum(r.payload.count(b"\n") for r in read_log(recorder.path) if r.kind is RecordKind.DATA)
         sender.stdin.write("end\n")
     p50, p99 = np.percentile(tee.delays_us, [50, 99]) / 1000 if tee.delays_us else (np.inf, np.inf)
     return Figures(received, expected, recorded, used / took, float(p50), float(p99))

@@ -20,14 +20,14 @@ from pipeline.errors import AnalysisError
 from pipeline.options import TIERS, options_for
 from pipeline.results.classic import classic
 from pipeline.track import F8, Track
-from springmass.trade import QUANTITIES, Kind, Motion, bounds, record
+from springmass.trade import QUANTITIES, Motion, Trouble, bounds, record
 
 FIGURE = Path(__file__).resolve().parents[1] / "docs" / "figures" / "trade.svg"
 MOTION = Motion(seconds=120.0)
 CASES = {
-    "f, A, γ at 0.3 mm": (MOTION, Kind()),
-    "f, A, γ at 2.39 mm": (replace(MOTION, noise_m=0.00239), Kind()),
-    "f, A, γ at 0.3 mm, 5 % echoes": (MOTION, Kind(echoes=0.05)),
+    "f, A, γ at 0.3 mm": (MOTION, Trouble()),
+    "f, A, γ at 2.39 mm": (replace(MOTION, noise_m=0.00239), Trouble()),
+    "f, A, γ at 0.3 mm, 5 % echoes": (MOTION, Trouble(echoes=0.05)),
 }
 Values = Mapping[str, float]
 Row = tuple[float, dict[str, float]]  # time in s, and errors over their bounds
@@ -113,7 +113,7 @@ METHODS: dict[str, Callable[[Track], Values]] = {
 }
 
 
-def measure(motion: Motion, kind: Kind, seeds: int) -> dict[str, Row]:
+def measure(motion: Motion, kind: Trouble, seeds: int) -> dict[str, Row]:
     """Run all methods in turn on each record, so that a busy machine slows all of them alike."""
     bound, truth = bounds(motion, kind), motion.truth()
     errors: dict[str, dict[str, list[float]]] = {name: {} for name in METHODS}

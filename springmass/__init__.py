@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from acquisition.decoders.family import Family as Sensor
+    from acquisition.decoders.family import Sensor
     from acquisition.recordings.recording import Format
     from pipeline.bench.scene import Scene
     from pipeline.damping.laws import LAWS
@@ -37,7 +37,7 @@ else:
         "LAWS": "pipeline.damping.laws",
         "Run": "springmass.runs.run",
         "Scene": "pipeline.bench.scene",
-        "Sensor": "acquisition.decoders.family:Family",
+        "Sensor": "acquisition.decoders.family",
         "Stream": "springmass.api.stream",
         "analyse": "springmass.api.analysing",
         "batch": "springmass.api.courses",
@@ -55,8 +55,7 @@ else:
 
         if name not in _WHERE:
             raise AttributeError(f"module 'springmass' has no attribute {name!r}; it has {', '.join(__all__)}")
-        module, _, known_as = _WHERE[name].partition(":")
-        return getattr(importlib.import_module(module), known_as or name)
+        return getattr(importlib.import_module(_WHERE[name]), name)
 
     def __dir__():
         return sorted(__all__)

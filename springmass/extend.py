@@ -7,15 +7,17 @@ add.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import Clock, SystemClock, VirtualClock
-from acquisition.decoders.family import Decoder, Encoder, Family, Identity, Poll
+from acquisition.decoders.family import Decoder, Encoder, Identity, Poll, Sensor
 from acquisition.decoders.frames import FramedDecoder, LineSplitter, SumFrames, with_sum
 from acquisition.errors import FormatError, NeedsAnswer, SensorError
 from acquisition.readings import Reading, Readings
 from acquisition.recordings.families.user_dialects import dialect
 from acquisition.recordings.questions import Missing, MissingItem, Question
-from acquisition.recordings.recording import Format, Original, Recording, SurveyFormat, Trap
+from acquisition.recordings.recording import Format, FormatIssue, Original, Recording, SurveyFormat
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat, text_format
 from acquisition.recordings.tables.headings import Heading
@@ -31,10 +33,23 @@ from pipeline.numerics.quantity import Unit
 # fmt: off
 __all__ = [
     "AnalysisError", "Block", "Clock", "Column", "ColumnFormat", "Decoder", "DynamicsError", "Encoder", "Equation",
-    "Family", "Flag", "Format", "FormatError", "Formula", "FramedDecoder", "Header", "Heading", "Identity",
+    "Flag", "Format", "FormatError", "FormatIssue", "Formula", "FramedDecoder", "Header", "Heading", "Identity",
     "Integrator", "Law", "LineSplitter", "Missing", "MissingItem", "NeedsAnswer", "OneStep", "Original", "Poll",
-    "Problem", "Question", "Reading", "Readings", "Recording", "SensorError", "SourceInfo", "SumFrames",
-    "SurveyFormat", "SystemClock", "Table", "Trajectory", "Trap", "Unit", "VirtualClock", "acceleration", "auto",
-    "dialect", "get_integrator", "make_law", "text_format", "with_sum",
+    "Problem", "Question", "Reading", "Readings", "Recording", "Sensor", "SensorError", "SourceInfo", "SumFrames",
+    "SurveyFormat", "SystemClock", "Table", "Trajectory", "Unit", "VirtualClock", "acceleration", "auto", "dialect",
+    "get_integrator", "make_law", "text_format", "with_sum",
 ]
 # fmt: on
+
+if not TYPE_CHECKING:
+    _UNTIL_0_4 = {"Family": "Sensor", "Trap": "FormatIssue"}
+    """Names of earlier versions, each with its name since 0.4, in which the earlier ones are imported last."""
+
+    def __getattr__(name):
+        import warnings
+
+        if name not in _UNTIL_0_4:
+            raise AttributeError(f"module 'springmass.extend' has no attribute {name!r}")
+        message = f"springmass.extend.{name} is {_UNTIL_0_4[name]} since 0.4; import it by that name"
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return globals()[_UNTIL_0_4[name]]

@@ -89,7 +89,7 @@ def motion_of_problem(problem: Problem, noise_m: float | None, seconds: float) -
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
+class Trouble:
     """What spoils a record; lengths are relative to the amplitude."""
 
     periods: float | None = None
@@ -101,21 +101,21 @@ class Kind:
     second: float = 0.0  # amplitude of a mode at six tenths of the frequency
 
 
-KINDS = {
-    "clean": Kind(),
-    "1.6 periods": Kind(periods=1.6),
-    "3 periods": Kind(periods=3.0),
-    "noise 10 dB above the motion": Kind(noise_db=10.0),
-    "5 % false echoes": Kind(echoes=0.05),
-    "20 % false echoes": Kind(echoes=0.2),
-    "crests clipped at 80 %": Kind(clip=0.8),
-    "quantised to 2 %": Kind(quantum=0.02),
-    "rest drifts by 4 %": Kind(drift=0.04),
-    "second mode of 2 %": Kind(second=0.02),
+TROUBLES = {
+    "clean": Trouble(),
+    "1.6 periods": Trouble(periods=1.6),
+    "3 periods": Trouble(periods=3.0),
+    "noise 10 dB above the motion": Trouble(noise_db=10.0),
+    "5 % false echoes": Trouble(echoes=0.05),
+    "20 % false echoes": Trouble(echoes=0.2),
+    "crests clipped at 80 %": Trouble(clip=0.8),
+    "quantised to 2 %": Trouble(quantum=0.02),
+    "rest drifts by 4 %": Trouble(drift=0.04),
+    "second mode of 2 %": Trouble(second=0.02),
 }
 
 
-def spoilt(motion: Motion, kind: Kind) -> Motion:
+def spoilt(motion: Motion, kind: Trouble) -> Motion:
     """Return the motion with the length and the noise of a kind of records."""
     if kind.periods is not None:
         motion = replace(motion, seconds=kind.periods / motion.frequency_hz)
@@ -125,7 +125,7 @@ def spoilt(motion: Motion, kind: Kind) -> Motion:
     return motion
 
 
-def record(motion: Motion, kind: Kind, rng: np.random.Generator) -> F8:
+def record(motion: Motion, kind: Trouble, rng: np.random.Generator) -> F8:
     """Return the distances of one record in m, with a random phase."""
     t, size = motion.t, float(motion.theta[0])
     angle, rest = 2.0 * math.pi * motion.frequency_hz * t, 4.0 * size
@@ -140,7 +140,7 @@ def record(motion: Motion, kind: Kind, rng: np.random.Generator) -> F8:
     return np.asarray(y)
 
 
-def bounds(motion: Motion, kind: Kind) -> dict[str, float]:
+def bounds(motion: Motion, kind: Trouble) -> dict[str, float]:
     """Return the least standard deviations of unbiased estimates (Cramér-Rao) where the law is known.
 
     They follow from the inverse Fisher information of frequency, phase, offset and the law's parameters in white noise,
@@ -173,7 +173,7 @@ def _rate(law: Law, theta: F8) -> float:
 
 def measure_tiers(motion: Motion, seeds: int) -> Iterator[list[dict[str, Any]]]:
     """Yield for each kind of records the errors and the time of every tier; all evaluate the same records in turn."""
-    for name, kind in KINDS.items():
+    for name, kind in TROUBLES.items():
         found = spoilt(motion, kind)
         bound, truth = bounds(found, kind), found.truth()
         asked = [each for each in QUANTITIES if bound[each] > 0.0]  # without damping there is no rate to find

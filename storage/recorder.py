@@ -21,8 +21,8 @@ from typing import Any, Self
 from acquisition.clock import Clock
 from acquisition.readings import Read
 from storage.errors import DiskNearlyFull, NotALog, WriteFailed, one_line
-from storage.wire_log.appending import Item, LogFile, WireLogWriter, open_log_file
-from storage.wire_log.records import HEAD_BYTES, HIGHEST_CHANNEL, MAX_PAYLOAD, Kind, LogHeader, event_payload
+from storage.wire_log.appending import LogFile, LogItem, WireLogWriter, open_log_file
+from storage.wire_log.records import HEAD_BYTES, HIGHEST_CHANNEL, MAX_PAYLOAD, LogHeader, RecordKind, event_payload
 from storage.wire_log.scanning import LogContents, read_log
 
 QUEUE_BYTES = 16 << 20
@@ -77,11 +77,11 @@ class Recorder:
         self._limit = queue_bytes
         self._lock = threading.Lock()
         self._done = threading.Condition(self._lock)
-        self._queue: list[Item] = []
+        self._queue: list[LogItem] = []
         # Receives an item whenever the empty queue is filled. A Condition is written in Python and costs twice as much.
         self._wakeup: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._queued_bytes = 0
-        self._taken: list[Item] = []  # what the disk has not answered yet
+        self._taken: list[LogItem] = []  # what the disk has not answered yet
         # The reads that each channel has lost since the queue became full: time of the last one, and the event's facts.
         self._overflows: dict[int, tuple[int, dict[str, int]]] = {}
         self._dropped_records = self._dropped_bytes = 0
@@ -115,12 +115,12 @@ class Recorder:
     def unwritten(self) -> tuple[int, int]:
         """Return the number of reads that the disk has not taken, and their bytes: they still wait, or were dropped."""
         with self._lock:
-            waiting = [len(item[3]) for item in (*self._taken, *self._queue) if item[0] is Kind.DATA]
+            waiting = [len(item[3]) for item in (*self._taken, *self._queue) if item[0] is RecordKind.DATA]
             return self._dropped_records + len(waiting), self._dropped_bytes + sum(waiting)
 
     def reads(self, reads: Sequence[Read]) -> None:
         """Record reads of ports. This never waits for the disk and never raises a disk error."""
-        self._offer(Kind.DATA, reads)
+        self._offer(RecordKind.DATA, reads)
 
     def put(self, channel: int, host_ns: int, data: bytes) -> None:
         """Record the bytes of one read of a port."""
@@ -129,11 +129,11 @@ class Recorder:
     def mark(self, text: str, *, host_ns: int | None = None, channel: int = 0) -> None:
         """Record a mark."""
         now = self._clock.now_ns() if host_ns is None else host_ns
-        self._offer(Kind.MARK, ((channel, now, text.encode("utf-8", "replace")),))
+        self._offer(RecordKind.MARK, ((channel, now, text.encode("utf-8", "replace")),))
 
     def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
         """Record "lost", "continues", "timeout", "trigger", "calibration" or another event, with facts about it."""
-        self._offer(Kind.EVENT, ((channel, host_ns, event_payload(kind, facts)),))
+        self._offer(RecordKind.EVENT, ((channel, host_ns, event_payload(kind, facts)),))
 
     def drain(self, *, sync: bool = False) -> RecorderStatus:
         """Wait until everything received so far is in the log (with ``sync``: on the disk) or the recording stops."""
@@ -169,7 +169,7 @@ class Recorder:
         contents.grow()
         return contents
 
-    def _offer(self, kind: Kind, records: Sequence[Read]) -> None:
+    def _offer(self, kind: RecordKind, records: Sequence[Read]) -> None:
         for channel, _, _ in records:
             if not 0 <= channel <= HIGHEST_CHANNEL:
                 raise ValueError(f"a channel must lie in 0 to {HIGHEST_CHANNEL}, got {channel}")
@@ -180,7 +180,7 @@ class Recorder:
                 size = HEAD_BYTES + len(payload)
                 # After an overflow, its event comes first, so that the reads around the loss do not look consecutive.
                 # Marks and events are never dropped: later readings cannot be decoded without those of ports.
-                room = kind is not Kind.DATA or not (self._overflows or self._queued_bytes + size > self._limit)
+                room = kind is not RecordKind.DATA or not (self._overflows or self._queued_bytes + size > self._limit)
                 if accepting and room:
                     self._queue.append((kind, channel, mono_ns, payload))
                     self._queued_bytes += size
@@ -206,7 +206,7 @@ class Recorder:
                 self._stop(error, items[self._log.extended :])
                 return
 
-    def _take_queued(self) -> list[Item]:
+    def _take_queued(self) -> list[LogItem]:
         """Wait for records and return all of them; return an empty list if the recording is closing and none are left.
 
         Overflow events follow the queued records and precede all later ones, because the lost reads belong there.
@@ -215,7 +215,7 @@ class Recorder:
             with self._lock:
                 items, self._queue, self._queued_bytes = self._queue, [], 0
                 items += [
-                    (Kind.EVENT, channel, mono_ns, event_payload("overflow", lost))
+                    (RecordKind.EVENT, channel, mono_ns, event_payload("overflow", lost))
                     for channel, (mono_ns, lost) in self._overflows.items()
                 ]
                 self._overflows.clear()
@@ -226,7 +226,7 @@ class Recorder:
                     return items
             self._wakeup.get()
 
-    def _stop(self, error: WriteFailed, pending: list[Item]) -> None:
+    def _stop(self, error: WriteFailed, pending: list[LogItem]) -> None:
         """Stop recording; records that were already appended can still be synced."""
         with self._lock:
             self._error = self._error or error
@@ -248,7 +248,7 @@ class Recorder:
     def _append_end(self) -> None:
         counts = {"records": self._log.written.records, "dropped_records": self._dropped_records}
         payload = json.dumps(counts | {"dropped_bytes": self._dropped_bytes}).encode("ascii")
-        self._log.extend([(Kind.END, 0, self._clock.now_ns(), payload)])
+        self._log.extend([(RecordKind.END, 0, self._clock.now_ns(), payload)])
 
     def _guarded(self, step: Callable[[], object]) -> None:
         """Run a step and keep the first error, which :meth:`close` raises."""

@@ -1,7 +1,7 @@
 """Convert JSON to structs that declare its keys, types and ranges, and back to canonical JSON.
 
 A correct checksum shows that a header is unchanged, not that its values make sense. So ``msgspec`` structs declare
-them: :class:`storage.run_file.header.Header` and :class:`storage.wire_log.records.LogHeader`.
+them: :class:`storage.run_file.header.RunHeader` and :class:`storage.wire_log.records.LogHeader`.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from typing import Any
 
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from storage.wire_log.appending import LogFile, WireLogWriter
-from storage.wire_log.records import Kind, Record
+from storage.wire_log.records import Record, RecordKind
 from storage.wire_log.scanning import LogContents
 
 WAIT_S = 120.0
@@ -25,7 +25,7 @@ def parse_log(data: bytes) -> LogContents:
     return LogContents(Path("log"), file)
 
 
-def append(log: WireLogWriter, kind: Kind, payload: bytes, *, mono_ns: int, channel: int = 0) -> None:
+def append(log: WireLogWriter, kind: RecordKind, payload: bytes, *, mono_ns: int, channel: int = 0) -> None:
     """Append one record."""
     log.extend([(kind, channel, mono_ns, payload)])
 

@@ -94,7 +94,7 @@ class Encoder(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Family:
+class Sensor:
     """A family of rangefinders.
 
     Parameters

@@ -12,7 +12,7 @@ import math
 import re
 from binascii import crc_hqx
 
-from acquisition.decoders.family import DeviceStatus, Family, Identity
+from acquisition.decoders.family import DeviceStatus, Identity, Sensor
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.readings import NAN, Reading
 
@@ -146,7 +146,7 @@ class LineProtocolEncoder:
         return frame(b"R1,%d,%d,%s,%s,%s" % (sequence % _WRAP, device_us % _WRAP, echo, temperature, status))
 
 
-FAMILY = Family(
+FAMILY = Sensor(
     name="line-protocol",
     title="springmass line protocol ($R1 lines of a microcontroller that times the echo)",
     baud=115200,

@@ -11,14 +11,14 @@ import re
 from functools import partial
 from typing import NamedTuple
 
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Sensor
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.readings import NAN, Reading
 
 _LONGEST = 64  # bytes; the lines of the start-up banner are shorter, and are counted as faults like any other text
 
 
-class Form(NamedTuple):
+class DistanceForm(NamedTuple):
     """How a model writes a distance: number of digits, value of the last one in m, codes for no target besides 0."""
 
     digits: int
@@ -33,7 +33,7 @@ class MaxbotixDecoder(FramedDecoder):
     digit to another cannot be detected.
     """
 
-    def __init__(self, form: Form) -> None:
+    def __init__(self, form: DistanceForm) -> None:
         super().__init__(LineSplitter(b"\r", _LONGEST, {"garbage_bytes": 0, "bad_frame": 0}))
         self._unit_m = form.unit_m
         self._no_target = frozenset((0, *form.no_target))
@@ -60,16 +60,16 @@ _XL = "Steps of 1 cm at 10 Hz."
 _HR = "10 Hz, and everything nearer than 300 mm reads 300."
 _WR = "The free-running output is filtered to 1.2 to 1.5 Hz, useless for oscillations: trigger each reading."
 _TABLE = (
-    ("lv", "LV-MaxSonar-EZ", "Rddd, inches", Form(3, 0.0254, (255,)), 20.0, (0.1524, 6.45), _LV),
-    ("lv-p", "LV-ProxSonar-EZ", "Rddd Pn, inches", Form(3, 0.0254, (255,)), 20.0, (0.1524, 6.45), _LV),
-    ("xl", "XL-MaxSonar, 7.6 m models", "Rddd, cm", Form(3, 0.01, (765,)), 10.0, (0.2, 7.65), _XL),
-    ("xl-long", "XL-MaxSonar, 10 m models", "Rdddd, cm", Form(4, 0.01, (1068,)), 10.0, (0.2, 10.68), _XL),
-    ("hr", "HRLV- and HRUSB-MaxSonar", "Rdddd, mm", Form(4, 0.001, (5000,)), 10.0, (0.3, 5.0), _HR),
-    ("wr", "HRXL-MaxSonar-WR", "Rdddd, mm", Form(4, 0.001, (4999, 9999)), 7.5, (0.3, 9.998), _WR),
+    ("lv", "LV-MaxSonar-EZ", "Rddd, inches", DistanceForm(3, 0.0254, (255,)), 20.0, (0.1524, 6.45), _LV),
+    ("lv-p", "LV-ProxSonar-EZ", "Rddd Pn, inches", DistanceForm(3, 0.0254, (255,)), 20.0, (0.1524, 6.45), _LV),
+    ("xl", "XL-MaxSonar, 7.6 m models", "Rddd, cm", DistanceForm(3, 0.01, (765,)), 10.0, (0.2, 7.65), _XL),
+    ("xl-long", "XL-MaxSonar, 10 m models", "Rdddd, cm", DistanceForm(4, 0.01, (1068,)), 10.0, (0.2, 10.68), _XL),
+    ("hr", "HRLV- and HRUSB-MaxSonar", "Rdddd, mm", DistanceForm(4, 0.001, (5000,)), 10.0, (0.3, 5.0), _HR),
+    ("wr", "HRXL-MaxSonar-WR", "Rdddd, mm", DistanceForm(4, 0.001, (4999, 9999)), 7.5, (0.3, 9.998), _WR),
 )
 
 FAMILIES = {
-    f"maxbotix-{name}": Family(
+    f"maxbotix-{name}": Sensor(
         name=f"maxbotix-{name}",
         title=f"MaxBotix {model} ({lines})",
         baud=9600,

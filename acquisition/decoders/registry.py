@@ -1,7 +1,7 @@
 """The registry of the families of rangefinders, and the recognition of a family by its bytes.
 
 The table contains only names; the module of a family is imported on demand. Another package can add a family with an
-entry point in the group ``springmass.sensors`` that refers to a :class:`acquisition.decoders.family.Family`.
+entry point in the group ``springmass.sensors`` that refers to a :class:`acquisition.decoders.family.Sensor`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Sensor
 from acquisition.errors import SensorError
 from failure.extensions import entry_points_of, load_entry
 
@@ -35,13 +35,13 @@ _ENOUGH = 0.5
 """Minimum fraction of bytes in valid frames for a family to be recognised."""
 
 
-def families() -> tuple[Family, ...]:
+def families() -> tuple[Sensor, ...]:
     """Return all families, with those of this package first."""
     added = [_load(entry) for name, entry in entry_points_of(GROUP).items() if name not in _MODULES]
     return (*map(_built_in, _MODULES), *added)
 
 
-def get_family(name: str) -> Family:
+def get_family(name: str) -> Sensor:
     """Return the family with a given name; the SensorError of an unknown name lists the known ones."""
     if name in _MODULES:
         return _built_in(name)
@@ -85,7 +85,7 @@ def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> str:
     return "looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?"
 
 
-def _share(family: Family, data: bytes) -> float:
+def _share(family: Sensor, data: bytes) -> float:
     """Return the fraction of bytes in valid frames; an incomplete frame at the end is not counted."""
     decoder = family.decoder()
     readings = decoder.feed(0, data)
@@ -93,19 +93,19 @@ def _share(family: Family, data: bytes) -> float:
     return 1 - decoder.faults.get("garbage_bytes", 0) / whole if len(readings) else 0.0
 
 
-def _built_in(name: str) -> Family:
+def _built_in(name: str) -> Sensor:
     module = import_module(f"acquisition.decoders.{_MODULES[name]}")
-    family: Family = module.FAMILIES[name] if hasattr(module, "FAMILIES") else module.FAMILY
+    family: Sensor = module.FAMILIES[name] if hasattr(module, "FAMILIES") else module.FAMILY
     return family
 
 
-def _load(entry: EntryPoint) -> Family:
-    return cast(Family, load_entry(entry, f"sensor {entry.name!r}", SensorError, partial(_checked, entry.name)))
+def _load(entry: EntryPoint) -> Sensor:
+    return cast(Sensor, load_entry(entry, f"sensor {entry.name!r}", SensorError, partial(_checked, entry.name)))
 
 
-def _checked(name: str, loaded: Any) -> Family:
+def _checked(name: str, loaded: Any) -> Sensor:
     """Return the loaded family, or the family of the given name if a table of families was loaded."""
     family = loaded.get(name) if isinstance(loaded, dict) else loaded
-    if not isinstance(family, Family):
-        raise SensorError(f"sensor {name!r}: expected a Family, got {type(family).__name__}; repair the package")
+    if not isinstance(family, Sensor):
+        raise SensorError(f"sensor {name!r}: expected a Sensor, got {type(family).__name__}; repair the package")
     return family

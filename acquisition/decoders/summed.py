@@ -17,12 +17,12 @@ from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
-from acquisition.decoders.family import Family, Poll
+from acquisition.decoders.family import Poll, Sensor
 from acquisition.decoders.frames import FramedDecoder, SumFrames, with_sum
 from acquisition.readings import NAN, Reading
 
 
-class Form(NamedTuple):
+class FrameForm(NamedTuple):
     """The frames of a family: size, first bytes, unit of the value before the sum, its largest one, and no target.
 
     The byte at index ``command`` is ``distance`` in a frame with a distance, ``temperature`` in one to be skipped; the
@@ -44,7 +44,7 @@ class Form(NamedTuple):
 class SummedDecoder(FramedDecoder):
     """Decodes the frames of one form."""
 
-    def __init__(self, form: Form, temperature_every: int = 0) -> None:
+    def __init__(self, form: FrameForm, temperature_every: int = 0) -> None:
         self._form = form
         super().__init__(SumFrames(form.size, form.starts, self._plausible))
 
@@ -65,16 +65,16 @@ class SummedDecoder(FramedDecoder):
 
 
 # The largest value is beyond the range of every module, but its high byte is none that begins a frame.
-_FFHLS = Form(4, b"\xff", 1e-3, 10_000, (0xFFFD, 0xFFFE))
+_FFHLS = FrameForm(4, b"\xff", 1e-3, 10_000, (0xFFFD, 0xFFFE))
 # A temperature has twelve bits, and its upper four are all 1 below zero.
-_URM37 = Form(4, b"\x22\x11", 1e-2, 1000, (0xFFFF,), distance=0x22, temperature=0x11, signs=(0x0, 0xF))
+_URM37 = FrameForm(4, b"\x22\x11", 1e-2, 1000, (0xFFFF,), distance=0x22, temperature=0x11, signs=(0x0, 0xF))
 # The address, the third byte, may have any value.
-_SEN0149 = Form(8, b"\x55", 1e-3, 12_000, (0xFFFF,), 4, distance=0x02, temperature=0x03, fixed=((1, 0xAA), (3, 2)))
+_SEN0149 = FrameForm(8, b"\x55", 1e-3, 12_000, (0xFFFF,), 4, distance=0x02, temperature=0x03, fixed=((1, 0xAA), (3, 2)))
 
 FAMILIES = {
     family.name: family
     for family in (
-        Family(
+        Sensor(
             name="ffhls",
             title="FF-H-L-SUM frames (A02YYUW, ME007YS, A01NYUB, DYP modules, JSN-SR04T in serial mode)",
             baud=9600,
@@ -86,7 +86,7 @@ FAMILIES = {
             decoder=partial(SummedDecoder, _FFHLS),
             source="DFRobot SEN0311 (A02YYUW), SEN0312 (ME007YS), SEN0313 (A01NYUB): UART output; DYP-A22 data sheet",
         ),
-        Family(
+        Sensor(
             name="urm37",
             title="URM37 (SEN0001) replies of command, two bytes, sum",
             baud=9600,
@@ -99,7 +99,7 @@ FAMILIES = {
             past_options=("temperature_every",),
             source="DFRobot SEN0001 (URM37): communication protocol",
         ),
-        Family(
+        Sensor(
             name="sen0149",
             title="SEN0149, SEN0150 (URM06) frames 55 AA address length command H L SUM",
             baud=19200,

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
-from acquisition.decoders.family import DeviceStatus, Family
+from acquisition.decoders.family import DeviceStatus, Sensor
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.errors import SensorError
 from acquisition.line_numbers import LENGTHS_M, TIMES_US, Number, find_distance, has_decimal_comma, numbers
@@ -250,7 +250,7 @@ def _demand(option: str, unit: str | None, known: Mapping[str, Any]) -> None:
         raise SensorError(f"{option} of text-lines must be one of {', '.join(known)}, got {unit!r}")
 
 
-FAMILY = Family(
+FAMILY = Sensor(
     name="text-lines",
     title="text lines with a number, from a microcontroller's sketch",
     baud=9600,

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from acquisition.decoders.family import Family, Poll
+from acquisition.decoders.family import Poll, Sensor
 from acquisition.errors import SensorError
 from acquisition.readings import NAN, Reading, Readings
 
@@ -86,7 +86,7 @@ class Us100Decoder:
         return 1
 
 
-FAMILY = Family(
+FAMILY = Sensor(
     name="us100",
     title="US-100 in serial mode (two bytes a distance, no header, no checksum)",
     baud=9600,

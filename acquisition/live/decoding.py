@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.block import F8, Block, Flag, Kind, SourceInfo
-from acquisition.decoders.family import DeviceStatus, Family
+from acquisition.block import F8, Block, Flag, SourceInfo, SourceKind
+from acquisition.decoders.family import DeviceStatus, Sensor
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, fit_clock
 from acquisition.live.timebase import Timebase, demand_within
@@ -36,7 +36,7 @@ class SensorChain:
 
     def __init__(
         self,
-        family: Family,
+        family: Sensor,
         *,
         options: Mapping[str, Any] | None = None,
         rate_hz: float | None = None,
@@ -131,7 +131,7 @@ class SensorChain:
         status = getattr(self.decoder, "status", None)
         return status if isinstance(status, DeviceStatus) else DeviceStatus()
 
-    def info(self, name: str, kind: Kind = "live") -> SourceInfo:
+    def info(self, name: str, kind: SourceKind = "live") -> SourceInfo:
         """Return the description of the source; its kind of clock is determined by the first reading."""
         rate_hz, clock = self.timebase.rate_hz, self.timebase.clock
         quantum_m = getattr(self.decoder, "resolution_m", None) or self.family.resolution_m

@@ -34,7 +34,7 @@ class Sink(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class PortLine:
     """A port, the number of its sensor within the run, how to poll it, and what makes it identify itself."""
 
     port: SerialPort
@@ -50,7 +50,7 @@ class PortReader:
     reading continues after it.
     """
 
-    def __init__(self, lines: Sequence[Line], sink: Sink, clock: Clock) -> None:
+    def __init__(self, lines: Sequence[PortLine], sink: Sink, clock: Clock) -> None:
         self._lines = list(lines)
         self._sink = sink
         self._clock = clock
@@ -77,7 +77,7 @@ class PortReader:
         if self.failure is not None:
             raise self.failure
 
-    def _guarded(self, line: Line) -> None:
+    def _guarded(self, line: PortLine) -> None:
         while not self._stop.is_set():
             try:
                 self._serve(line)
@@ -85,7 +85,7 @@ class PortReader:
                 self.failure = error
                 self._stop.wait(REOPEN_EVERY_S)
 
-    def _serve(self, line: Line) -> None:
+    def _serve(self, line: PortLine) -> None:
         """Read a port until the end, over all of its losses."""
         while (why := self._read_until_lost(line)) is not None:
             lost_ns = self._clock.now_ns()
@@ -99,7 +99,7 @@ class PortReader:
             facts = {"port": line.port.name, "gap_s": (now_ns - lost_ns) * 1e-9, "sensor": sensor}
             self._sink.event(line.channel, now_ns, "reopened", facts)
 
-    def _read_until_lost(self, line: Line) -> str | None:
+    def _read_until_lost(self, line: PortLine) -> str | None:
         """Pass on what a port sends until it is lost; return the reason, or None at the end."""
         asker = None if line.poll is None else _Asker(line, line.poll)
         wait_s = WAIT_S if asker is None else POLLED_WAIT_S
@@ -117,7 +117,7 @@ class PortReader:
                 self._sink.reads([(line.channel, now_ns, data)])
         return None
 
-    def _reopened(self, line: Line) -> str | None:
+    def _reopened(self, line: PortLine) -> str | None:
         """Try to open a lost port; return which sensor is on it, or None if the port is still unavailable."""
         try:
             sensor = line.port.reopen()
@@ -132,7 +132,7 @@ class PortReader:
 class _Asker:
     """Sends the requests to a polled sensor on an absolute schedule, so that a late wake-up does not delay them all."""
 
-    def __init__(self, line: Line, poll: Poll) -> None:
+    def __init__(self, line: PortLine, poll: Poll) -> None:
         self._port, self.poll = line.port, poll
         self._ask_ns = self._answer_by_ns = 0
         self.received = poll.reply_bytes  # number of bytes since the last request; before the first, nothing is missing

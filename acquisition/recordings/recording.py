@@ -24,7 +24,7 @@ class Original:
 
 
 @dataclass(frozen=True, slots=True)
-class Trap:
+class FormatIssue:
     """A peculiarity of a file that is easy to misread; the analysis reports it as a finding.
 
     Parameters
@@ -61,7 +61,7 @@ class Recording:
         The quantity or column whose values are the samples.
     samples : Block
         All samples, ``first`` = 0. Every row of data is a sample; samples that could not be read are flagged.
-    traps : tuple of Trap
+    traps : tuple of FormatIssue
         Remarks by the reader.
     malformed_rows : int
         Number of rows that could not be read (text between rows, a truncated last row), including those that are kept
@@ -81,7 +81,7 @@ class Recording:
     info: SourceInfo
     channel: str
     samples: Block
-    traps: tuple[Trap, ...] = ()
+    traps: tuple[FormatIssue, ...] = ()
     malformed_rows: int = 0
     originals: tuple[Original, ...] = ()
     title: str = ""
@@ -135,7 +135,7 @@ class Survey:
     unit: str
     samples: int
     rate_hz: float | None
-    traps: tuple[Trap, ...]
+    traps: tuple[FormatIssue, ...]
     span_s: float | None = None
 
 

@@ -19,7 +19,7 @@ _SHOWN = np.uint8(Flag.MISSING)  # this flag is not lost, because a NaN represen
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenFiles:
     """The files written for one recording.
 
     ``files`` are the suffix that is added to the user's file name (empty for the file with that name) and the content.
@@ -30,7 +30,9 @@ class Written:
     lost: tuple[str, ...]
 
 
-def write_motion_sensor(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
+def write_motion_sensor(
+    path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = ""
+) -> WrittenFiles:
     """Write the pair of files of MotionSensor.vi: position, and velocity with the suffix ``_velocity``.
 
     If the recording has no velocity, the backward difference of the position over one sample is written, as in the
@@ -51,10 +53,10 @@ def write_motion_sensor(path: str, samples: Block, info: SourceInfo, title: str 
         return "\r\n".join([head, columns, *(f"{t:.3f}\t{_fixed(x * 100, 3)}{end}" for t, x in pairs)]).encode()
 
     files = ("", file(columns, samples.distance, error)), ("_velocity", file("Time (s)\tVelocity (cm/s)", velocity))
-    return Written(files, _losses(samples, rounding_m=1e-5))
+    return WrittenFiles(files, _losses(samples, rounding_m=1e-5))
 
 
-def write_csv(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> Written:
+def write_csv(path: str, samples: Block, info: SourceInfo, title: str = "", start_time: str = "") -> WrittenFiles:
     """Write columns under headings with units; see :func:`write_motion_sensor`.
 
     The heading marks simulated data, because the format has no other place for this information.
@@ -69,10 +71,10 @@ def write_csv(path: str, samples: Block, info: SourceInfo, title: str = "", star
     lost = [*_losses(samples, 1e-9), *(f"CSV cannot store the {what}" for what in titles)]
     rows = zip(samples.t.tolist(), *(column.tolist() for column in columns), strict=True)
     lines = [",".join(headings), *(",".join(_fixed(value, 9) for value in row) for row in rows), ""]
-    return Written((("", "\n".join(lines).encode()),), tuple(lost))
+    return WrittenFiles((("", "\n".join(lines).encode()),), tuple(lost))
 
 
-WRITERS: dict[str, Callable[[str, Block, SourceInfo, str, str], Written]] = {
+WRITERS: dict[str, Callable[[str, Block, SourceInfo, str, str], WrittenFiles]] = {
     ".txt": write_motion_sensor,
     ".csv": write_csv,
 }

@@ -16,9 +16,9 @@ from springmass import Run, sample_data
 from springmass.charts.chart import Chart, Panel
 from springmass.charts.draw import draw, style
 from springmass.charts.run import charts_of
-from springmass.runs.options import How
+from springmass.runs.options import AnalysisOptions
 from springmass.runs.simulating import charts
-from springmass.runs.simulating.against import duration_s, lay_over
+from springmass.runs.simulating.against import compare_with_run, duration_s
 from springmass.runs.simulating.simulation import count_of, prepare, simulated
 
 HERE = Path(__file__).resolve().parent
@@ -29,12 +29,12 @@ COLUMNS, WIDTH, HEIGHT = 3, 4.2, 3.0
 def charts_of_run(name: str) -> dict[str, Chart]:
     """Return the charts of a run and, under "by NAME", those of its simulation by both Euler methods."""
     data = sample_data()
-    how = How.of({"velocity": data / f"{name}_simulated_velocity.txt", "method": "classic"})
+    how = AnalysisOptions.of({"velocity": data / f"{name}_simulated_velocity.txt", "method": "classic"})
     run = Run.of(data / f"{name}_simulated_position.txt", data / f"{name}.scene.toml", how)
     seconds = duration_s(run.analysis)
     ready = prepare(cast(Scene, run.scene), seconds, analysis=run.analysis)
     motion = simulated(ready.problem, "auto", STEP_S, count_of(seconds, STEP_S), None, check=False)
-    over = lay_over(run.analysis, ready.problem, "auto", STEP_S, None, None)
+    over = compare_with_run(run.analysis, ready.problem, "auto", STEP_S, None, None)
     own = charts_of(run.analysis, (), run.classic)
     return own | {f"by {c.name}": c for c in charts.simulation(motion, effective_mass_kg(ready.solved), over)}
 

@@ -13,8 +13,8 @@ from acquisition.errors import NeedsAnswer
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import Law
 from pipeline.errors import AnalysisError
-from springmass.runs.comparing import Compared, compare_runs
-from springmass.runs.options import Accuracy, How
+from springmass.runs.comparing import SpringComparison, compare_runs
+from springmass.runs.options import Accuracy, AnalysisOptions
 from springmass.runs.outputs import distinct_names
 from springmass.runs.questions import for_python
 from springmass.runs.run import Run
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     AnySource: TypeAlias = Path | Run | Arrays
 
 
-class Reading(TypedDict, total=False):
+class ReadKeywords(TypedDict, total=False):
     """How a recording is read: what its file leaves out, and which part of it is used."""
 
     velocity: str | os.PathLike[str] | None
@@ -54,7 +54,7 @@ class Reading(TypedDict, total=False):
     unverified: bool
 
 
-class Analysing(Reading, total=False):
+class AnalysisKeywords(ReadKeywords, total=False):
     """How a recording is read and analysed."""
 
     accuracy: Accuracy
@@ -63,7 +63,7 @@ class Analysing(Reading, total=False):
     method: Literal["classic"] | None
 
 
-def analyse(source: AnySource, scene: AnyScene | None = None, **how: Unpack[Analysing]) -> Run:
+def analyse(source: AnySource, scene: AnyScene | None = None, **how: Unpack[AnalysisKeywords]) -> Run:
     """Analyse a run.
 
     Parameters
@@ -103,7 +103,7 @@ def analyse(source: AnySource, scene: AnyScene | None = None, **how: Unpack[Anal
     return run
 
 
-def load(source: AnySource, scene: AnyScene | None = None, **how: Unpack[Analysing]) -> Run:
+def load(source: AnySource, scene: AnyScene | None = None, **how: Unpack[AnalysisKeywords]) -> Run:
     """Read a recording, a run file or a wire log; it is analysed when a result is asked for.
 
     All digests of a run file are checked before a sample is used.
@@ -123,7 +123,7 @@ def load(source: AnySource, scene: AnyScene | None = None, **how: Unpack[Analysi
 
 def _run(source: Any, scene: Any, function: str, options: Mapping[str, Any]) -> Run:
     """Return the run of a source; an error about something missing names the arguments of the called function."""
-    how = How.of(options)
+    how = AnalysisOptions.of(options)
     try:
         return Run.of(source, scene, how)
     except NeedsAnswer as error:
@@ -137,8 +137,8 @@ def compare(
     mass_correlation: float = 0.0,
     reported: Path | None = None,
     hooke: Path | None = None,
-    **how: Unpack[Analysing],
-) -> Compared:
+    **how: Unpack[AnalysisKeywords],
+) -> SpringComparison:
     """Test whether runs agree on one spring constant, and whether one damping law fits all runs of one bob.
 
     Parameters

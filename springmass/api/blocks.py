@@ -18,7 +18,7 @@ from acquisition.decoders.registry import get_family
 from acquisition.live.serial_port import SerialPort
 from acquisition.replay import Replay
 from pipeline.bench.scene import Scene
-from springmass.api.analysing import AnyScene, Reading
+from springmass.api.analysing import AnyScene, ReadKeywords
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.runs.loading import Loaded, load, to_track
 from springmass.runs.options import ReadOptions
@@ -27,7 +27,7 @@ from springmass.runs.scenes import scene_from
 from springmass.runs.simulating.bench import bench_position
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import demand_new
-from springmass.session.sensors import Sensor
+from springmass.session.sensors import OpenSensor
 from springmass.session.session import Session
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
@@ -37,7 +37,7 @@ SIGMA_M = 8e-5  # noise of a simulated rangefinder if its scene states none
 POLL_S = 0.05
 
 
-class Source(Protocol):
+class SampleSource(Protocol):
     """What :func:`springmass.source` returns: a ``with`` block that iterates blocks of samples.
 
     A block has ``t`` (s), ``distance`` (m, NaN if not measured) and ``flags``.
@@ -66,8 +66,8 @@ def source(
     scene: AnyScene | None = None,
     sensor: str | None = None,
     baud: int | None = None,
-    **how: Unpack[Reading],
-) -> Source:
+    **how: Unpack[ReadKeywords],
+) -> SampleSource:
     """Open a port, a recording or a simulated bench as a source of samples.
 
     Parameters
@@ -169,7 +169,7 @@ class _Live:
         baud = measured or family.baud
         self._port = SerialPort(address, baud)
         tables = None if scene is None else scene.to_mapping()
-        self._session = Session([Sensor(family, self._port, baud=baud)], SystemClock(), scene=tables)
+        self._session = Session([OpenSensor(family, self._port, baud=baud)], SystemClock(), scene=tables)
         self._recorder: Recorder | None = None
         self._path = Path()
 

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Unpack
 
 from failure import Error
-from springmass.api.analysing import Analysing, AnyScene, analyse
+from springmass.api.analysing import AnalysisKeywords, AnyScene, analyse
 from springmass.course.results_csv import NUMBERS, WHOLE, columns_of, read_rows
 from springmass.course.worker import row_of
 
@@ -24,7 +24,7 @@ def batch(
     scene: AnyScene | None = None,
     *,
     executor: Executor | None = None,
-    **how: Unpack[Analysing],
+    **how: Unpack[AnalysisKeywords],
 ) -> pd.DataFrame:
     """Analyse many runs into one table.
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pipeline.errors import AnalysisError
 from springmass.api.analysing import AnyScene
-from springmass.runs.options import How
+from springmass.runs.options import AnalysisOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import scene_from
 
@@ -43,7 +43,7 @@ class Stream:
     """
 
     def __init__(self, scene: AnyScene | None = None, *, accuracy: Any = "fast", law: str | None = None) -> None:
-        self._scene, self._how = scene_from(scene), How(accuracy=accuracy, law=law)
+        self._scene, self._how = scene_from(scene), AnalysisOptions(accuracy=accuracy, law=law)
         self._t: list[Any] = []
         self._y: list[Any] = []
         self._count, self._due = 0, FEWEST

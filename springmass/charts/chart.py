@@ -190,7 +190,7 @@ def band_of(label: str, x: F8, y: F8, u: F8) -> Series:
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
+class ChartNote:
     """A mark or an event of a recording."""
 
     t_s: float

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-Kind = Literal["svg", "pdf", "png"]
+PictureFormat = Literal["svg", "pdf", "png"]
 STYLE = Path(__file__).with_name("figures.mplstyle")
 WIDTH = 7.2  # inches, the width of the text on A4
 MOST_OF_LINE, RASTER_POINTS = 3000, 300  # of a line; more markers than the latter are pixels, which are fewer bytes
@@ -40,7 +40,7 @@ def _looks() -> dict[str, dict[str, Any]]:
     return looks
 
 
-def save(charts: Iterable[Chart], folder: Path, kinds: Sequence[Kind], stem: str = "") -> dict[str, bytes]:
+def save(charts: Iterable[Chart], folder: Path, kinds: Sequence[PictureFormat], stem: str = "") -> dict[str, bytes]:
     """Write each chart as a file of every kind, complete or not at all; return the SVG by the names of their files."""
     pictures = {}
     for chart in charts:
@@ -51,7 +51,7 @@ def save(charts: Iterable[Chart], folder: Path, kinds: Sequence[Kind], stem: str
     return pictures
 
 
-def render(chart: Chart, kinds: Sequence[Kind]) -> dict[Kind, bytes]:
+def render(chart: Chart, kinds: Sequence[PictureFormat]) -> dict[PictureFormat, bytes]:
     """Return a chart as the bytes of a file of every kind."""
     with style():
         figure = figure_of(chart)
@@ -69,7 +69,7 @@ def style() -> AbstractContextManager[None]:
     return rc_context(fname=STYLE)
 
 
-def written(figure: Figure, kind: Kind) -> bytes:
+def written(figure: Figure, kind: PictureFormat) -> bytes:
     """Return a figure as the bytes of a file, without a date, so that equal runs give identical files."""
     out = io.BytesIO()
     dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[kind]

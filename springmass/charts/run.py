@@ -15,7 +15,7 @@ from pipeline.numerics.quantity import SHOWN, noun
 from pipeline.results.classic import CYCLES, Classic
 from pipeline.results.curves import Curve, Smoothed
 from pipeline.track import F8, UNUSABLE, Quality
-from springmass.charts.chart import Chart, Note, Panel, Role, Series, band_of, line_of, rate_label, value_label
+from springmass.charts.chart import Chart, ChartNote, Panel, Role, Series, band_of, line_of, rate_label, value_label
 from springmass.typeset import law_status, pretty
 
 REASONS: tuple[tuple[int, str], ...] = (
@@ -39,7 +39,7 @@ MOST_TURNS = 230  # of the phase plot: 6000 points, of which none may be left ou
 MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
 
 
-def position(a: Analysis, notes: Sequence[Note] = ()) -> Chart:
+def position(a: Analysis, notes: Sequence[ChartNote] = ()) -> Chart:
     """Samples with their fit, residuals over the noise of one sample, and the rest position if it moves."""
     track, factor = a.track, SHOWN[a.track.unit].factor
     rows = np.flatnonzero(np.isfinite(track.t))
@@ -89,7 +89,7 @@ def _reason(flags: int, y: float) -> str:
     return next((words for bit, words in REASONS if flags & bit), "not usable")
 
 
-def _marks(notes: Sequence[Note]) -> list[Series]:
+def _marks(notes: Sequence[ChartNote]) -> list[Series]:
     """Marks of the recording, its trigger and its losses, as vertical lines."""
     chosen = [note for note in notes if note.kind in ("mark", "trigger", "lost", "reopened")]
     at, texts = np.array([note.t_s for note in chosen]), (n.text if n.kind == "mark" else n.kind for n in chosen)
@@ -413,7 +413,7 @@ CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {
 
 def charts_of(
     a: Analysis,
-    notes: Sequence[Note] = (),
+    notes: Sequence[ChartNote] = (),
     classic: Classic | None = None,
     smoothed: Smoothed | None = None,
 ) -> dict[str, Chart]:

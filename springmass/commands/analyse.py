@@ -33,7 +33,7 @@ from springmass.layout import STDIN
 from springmass.parameters import argument, flag, option, output
 from springmass.runs.inputs import files_of
 from springmass.runs.json_results import rejected
-from springmass.runs.options import How
+from springmass.runs.options import AnalysisOptions
 from springmass.runs.outputs import distinct_names, in_a_name, make_folder, safe_name
 from springmass.runs.questions import for_command, option_words
 from springmass.runs.run import Failed, Run, Task, analyse_all, law_lines
@@ -70,7 +70,7 @@ def analyse(
         File, argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True)
     ],
     options: AnalyseOptions = AnalyseOptions(),
-    how: How = How(),
+    how: AnalysisOptions = AnalysisOptions(),
     bench: BenchOptions = BenchOptions(),
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
@@ -85,9 +85,9 @@ def analyse(
     alone = len(found) == 1
     names = [""] if alone else distinct_names(["stdin" if one.path == STDIN else one.path for one in found])
     how = replace(how, method=options.method)
-    hows = [how if one.velocity is None else replace(how, velocity=one.velocity) for one in found]
+    of_files = [how if one.velocity is None else replace(how, velocity=one.velocity) for one in found]
     tasks = [
-        Task(one.path, name, scenes[one.of], its, values) for one, name, its in zip(found, names, hows, strict=True)
+        Task(one.path, name, scenes[one.of], its, values) for one, name, its in zip(found, names, of_files, strict=True)
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
     if not alone:

@@ -17,7 +17,7 @@ from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
 from springmass.parameters import Count, WholeNumber, argument, flag, option, output
-from springmass.runs.options import How
+from springmass.runs.options import AnalysisOptions
 from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
 
@@ -43,7 +43,7 @@ class BatchOptions:
 def batch(
     *recordings: Annotated[File, argument("INPUT", "recordings, folders (with subfolders), or patterns")],
     options: BatchOptions = BatchOptions(),
-    how: How = How(),
+    how: AnalysisOptions = AnalysisOptions(),
 ) -> int:
     """Analyse new and changed runs, and write the table and the page of all runs."""
     refuse("batch", how, "velocity")

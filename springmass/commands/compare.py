@@ -18,9 +18,9 @@ from springmass.commands.options import Figures, File, Json, Scenes, Strict, ref
 from springmass.course.results_csv import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
 from springmass.parameters import Share, argument, option, output
-from springmass.runs.comparing import Compared, beside, compare_runs, comparison_json
+from springmass.runs.comparing import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
 from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
-from springmass.runs.options import How
+from springmass.runs.options import AnalysisOptions
 from springmass.runs.outputs import distinct_names, make_folder, now_utc
 from springmass.runs.run import Run, Task, analysed, law_lines
 from springmass.runs.scenes import read_scenes
@@ -55,7 +55,7 @@ def compare(
         File, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
     ],
     options: CompareOptions = CompareOptions(),
-    how: How = How(),
+    how: AnalysisOptions = AnalysisOptions(),
 ) -> int:
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
     refuse("compare", how, "velocity")
@@ -118,13 +118,13 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     return OK
 
 
-def _print_text(compared: Compared, runs: list[Run]) -> None:
+def _print_text(compared: SpringComparison, runs: list[Run]) -> None:
     from springmass.terminal.printing import comparison_text, findings_text, reported_text, wrapped
     from springmass.terminal.style import style_of
 
     text = comparison_text(compared.comparison, [run.analysis for run in runs], style_of(sys.stdout))
     print(*law_lines(runs), text, sep="\n")
-    for message in (*beside(compared), *(joint.message for joint in compared.joint)):
+    for message in (*line_and_hooke_words(compared), *(joint.message for joint in compared.joint)):
         print(f"\n{wrapped(message)}")
     if compared.reported:
         mistakes = [plain(f) for f in compared.findings if "reported" in kinds()[f.code].about]

@@ -17,7 +17,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from acquisition.clock import SystemClock
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Sensor
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration, StillPoint
 from acquisition.live.serial_port import SerialPort
@@ -46,7 +46,7 @@ from springmass.runs.simulating.bench import EXAMPLE, REST_M, Release, bench_pos
 from springmass.session.bench_requests import Closed, Operator
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import default_name, demand_new
-from springmass.session.sensors import Sensor
+from springmass.session.sensors import OpenSensor
 from springmass.session.session import BYTES_PER_READ, Ended, RunLimits, RunListeners, Session
 from springmass.session.trigger import Disarmed, Trigger
 from springmass.stops import STOPS, EndReason
@@ -370,7 +370,7 @@ class _Bench:
 
 
 @contextlib.contextmanager
-def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> Iterator[list[Sensor]]:
+def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> Iterator[list[OpenSensor]]:
     """Open the source of the recording: the named ports, or a simulated bench on a simulated port."""
     given, names = dict(options.option), options.sensor or ((SIMULATED_FAMILY,) if options.simulate else ())
     families = [get_family(name) for name in names]
@@ -387,14 +387,14 @@ def _sensors(options: RecordOptions, scene: Scene | None, release: Release) -> I
             baud = options.baud or family.baud
             port = SerialPort(address, baud)
             opened.callback(port.close)
-            sensors.append(Sensor(family, port, options.rate_hz, given, calibration, baud, options.clock_ppm))
+            sensors.append(OpenSensor(family, port, options.rate_hz, given, calibration, baud, options.clock_ppm))
         if virtual is not None:
             virtual.start()
             release.begin()
         yield sensors
 
 
-def _virtual(options: RecordOptions, family: Family, scene: Scene | None, release: Release) -> VirtualPort:
+def _virtual(options: RecordOptions, family: Sensor, scene: Scene | None, release: Release) -> VirtualPort:
     """Return a simulated port, on which a sensor of the family sends what it sees of the bench."""
     assert scene is not None
     if os.name == "nt":

@@ -19,7 +19,7 @@ from springmass.commands.options import Figures, File, Json, Overwrite
 from springmass.errors import OK, ProgramError, suggest, tell
 from springmass.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.runs.json_results import picked
-from springmass.runs.options import How, ReadOptions
+from springmass.runs.options import AnalysisOptions, ReadOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import ask_about, read_scene
 from springmass.runs.simulating.simulation import (
@@ -81,7 +81,7 @@ def simulate(
     if against is not None:
         from springmass.runs.simulating.against import duration_s
 
-        run = Run.of(against, stated, How.of(read.given()))
+        run = Run.of(against, stated, AnalysisOptions.of(read.given()))
         stated, analysis = run.scene, run.analysis
         longest_s = max(seconds or 0.0, duration_s(analysis))
         seconds = seconds or longest_s
@@ -113,9 +113,9 @@ def simulate(
         None,
     )
     if analysis is not None:
-        from springmass.runs.simulating.against import deviation_text, lay_over
+        from springmass.runs.simulating.against import compare_with_run, deviation_text
 
-        over = lay_over(analysis, ready.problem, method, dt, wanted, band, ready.values())
+        over = compare_with_run(analysis, ready.problem, method, dt, wanted, band, ready.values())
         left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"
         print("\n".join([f"against the run  {left}", *deviation_text(over)]), file=say)
         results["against"] = over.summary()

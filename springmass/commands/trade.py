@@ -11,11 +11,19 @@ from springmass import __version__
 from springmass.commands.options import File, Json
 from springmass.errors import OK, UNREADABLE, ProgramError, manner
 from springmass.parameters import Count, Positive, argument, option
-from springmass.runs.options import How
+from springmass.runs.options import AnalysisOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import read_scene
 from springmass.terminal.progress import counted
-from springmass.trade import KINDS, QUANTITIES, Motion, measure_integrators, measure_tiers, motion_of, motion_of_problem
+from springmass.trade import (
+    QUANTITIES,
+    TROUBLES,
+    Motion,
+    measure_integrators,
+    measure_tiers,
+    motion_of,
+    motion_of_problem,
+)
 
 
 def trade(
@@ -26,7 +34,7 @@ def trade(
     seeds: Annotated[Count, option("N", "simulated records of each kind (default: 20)")] = 20,
     seconds: Annotated[Positive, option("S", "length of the records without a recording, s (default: 60)")] = 60.0,
     as_json: Json = False,
-    how: How = How(),
+    how: AnalysisOptions = AnalysisOptions(),
 ) -> int:
     """Simulate records of one motion, evaluate them with every tier, and solve the motion with every integrator."""
     motion = Motion(seconds=seconds)
@@ -48,7 +56,7 @@ def trade(
             f"expected a motion of two periods, got {motion.seconds:g} s at {motion.frequency_hz:.3g} Hz from "
             f"{motion.theta[0]:g} m; take more --seconds, or state a start in the scene"
         )
-    kinds = counted(measure_tiers(motion, seeds), len(KINDS), "kinds of records", quiet=manner()[0])
+    kinds = counted(measure_tiers(motion, seeds), len(TROUBLES), "kinds of records", quiet=manner()[0])
     tiers = [row for rows in kinds for row in rows]
     problem = motion.problem()
     solved = [] if problem is None else [*measure_integrators(problem, 1.0 / motion.rate_hz, motion.t.size)]

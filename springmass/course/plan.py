@@ -26,7 +26,7 @@ from springmass.course.results_csv import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
 from springmass.runs.inputs import InputFile, files_of
-from springmass.runs.options import HOW, How
+from springmass.runs.options import ANALYSIS_DEFAULTS, AnalysisOptions
 from springmass.runs.outputs import numbered
 from springmass.runs.run import Task
 from springmass.runs.scenes import about_path, read_scene
@@ -67,7 +67,7 @@ class Job:
 
     def task(self) -> Task:
         """Return what every process can analyse."""
-        how = How.of(self.how)
+        how = AnalysisOptions.of(self.how)
         if how.velocity is not None:
             how = replace(how, velocity=self.whole(str(how.velocity)))
         return Task(self.whole(self.path), self.path, self.scene, how)
@@ -91,7 +91,7 @@ def plan(
     *,
     runs_csv: str | None = None,
     scene: str | None = None,
-    how: How = HOW,
+    how: AnalysisOptions = ANALYSIS_DEFAULTS,
     known: Collection[str] = (),
     output: str | None = None,
 ) -> Plan:

@@ -11,12 +11,12 @@ from typing import Any
 
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from springmass.page.view import Series, View
+from springmass.page.view import SampleBuffer, View
 from springmass.report.recorded import event_words
 from springmass.runs.loading import Loaded
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
-from storage.wire_log.records import Kind, Record, event_content
+from storage.wire_log.records import Record, RecordKind, event_content
 from storage.wire_log.scanning import read_log
 from storage.wire_log.survey import Part
 from storage.wire_log.wire_samples import LogDecoder, chain_of
@@ -38,7 +38,7 @@ class LogFeed:
         self.scene = header.scene
         self._scan = self._log.scan()
         self._sensors = {sensor.channel: sensor for sensor in header.sensors}
-        self._series: dict[Part, Series] = {}
+        self._series: dict[Part, SampleBuffer] = {}
         self._shown = [Part(channel, 1) for channel in self._sensors]
         self._timed: list[Record] = []
         self.view = View(
@@ -87,15 +87,15 @@ class LogFeed:
         if part.number == 1:
             self._series[part] = self.view.series[number]
         else:
-            self._series[part] = Series()
+            self._series[part] = SampleBuffer()
             series = [self._series[shown] for shown in self._shown]
             self.view = replace(self.view, series=series, session=secrets.token_hex(8))
         return chain_of(self._sensors[part.sensor])
 
     def _note(self, record: Record, content: dict[str, Any]) -> None:
-        if record.kind is Kind.MARK:
+        if record.kind is RecordKind.MARK:
             self._timed.append(record)
-        elif record.kind is Kind.EVENT:
+        elif record.kind is RecordKind.EVENT:
             if content["kind"] == "trigger":
                 self._timed.append(record)
             if content["kind"] == "still":
@@ -109,8 +109,10 @@ class LogFeed:
         if origin_ns is None:
             return
         timed = [((record.mono_ns - origin_ns) * 1e-9, record) for record in self._timed]
-        self.view.marks = [(t_s, record.text()) for t_s, record in timed if record.kind is Kind.MARK]
-        events = [{"t_s": t_s, **event_content(record.payload)} for t_s, record in timed if record.kind is Kind.EVENT]
+        self.view.marks = [(t_s, record.text()) for t_s, record in timed if record.kind is RecordKind.MARK]
+        events = [
+            {"t_s": t_s, **event_content(record.payload)} for t_s, record in timed if record.kind is RecordKind.EVENT
+        ]
         self.view.provenance = {**self.view.provenance, "events": events}
 
 

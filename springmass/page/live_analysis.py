@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import Scene
 from pipeline.errors import PipelineError
@@ -23,7 +23,7 @@ from springmass.errors import Error
 from springmass.page.view import View, json_of
 from springmass.runs.json_results import picked
 from springmass.runs.loading import between
-from springmass.runs.options import Accuracy, How
+from springmass.runs.options import Accuracy, AnalysisOptions
 from springmass.runs.run import Run, analyse_track
 
 LIVE_TIER: Accuracy = "fast"
@@ -49,7 +49,7 @@ def motion_of(
     track: Track,
     scene: Scene,
     wanted_u_s: float | None = None,
-    traps: Sequence[Trap] = (),
+    traps: Sequence[FormatIssue] = (),
     *,
     law: str | None = None,
     accuracy: Accuracy = LIVE_TIER,
@@ -57,7 +57,7 @@ def motion_of(
 ) -> dict[str, Any]:
     """Analyse samples and return the message about their motion; None wants u(T) to reach 40 ppm of the period."""
     try:
-        analysis = analyse_track(track, scene, How(accuracy=accuracy, law=law), traps)
+        analysis = analyse_track(track, scene, AnalysisOptions(accuracy=accuracy, law=law), traps)
     except PipelineError as error:
         return {"type": "motion", "why": str(error), "accuracy": accuracy, "t_s": _end(track)}
     return _message(analysis, accuracy, wanted_u_s, charts=charts)
@@ -226,7 +226,7 @@ class Watcher:
         if self._complete is None:
             return self._between(charts=True)
         try:
-            run = Run.of(self._complete, how=How(accuracy=WHOLE_TIER, law=self._law))
+            run = Run.of(self._complete, how=AnalysisOptions(accuracy=WHOLE_TIER, law=self._law))
         except Error as error:
             return {"type": "motion", "why": str(error), "accuracy": WHOLE_TIER}
         self._run = run

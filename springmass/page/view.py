@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import Block, ClockKind, SourceInfo
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from pipeline.track import Track
 from springmass.runs.json_results import plain
 from springmass.runs.loading import to_track
@@ -25,7 +25,7 @@ SHOWN_NOTES = 20  # the latest
 _HEAD = struct.Struct("<4I")
 
 
-class Series:
+class SampleBuffer:
     """One sensor's samples; the room grows by doubling, so that the cost per sample stays constant."""
 
     def __init__(self) -> None:
@@ -86,7 +86,7 @@ class View:
     clock: ClockKind = "device"
     simulated: bool = False
     calibration: str = ""
-    series: list[Series] = field(default_factory=list)
+    series: list[SampleBuffer] = field(default_factory=list)
     session: str = field(default_factory=lambda: secrets.token_hex(8))
     marks: list[tuple[float, str]] = field(default_factory=list)
     notes: deque[str] = field(default_factory=lambda: deque(maxlen=SHOWN_NOTES))
@@ -95,11 +95,11 @@ class View:
     recorded: Track | None = None
     info: SourceInfo | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
-    traps: tuple[Trap, ...] = ()
+    traps: tuple[FormatIssue, ...] = ()
     zero: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.series = self.series or [Series() for _ in self.sensors]
+        self.series = self.series or [SampleBuffer() for _ in self.sensors]
 
     def track(self) -> Track:
         """Return the first sensor's samples so far, in the form for an analysis."""

@@ -21,7 +21,7 @@ from springmass.report.advice import notices_of, trust_of
 from springmass.report.budgets import budgets_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
-from springmass.runs.comparing import Compared, beside
+from springmass.runs.comparing import SpringComparison, line_and_hooke_words
 from springmass.runs.rows import table_rows
 from springmass.runs.run import Run
 from springmass.runs.showing import laws_across, laws_of
@@ -73,7 +73,7 @@ def render_html(
     runs: Sequence[Run],
     charts: Sequence[Mapping[str, Chart]],
     *,
-    compared: Compared | None = None,
+    compared: SpringComparison | None = None,
     several: Mapping[str, Chart],
     pictures: Mapping[str, bytes],
     stems: Sequence[str],
@@ -97,7 +97,9 @@ def render_html(
         several=overview,
         compared=compared,
         of_reported={code for code, kind in kinds().items() if "reported" in kind.about},
-        verdict="" if compared is None else typeset(" ".join([compared.comparison.message, *beside(compared)])),
+        verdict=""
+        if compared is None
+        else typeset(" ".join([compared.comparison.message, *line_and_hooke_words(compared)])),
         joint=() if compared is None else [laws_across(joint) for joint in compared.joint],
         provenance=list(_flattened(provenance)),
         version=provenance["version"],

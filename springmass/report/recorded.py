@@ -9,7 +9,7 @@ from typing import Any
 from acquisition.errors import visible
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
-from springmass.charts.chart import Note
+from springmass.charts.chart import ChartNote
 from springmass.typeset import pretty
 
 _ON_THE_BENCH = (
@@ -28,11 +28,11 @@ _CALIBRATED = {
 }
 
 
-def notes_of(recorded: Mapping[str, Any]) -> tuple[Note, ...]:
+def notes_of(recorded: Mapping[str, Any]) -> tuple[ChartNote, ...]:
     """Return marks and events of a recording in the order of their times."""
-    marks = [Note(mark["t_s"], visible(str(mark["text"])), "mark") for mark in recorded.get("marks", ())]
+    marks = [ChartNote(mark["t_s"], visible(str(mark["text"])), "mark") for mark in recorded.get("marks", ())]
     events = [
-        Note(event["t_s"], visible(event_words(event["kind"], event.get("facts", {}))), str(event["kind"]))
+        ChartNote(event["t_s"], visible(event_words(event["kind"], event.get("facts", {}))), str(event["kind"]))
         for event in recorded.get("events", ())
     ]
     return tuple(sorted([*marks, *events], key=lambda note: note.t_s))

@@ -24,7 +24,7 @@ from springmass.runs.simulating.bench import REST_M
 from springmass.runs.simulating.simulation import FINE, Prepared, Simulation, count_of, solve
 
 if TYPE_CHECKING:
-    from springmass.charts.draw import Kind
+    from springmass.charts.draw import PictureFormat
 
 PAGE = "simulation.html"
 FIGURES = ("position", "velocity", "energy", "phase", "error", "band", "against")
@@ -42,7 +42,7 @@ def write_folder(
     where: str,
     out: str | Path,
     results: Mapping[str, Any],
-    kinds: Sequence[Kind] = (),
+    kinds: Sequence[PictureFormat] = (),
 ) -> Path:
     """Write run file, page of charts, tables, JSON and the kinds of figures into NAME.simulated; return the folder."""
     from springmass.charts.draw import save

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from springmass.charts.chart import Chart
-from springmass.charts.draw import Kind, save
+from springmass.charts.draw import PictureFormat, save
 from springmass.charts.run import CHARTS, charts_of
 from springmass.charts.several import comparison, masses, overlay, static
 from springmass.errors import detail
@@ -18,7 +18,7 @@ from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import amplitude_csv, motion_csv
 from springmass.report.recorded import notes_of
 from springmass.report.words import summary as in_words
-from springmass.runs.comparing import Compared
+from springmass.runs.comparing import SpringComparison
 from springmass.runs.frames import smoothed_or_why
 from springmass.runs.json_results import plain
 from springmass.runs.outputs import safe_name
@@ -36,9 +36,9 @@ def write_report(
     directory: Path,
     runs: Sequence[Run],
     *,
-    compared: Compared | None = None,
+    compared: SpringComparison | None = None,
     summary: Mapping[str, Any] | None = None,
-    figures: Sequence[Kind] = (),
+    figures: Sequence[PictureFormat] = (),
     template: Literal["latex"] | None = None,
     script: str = "",
 ) -> Path:
@@ -52,7 +52,7 @@ def write_report(
     run.
     """
     directory, stems = Path(directory), _stems([run.name for run in runs])
-    pdf: tuple[Kind, ...] = ("pdf",) if template is not None else ()
+    pdf: tuple[PictureFormat, ...] = ("pdf",) if template is not None else ()
     kinds = list(dict.fromkeys((*figures, *pdf)))
     names, analyses = [run.name for run in runs], [run.analysis for run in runs]
     motions = [smoothed_or_why(analysis) for analysis in analyses]
@@ -118,7 +118,7 @@ def _names(stems: Sequence[str]) -> set[str]:
     figures = {
         f"figures/{name}.{kind}"
         for name in (*charts, "comparison", "overlay", "masses", "hooke")
-        for kind in get_args(Kind)
+        for kind in get_args(PictureFormat)
     }
     tables = (f"{stem}{name}.csv" for stem in stems for name in ("motion", "amplitude"))
     return {PAGE, LAB_REPORT, *TABLES, *figures, *tables}

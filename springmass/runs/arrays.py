@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition import units
 from acquisition.block import Block, SourceInfo
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.headings import heading_of, is_time
 from pipeline.errors import TrackError
 from pipeline.track import F8, Track
@@ -69,7 +69,7 @@ def _stated(source: Any, about: Mapping[str, Any], samples: Block) -> Loaded | N
     path = Path(getattr(source, "encoding", {}).get("source", ""))
     if ABOUT in about:
         known = json.loads(about[ABOUT])
-        info, traps = SourceInfo(**known.pop("info")), tuple(Trap(**trap) for trap in known.pop("traps"))
+        info, traps = SourceInfo(**known.pop("info")), tuple(FormatIssue(**trap) for trap in known.pop("traps"))
         path = Path(known.pop("path"))
         return Loaded(path, info=info, traps=traps, samples=samples, track=_track(samples, info, known), **known)
     if path.is_file() and kind_of(path) == "run":
@@ -90,39 +90,39 @@ def about_json(loaded: Loaded, scene: Mapping[str, Any]) -> str:
     names = ("format", "channel", "title", "malformed_rows", "provenance", "recorded_format", "sha256")
     about = {name: getattr(loaded, name) for name in names}
     info = {name: getattr(loaded.info, name) for name in SourceInfo.__slots__}
-    traps = [{name: getattr(trap, name) for name in Trap.__slots__} for trap in loaded.traps]
+    traps = [{name: getattr(trap, name) for name in FormatIssue.__slots__} for trap in loaded.traps]
     return json.dumps({**about, "path": str(loaded.path), "info": info, "traps": traps, "scene": dict(scene)})
 
 
-class _Column(NamedTuple):
+class _ArrayColumn(NamedTuple):
     """Values, and the unit that their heading states."""
 
     values: Any
     unit: str = ""
 
 
-def _columns(source: Any) -> tuple[_Column, _Column, Any]:
+def _columns(source: Any) -> tuple[_ArrayColumn, _ArrayColumn, Any]:
     """Return the times, the values and the flags of a container."""
     if hasattr(source, "keys") and "distance" in source:
         t = source["time"] if "time" in source else _index_of(source)
         # The "in" of a frame and of a dataset is that of their columns.
         flags = source["quality"] if "quality" in source else None  # noqa: SIM401
         if t is not None:
-            return _Column(t), _Column(source["distance"]), flags
+            return _ArrayColumn(t), _ArrayColumn(source["distance"]), flags
     elif hasattr(source, "columns"):
         return *_by_headings(source), None
     elif getattr(source, "ndim", None) == 1 and "time" in getattr(source, "coords", ()):
-        return _Column(source.coords["time"]), _Column(source), None
+        return _ArrayColumn(source.coords["time"]), _ArrayColumn(source), None
     elif getattr(source, "ndim", None) == 1 and hasattr(source, "index"):
-        return _Column(_index_of(source)), _Column(source), None
+        return _ArrayColumn(_index_of(source)), _ArrayColumn(source), None
     elif isinstance(source, list | tuple) and len(source) == 2:
-        return _Column(source[0]), _Column(source[1]), None
+        return _ArrayColumn(source[0]), _ArrayColumn(source[1]), None
     if coords := ", ".join(map(str, getattr(source, "coords", ()))):
         raise TrackError(f"its times were expected as a coordinate named time, got {coords}; rename the one with times")
     raise TrackError(f"{EXPECTED}, got {type(source).__name__}")
 
 
-def _by_headings(frame: Any) -> tuple[_Column, _Column]:
+def _by_headings(frame: Any) -> tuple[_ArrayColumn, _ArrayColumn]:
     """Return the time and the only other column of a frame, whose headings are as in a CSV file."""
     headings = [(name, *heading_of(str(name))) for name in frame.columns]
     times = [(name, unit) for name, words, unit in headings if is_time(words)]
@@ -130,7 +130,7 @@ def _by_headings(frame: Any) -> tuple[_Column, _Column]:
     if len(times) != 1 or len(others) != 1:
         named = ", ".join(repr(name) for name, *_ in headings)
         raise TrackError(f"one column of times and one of values were expected, got {named}: choose two of them")
-    return _Column(frame[times[0][0]], times[0][1]), _Column(frame[others[0][0]], others[0][1])
+    return _ArrayColumn(frame[times[0][0]], times[0][1]), _ArrayColumn(frame[others[0][0]], others[0][1])
 
 
 def _index_of(source: Any) -> Any:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Compared:
+class SpringComparison:
     """The joint result of several runs of one spring, as :func:`springmass.compare` returns it.
 
     Parameters
@@ -95,7 +95,7 @@ def compare_runs(
     mass_correlation: float = 0.0,
     reported: str | os.PathLike[str] | None = None,
     static: str | os.PathLike[str] | None = None,
-) -> Compared:
+) -> SpringComparison:
     """Compare two or more runs of one spring; raise AnalysisError if one does not oscillate.
 
     ``mass_correlation`` is the correlation coefficient between the errors of two bobs' masses, 0 to 1. ``reported``
@@ -118,10 +118,10 @@ def compare_runs(
     findings = by_severity([*_findings(comparison, joint), *mistakes])
     line = mass_line(springs, mass_correlation)
     hooke = read_hooke(static) if static is not None else None
-    return Compared(comparison, joint, findings, {run.name: run for run in runs}, judged, line, hooke)
+    return SpringComparison(comparison, joint, findings, {run.name: run for run in runs}, judged, line, hooke)
 
 
-def beside(compared: Compared) -> list[str]:
+def line_and_hooke_words(compared: SpringComparison) -> list[str]:
     """Return a sentence on the line through the squared periods, and one on Hooke's law."""
     line, static = compared.line, compared.hooke
     lines = []
@@ -139,7 +139,7 @@ def beside(compared: Compared) -> list[str]:
     return lines
 
 
-def comparison_json(compared: Compared, provenance: Mapping[str, Any]) -> dict[str, Any]:
+def comparison_json(compared: SpringComparison, provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Return a comparison as a JSON-serialisable mapping; numbers that are not finite become None."""
     runs = compared.runs.values()
     found = compared.comparison

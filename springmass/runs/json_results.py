@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.findings.finding import UNKNOWN_CODE, Finding, by_severity, kinds, word
 from pipeline.numerics.estimate import Estimate, UpperLimit
@@ -91,13 +91,13 @@ def _recorded(loaded: Loaded) -> dict[str, Any]:
     }
 
 
-def with_traps(findings: Sequence[Finding], traps: Sequence[Trap]) -> tuple[Finding, ...]:
+def with_traps(findings: Sequence[Finding], traps: Sequence[FormatIssue]) -> tuple[Finding, ...]:
     """Return the findings of an analysis and of the reader, the most severe first."""
     known = {finding.code for finding in findings}
     return by_severity([*findings, *(_of_reader(trap) for trap in traps if trap.code not in known)])
 
 
-def _of_reader(trap: Trap) -> Finding:
+def _of_reader(trap: FormatIssue) -> Finding:
     if trap.code in kinds():
         return word(Found(trap.code, {"sentence": _sentence(trap.message)}))
     # A run file may come from a version that knows more codes than this one.

@@ -21,13 +21,13 @@ from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.clock_fit import fit_clock
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
-from acquisition.recordings.recording import Original, Recording, Trap
+from acquisition.recordings.recording import FormatIssue, Original, Recording
 from acquisition.regular_file import open_regular
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
 from springmass.layout import STDIN, part
 from springmass.runs.inputs import kind_of
-from springmass.runs.options import READ, ReadOptions
+from springmass.runs.options import READ_DEFAULTS, ReadOptions
 from springmass.runs.scenes import about_of
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
@@ -56,7 +56,7 @@ class Loaded:
     title: str
     samples: Block
     track: Track
-    traps: tuple[Trap, ...] = ()
+    traps: tuple[FormatIssue, ...] = ()
     malformed_rows: int = 0
     scene: Mapping[str, Any] | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -80,7 +80,7 @@ class Loaded:
             yield self.samples[start : start + size]
 
 
-def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = False) -> Loaded:
+def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given: bool = False) -> Loaded:
     """Read a recording, a run file or a wire log, or standard input.
 
     All digests of a run file are checked before any sample is used. With ``scene_given`` the caller uses another scene,
@@ -209,14 +209,14 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
         )
 
 
-def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[Trap, ...]:
+def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[FormatIssue, ...]:
     """Return a trap that names the parts of a run file with a checksum mismatch."""
     if not differing:
         return ()
     named = "; ".join(error.problem for error in differing[:NAMED])
     more = f"; and {len(differing) - NAMED} more" if len(differing) > NAMED else ""
     message = f"{path.name} was changed or damaged after it was written ({named}{more}); it was read, as you asked."
-    return (Trap(UNVERIFIED, message, len(differing)),)
+    return (FormatIssue(UNVERIFIED, message, len(differing)),)
 
 
 def _sha256_of(path: Path) -> str:

@@ -61,7 +61,7 @@ class ReadOptions:
         return cls(**answers)
 
 
-READ = ReadOptions()
+READ_DEFAULTS = ReadOptions()
 """No option given: only the file's own statements are used."""
 
 Accuracy = Literal["fast", "standard", "best"]
@@ -70,7 +70,7 @@ _OPTIONS = Parameter(group=Group("Options", sort_key=1))
 
 @Parameter(name="*", group=HOW_READ)
 @dataclass(frozen=True, kw_only=True)
-class How(ReadOptions):
+class AnalysisOptions(ReadOptions):
     """The options of reading, and those of the analysis: its accuracy, and what is known about the damping law.
 
     ``law`` is the law that the results follow, "any" to let the recording choose whatever the scene states; ``laws``
@@ -118,5 +118,5 @@ def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:
     return tuple(found)
 
 
-HOW = How()
+ANALYSIS_DEFAULTS = AnalysisOptions()
 """No option given."""

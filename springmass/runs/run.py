@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError, PipelineError
@@ -24,7 +24,7 @@ from springmass.runs.estimates import Value
 from springmass.runs.frames import estimates_frame, run_dataset, samples_dataset
 from springmass.runs.json_results import result_of, with_traps
 from springmass.runs.loading import Loaded, load, within
-from springmass.runs.options import HOW, How
+from springmass.runs.options import ANALYSIS_DEFAULTS, AnalysisOptions
 from springmass.runs.outputs import now_utc, save_run
 from springmass.runs.rows import TableRow, table_rows
 from springmass.runs.scenes import Amendments, amended, scene_from, stated_keys
@@ -52,7 +52,7 @@ class Run(Mapping[str, Value]):
         The recording as it was read.
     stated : Scene or None
         The scene that replaces the recording's own.
-    how : How
+    how : AnalysisOptions
         How it was read, and how it is analysed.
     name : str
         Name of the run.
@@ -71,7 +71,7 @@ class Run(Mapping[str, Value]):
 
     loaded: Loaded
     stated: Scene | None = None
-    how: How = HOW
+    how: AnalysisOptions = ANALYSIS_DEFAULTS
     name: str = ""
     time_utc: str = ""
 
@@ -79,7 +79,7 @@ class Run(Mapping[str, Value]):
     __eq__ = object.__eq__
 
     @classmethod
-    def of(cls, source: Any, scene: Any = None, how: How = HOW, name: str = "") -> Run:
+    def of(cls, source: Any, scene: Any = None, how: AnalysisOptions = ANALYSIS_DEFAULTS, name: str = "") -> Run:
         """Return the run of a path, arrays, or another run; ``scene`` is one, its tables, or the path of its file."""
         if isinstance(source, str | os.PathLike):
             loaded = load(Path(source), how, scene_given=scene is not None)
@@ -280,7 +280,7 @@ class Run(Mapping[str, Value]):
         return html_summary(self)
 
 
-def analyse_track(track: Track, scene: Scene, how: How, traps: Sequence[Trap]) -> Analysis:
+def analyse_track(track: Track, scene: Scene, how: AnalysisOptions, traps: Sequence[FormatIssue]) -> Analysis:
     """Analyse samples; the findings include what their reader noticed."""
     found = analyse(track, scene, how.options)
     return replace(found, findings=with_traps(found.findings, traps))
@@ -300,7 +300,7 @@ class Task:
     path: str
     name: str
     scene: Scene | None = None
-    how: How = HOW
+    how: AnalysisOptions = ANALYSIS_DEFAULTS
     values: Amendments = field(default_factory=dict)
 
 

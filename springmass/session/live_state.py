@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.block import I8, Block, Flag
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Sensor
 from acquisition.live.decoding import SensorChain
 from pipeline.options import options_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet
@@ -91,7 +91,7 @@ class Usefulness:
                 self._change = float(t[changed[-1]])
             self._last = float(distance[-1])
 
-    def trouble(self, family: Family) -> Trouble | None:
+    def trouble(self, family: Sensor) -> Trouble | None:
         """Return the trouble and what to check; None if there is no trouble."""
         (near, far), missing_s, same_s = family.range_m, self._end - self._target, self._end - self._change
         if missing_s >= USELESS_S:

@@ -18,7 +18,7 @@ from acquisition.decoders.family import Decoder
 from acquisition.live.decoding import SensorChain
 from acquisition.readings import NO_READINGS, Read, Reading
 from springmass.session.failures import Failures
-from springmass.session.sensors import Sensor
+from springmass.session.sensors import OpenSensor
 from storage.recorder import Recorder
 from storage.recovery.report import SILENCE_S, SILENT_PERIODS
 from storage.wire_log.records import HIGHEST_CHANNEL
@@ -50,7 +50,7 @@ class Tee:
     """
 
     def __init__(
-        self, chains: list[SensorChain], failures: Failures | None = None, sensors: Sequence[Sensor] = ()
+        self, chains: list[SensorChain], failures: Failures | None = None, sensors: Sequence[OpenSensor] = ()
     ) -> None:
         self._sensors = sensors
         self._chains = chains

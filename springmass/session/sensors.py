@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from acquisition.decoders.family import Family, Identity
+from acquisition.decoders.family import Identity, Sensor
 from acquisition.decoders.registry import describe_bytes
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM
@@ -24,10 +24,10 @@ LATE_S, LATE_PERIODS = 0.25, 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
+class OpenSensor:
     """One sensor of a session on an open port; ``rate_hz`` and ``clock_ppm`` are by default those of its family."""
 
-    family: Family
+    family: Sensor
     port: SerialPort
     rate_hz: float | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -87,7 +87,7 @@ class Sensor:
         )
 
 
-def meeting(sensor: Sensor, identity: Identity) -> Iterator[str]:
+def meeting(sensor: OpenSensor, identity: Identity) -> Iterator[str]:
     """Yield lines about a sensor that reported its identity."""
     port, rate_hz = sensor.port.name, identity.settings.get("rate_hz")
     yield f"{port}: {identity}{settings_of(identity)}"

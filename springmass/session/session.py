@@ -22,14 +22,14 @@ import numpy as np
 from acquisition.block import Block
 from acquisition.clock import Clock
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
-from acquisition.live.reader import Line, PortReader
+from acquisition.live.reader import PortLine, PortReader
 from pipeline.streaming import LiveMotion, NotYet
 from springmass import __version__
 from springmass.errors import SENSOR, ProgramError
 from springmass.session.failures import Failures, Worker
 from springmass.session.live_state import SECOND_NS, LiveState, Progress, free_bytes, trouble_of
 from springmass.session.reads import Tee
-from springmass.session.sensors import ANSWERED, Sensor, meeting
+from springmass.session.sensors import ANSWERED, OpenSensor, meeting
 from springmass.session.trigger import Disarmed, Trigger, Watch
 from springmass.stops import EndReason, Stops
 from storage.errors import StorageError, WriteFailed
@@ -84,7 +84,7 @@ class Session:
 
     def __init__(
         self,
-        sensors: Sequence[Sensor],
+        sensors: Sequence[OpenSensor],
         clock: Clock,
         *,
         kind: str = "live",
@@ -110,7 +110,7 @@ class Session:
         A sensor that is not heard after 3 s, or after five periods of a slow sensor, raises a ProgramError that
         describes what was received instead.
         """
-        lines = [Line(x.port, port, x.family.poll, x.family.identify) for port, x in enumerate(self.sensors)]
+        lines = [PortLine(x.port, port, x.family.poll, x.family.identify) for port, x in enumerate(self.sensors)]
         for each in lines:
             if each.greeting:
                 each.port.write(each.greeting)

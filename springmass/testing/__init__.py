@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 from typing import Any
 
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Sensor
 from acquisition.recordings.recording import Format
 from pipeline.damping.laws import Law
 from pipeline.dynamics import Integrator
@@ -15,12 +15,12 @@ from springmass.testing.formats import File
 __all__ = ["File", "check"]
 
 
-def check(extension: Family | Format | Law | Integrator, *examples: Any, checksum: bool = False) -> None:
+def check(extension: Sensor | Format | Law | Integrator, *examples: Any, checksum: bool = False) -> None:
     """Hold an extension to every rule of its kind, in a test of your package.
 
     Parameters
     ----------
-    extension : Family, Format, Law or Integrator
+    extension : Sensor, Format, Law or Integrator
         An object as :mod:`springmass.extend` describes it.
     *examples
         For a sensor: frames of its data sheet with their distances in m, ``(b":0253,CA\\n", 0.253)``; NaN for no
@@ -38,8 +38,8 @@ def check(extension: Family | Format | Law | Integrator, *examples: Any, checksu
     """
     rules: tuple[Any, ...]
     cases: list[tuple[Any, ...]]
-    if isinstance(extension, Family):
-        kind, rules, cases = "sensor", sensors.RULES, [(sensors.Sensor(extension, examples, checksum),)]
+    if isinstance(extension, Sensor):
+        kind, rules, cases = "sensor", sensors.RULES, [(sensors.SensorCase(extension, examples, checksum),)]
     elif isinstance(extension, Integrator):
         kind, rules, cases = "method", integrators.RULES, [(extension, examples or integrators.PROBLEMS)]
     elif isinstance(extension, Law):
@@ -51,7 +51,7 @@ def check(extension: Family | Format | Law | Integrator, *examples: Any, checksu
             [(formats.Case(extension, each if isinstance(each, File) else File(each)),) for each in examples],
         )
     else:
-        raise TypeError(f"expected a Family, Format, Law or Integrator, got {extension!r:.80}")
+        raise TypeError(f"expected a Sensor, Format, Law or Integrator, got {extension!r:.80}")
     if not cases:
         raise TypeError(f"{kind} {extension.name}: give an example to check(), as its docstring says")
     failures: dict[str, Exception | None] = {}

@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from acquisition.decoders.family import Decoder, Family
+from acquisition.decoders.family import Decoder, Sensor
 from acquisition.readings import Reading
 from pipeline.track import F8
 from springmass.testing.demands import demand
@@ -25,10 +25,10 @@ _FILLERS = (b"\xff", b"R", b"\0", b"1", b"$", b"\x55\xaa", b"noise")
 
 
 @dataclass(frozen=True)
-class Sensor:
+class SensorCase:
     """A family with frames of its data sheet and their distances, m, and whether a checksum detects every flip."""
 
-    family: Family
+    family: Sensor
     known: Sequence[tuple[bytes, float]] = ()
     checksum: bool = False
 
@@ -40,7 +40,7 @@ class Sensor:
 
     def frames(self, distance: F8 | None = None) -> list[bytes]:
         """Return the bytes of each reading."""
-        demand(self.family.encoder, "give the Family an encoder that is written from the data sheet")
+        demand(self.family.encoder, "give the Sensor an encoder that is written from the data sheet")
         encode = self.family.encoder().encode  # type: ignore[misc]  # there is one, see above
         at = (self.distance if distance is None else distance).tolist()
         return [
@@ -69,7 +69,7 @@ def _metres(readings: Sequence[Reading]) -> F8:
     return np.where(np.isnan(echoes), [reading.distance_m for reading in readings], echoes / _ECHO_US_PER_M)
 
 
-def decoded_as_encoded(case: Sensor) -> None:
+def decoded_as_encoded(case: SensorCase) -> None:
     """Distances come back to half the resolution, no target as NaN, the device's counter and time where it has them."""
     readings, decoder = case.run(b"".join(case.frames()))
     lead = N - len(readings)
@@ -90,7 +90,7 @@ def decoded_as_encoded(case: Sensor) -> None:
     demand(known or not case.family.has_device_time, "return device_us or sequence, or leave has_device_time out")
 
 
-def frames_of_the_data_sheet(case: Sensor) -> None:
+def frames_of_the_data_sheet(case: SensorCase) -> None:
     """Frames of the data sheet are read as the maker says, and no target as NaN."""
     lead = b"" if len(case.clean()) == N else case.frames()[0]
     for frame, distance in (*case.known, *((frame, math.nan) for frame in case.frames(np.full(4, math.nan)))):
@@ -99,7 +99,7 @@ def frames_of_the_data_sheet(case: Sensor) -> None:
         demand(same, f"read the frame {frame!r} as {distance} m, got {found.tolist()}")
 
 
-def cuts_do_not_matter(case: Sensor) -> None:
+def cuts_do_not_matter(case: SensorCase) -> None:
     """Cut in two, into single bytes, and at random: the same readings and the same faults."""
     frames, rng = case.frames(), np.random.default_rng(6)
     clean = b"".join(frames)
@@ -117,7 +117,7 @@ def cuts_do_not_matter(case: Sensor) -> None:
             demand(same, f"decode the same however reads cut the stream; not so in {len(reads)} reads of {data!r:.60}")
 
 
-def in_step_after_garbage(case: Sensor) -> None:
+def in_step_after_garbage(case: SensorCase) -> None:
     """What came before garbage stands, and from the third frame after it on every one is read as sent.
 
     Garbage is noise, or a frame that lost a byte; a sensor without marks is flushed after it.
@@ -138,7 +138,7 @@ def in_step_after_garbage(case: Sensor) -> None:
         demand(not sent or after[-len(sent) :] == sent, f"read the frames from the third after {noise!r} on as sent")
 
 
-def flipped_bits(case: Sensor) -> None:
+def flipped_bits(case: SensorCase) -> None:
     """With a checksum nothing that was not sent is read; without, one flip changes at most two readings."""
     data = b"".join(case.frames()[:10])
     sent, most = set(_metres(case.run(data)[0]).tolist()), 0 if case.checksum else 2
@@ -153,7 +153,7 @@ def flipped_bits(case: Sensor) -> None:
         demand(noticed, f"count the fault of a frame that fails its check; none is for {what}")
 
 
-def noise_is_counted(case: Sensor) -> None:
+def noise_is_counted(case: SensorCase) -> None:
     """Bytes of noise make no reading; each is counted or held, and a few hundred at most are held."""
     noise = np.random.default_rng(3).bytes(5000)
     readings, decoder = case.run(noise)
@@ -169,7 +169,7 @@ def noise_is_counted(case: Sensor) -> None:
             demand(decoder.pending <= 512, f"hold at most 512 bytes of {filler!r} without an end")
 
 
-def begun_frames(case: Sensor) -> None:
+def begun_frames(case: SensorCase) -> None:
     """A frame has the host time of the read that completed it; a flush forgets and counts one that has begun."""
     frames, decoder, clean = case.frames(), case.family.decoder(), case.clean()
     decoder.flush()

@@ -20,7 +20,7 @@ from acquisition.block import Block
 from acquisition.errors import AcquisitionError
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from storage.errors import LogGrowing, NotALog, RunDamaged, RunExists, StorageError
 from storage.recovery.report import LossCount, Losses, RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
@@ -28,7 +28,7 @@ from storage.run_file.writing import RunWriter, run_writer
 from storage.schema import plain
 from storage.wire_log.records import LogHeader, SensorEntry
 from storage.wire_log.scanning import FOREIGN, Damage, LogContents, read_log
-from storage.wire_log.survey import Part, Survey
+from storage.wire_log.survey import LogSurvey, Part
 from storage.wire_log.wire_samples import LogDecoder, Origin, chain_of
 
 
@@ -48,7 +48,7 @@ class RunBuilder:
         self._losses.push(block)
         self._writer.append(block)
 
-    def finish(self, log: LogContents, survey: Survey, reads: int, extra: Mapping[str, Any]) -> RecoveredRun:
+    def finish(self, log: LogContents, survey: LogSurvey, reads: int, extra: Mapping[str, Any]) -> RecoveredRun:
         """Write the log and the header; ``extra`` are further entries of the provenance."""
         header, parts = survey.header, survey.parts_of(self._part.sensor)
         decoding, damage = self._chain.report(), log.damage
@@ -82,11 +82,11 @@ class RunBuilder:
         return RecoveredRun(self._sensor, self._part.number, self._writer.path, self._samples, decoding, losses)
 
 
-def _traps(damage: Damage) -> Iterator[Trap]:
+def _traps(damage: Damage) -> Iterator[FormatIssue]:
     if not damage.intact:
-        yield Trap("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost))
+        yield FormatIssue("damaged_log", f"The wire log is damaged: {damage.describe()}.", max(1, damage.lost))
     if not damage.ended:
-        yield Trap("cut_short", "The recording was cut short; everything in its log is here.")
+        yield FormatIssue("cut_short", "The recording was cut short; everything in its log is here.")
 
 
 RUNS_PER_PASS = 4
@@ -125,7 +125,7 @@ def recover(
     if not growing and contents.being_written():
         problem = f"a recording still writes this log ({contents.size} bytes so far)"
         raise LogGrowing(contents.path, problem, "recover it after the recording has ended")
-    survey = Survey(contents, _header(contents, header))
+    survey = LogSurvey(contents, _header(contents, header))
     sensors = [_calibrated(sensor, survey, speed_of_sound_m_per_s) for sensor in survey.header.sensors]
     out = contents.path if out_path is None else Path(out_path)
     paths = _paths(out, survey)
@@ -161,7 +161,7 @@ def run_paths(path: Path, channels: Sequence[int]) -> list[Path]:
     return [path] if len(channels) <= 1 else [path.with_name(f"{path.stem}.{channel}.h5") for channel in channels]
 
 
-def _paths(out: Path, survey: Survey) -> dict[Part, Path]:
+def _paths(out: Path, survey: LogSurvey) -> dict[Part, Path]:
     """Return the parts that get a run file, and its path: the first part of every sensor, and all long ones."""
     channels = [sensor.channel for sensor in survey.header.sensors]
     paths: dict[Part, Path] = {}
@@ -185,7 +185,7 @@ def _header(contents: LogContents, stand_in: LogHeader | None) -> LogHeader:
     raise NotALog(contents.path, problem, "in Python, give recover() the header of a log with the same sensors")
 
 
-def _calibrated(sensor: SensorEntry, survey: Survey, speed_of_sound_m_per_s: float | None) -> SensorEntry:
+def _calibrated(sensor: SensorEntry, survey: LogSurvey, speed_of_sound_m_per_s: float | None) -> SensorEntry:
     calibration = dict(survey.calibrations.get(sensor.channel, sensor.calibration))
     if speed_of_sound_m_per_s is not None:
         calibration["speed_of_sound_m_per_s"] = speed_of_sound_m_per_s
@@ -194,7 +194,7 @@ def _calibrated(sensor: SensorEntry, survey: Survey, speed_of_sound_m_per_s: flo
 
 def _build(
     contents: LogContents,
-    survey: Survey,
+    survey: LogSurvey,
     sensors: Sequence[SensorEntry],
     targets: Mapping[Part, Path],
     provenance: Mapping[str, Any],

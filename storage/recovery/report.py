@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block, Flag
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from storage.wire_log.records import SensorEntry
 from storage.wire_log.scanning import Damage
 from storage.wire_log.survey import goes_on
@@ -49,33 +49,33 @@ class Losses:
     dropped_reads: int = 0
     dropped_bytes: int = 0
 
-    def traps(self) -> Iterator[Trap]:
+    def traps(self) -> Iterator[FormatIssue]:
         """Yield a trap for each kind of loss."""
         if self.gone_s is not None:
             why = f" ({self.why})" if self.why else ", though its port was there"
-            yield Trap(
+            yield FormatIssue(
                 "sensor_lost",
                 f"The sensor sent no reading in the last {self.gone_s:.3g} s of the {self.seconds:.4g} s "
                 f"recorded{why}.",
             )
         if self.away:
             often = "once" if len(self.away) == 1 else f"{len(self.away)} times"
-            yield Trap(
+            yield FormatIssue(
                 "sensor_away",
                 f"The sensor's port was lost {often} and came back, after at most {max(self.away):.3g} s; "
                 f"{sum(self.away):.3g} s in total were not recorded.",
                 len(self.away),
             )
         if self.another:
-            yield Trap("sensor_replaced", f"Another sensor was plugged in before this part ({self.another}).")
+            yield FormatIssue("sensor_replaced", f"Another sensor was plugged in before this part ({self.another}).")
         if self.longest_no_target_s >= NO_TARGET_S:
-            yield Trap(
+            yield FormatIssue(
                 "no_target",
                 f"The sensor heard no echo for {self.no_target_s:.3g} s in total, at most "
                 f"{self.longest_no_target_s:.3g} s at a time.",
             )
         if self.dropped_reads:
-            yield Trap(
+            yield FormatIssue(
                 "readings_dropped",
                 f"{self.dropped_reads} reads of the port ({self.dropped_bytes} bytes) were dropped because the disk "
                 "was too slow and the queue was full; the samples have gaps there.",

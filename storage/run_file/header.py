@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from msgspec import Meta, Struct
 
-from acquisition.block import UNITS, ClockKind, Kind
+from acquisition.block import UNITS, ClockKind, SourceKind
 from storage.schema import Count, ValueRefused, decoded, json_text, parsed, plain, shown
 
 SCHEMA = 1
@@ -21,7 +21,7 @@ _Length = Annotated[float, Meta(ge=0.0, le=1e30)]
 class Info(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The source, as :class:`acquisition.block.SourceInfo` describes it."""
 
-    kind: Kind
+    kind: SourceKind
     name: _Text
     rate_hz: Annotated[float, Meta(ge=1e-9, le=1e12)]
     sigma_m: _Length | None = None
@@ -39,7 +39,7 @@ class FileEntry(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TrapEntry(Struct, frozen=True, forbid_unknown_fields=True):
-    """A remark of the reader, as described by :class:`acquisition.recordings.recording.Trap`."""
+    """A remark of the reader, as described by :class:`acquisition.recordings.recording.FormatIssue`."""
 
     code: Annotated[str, Meta(max_length=200)]
     message: _Text
@@ -47,7 +47,7 @@ class TrapEntry(Struct, frozen=True, forbid_unknown_fields=True):
     line: Count | None = None
 
 
-class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class RunHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Everything about a run that is not an array.
 
     ``first`` is the index of the first sample. ``columns`` has the SHA-256 of every column in the file. ``quantity``
@@ -76,7 +76,7 @@ class Header(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return text
 
     @classmethod
-    def decode(cls, text: bytes) -> Header:
+    def decode(cls, text: bytes) -> RunHeader:
         """Decode the text that :meth:`encode` returned.
 
         Raises ValueRefused if a value is not allowed for its key, and ValueError if the text has another schema.

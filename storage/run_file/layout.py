@@ -6,7 +6,7 @@ them as text, h5py returns ``bytes``.
 
 The file states all metadata twice. ``/entry/provenance/header`` is one canonical JSON text (sorted keys, ASCII) of
 everything except the arrays. It includes the SHA-256 of every array's decoded little-endian values; the SHA-256 of
-the text is stored as an attribute. :class:`storage.run_file.reading.Run` reads only this text and the arrays. The
+the text is stored as an attribute. :class:`storage.run_file.reading.RunFile` reads only this text and the arrays. The
 attributes and fields above are made from it for people and other tools.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import Block, Flag
-from storage.run_file.header import Header
+from storage.run_file.header import RunHeader
 from storage.schema import json_text, plain
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -32,7 +32,7 @@ NO_HOST_NS = -1
 """Value of ``host_mono_ns`` if no host recorded the sample."""
 
 
-class Column(NamedTuple):
+class StoredColumn(NamedTuple):
     """One array of the file with a value for each sample.
 
     ``field`` is that of a :class:`Block` with the values; ``fill`` stands in blocks that lack an optional column.
@@ -61,14 +61,16 @@ _QUALITY = {
 _VELOCITY = {"units": "m/s", "long_name": "velocity as the recording states it", **_NAN}
 _HOST = {"units": "ns", "long_name": "host's monotonic clock at arrival; -1 where no host was there"}
 COLUMNS = (
-    Column(f"{SIGNAL}/time", "<f8", {"units": "s", "long_name": "time since the start of the run"}, "t"),
-    Column(f"{SIGNAL}/distance", "<f8", {"units": "m", "long_name": "distance from the sensor", **_NAN}, "distance"),
-    Column(f"{SIGNAL}/distance_errors", "<f4", {**_ERRORS, "_FillValue": np.float32("nan")}),
-    Column(f"{SIGNAL}/quality", "|u1", _QUALITY, "flags"),
-    Column(f"{SIGNAL}/velocity", "<f8", _VELOCITY, "velocity", float("nan")),
-    Column("/raw/host_mono_ns", "<i8", _HOST, "host_ns", NO_HOST_NS),
+    StoredColumn(f"{SIGNAL}/time", "<f8", {"units": "s", "long_name": "time since the start of the run"}, "t"),
+    StoredColumn(
+        f"{SIGNAL}/distance", "<f8", {"units": "m", "long_name": "distance from the sensor", **_NAN}, "distance"
+    ),
+    StoredColumn(f"{SIGNAL}/distance_errors", "<f4", {**_ERRORS, "_FillValue": np.float32("nan")}),
+    StoredColumn(f"{SIGNAL}/quality", "|u1", _QUALITY, "flags"),
+    StoredColumn(f"{SIGNAL}/velocity", "<f8", _VELOCITY, "velocity", float("nan")),
+    StoredColumn("/raw/host_mono_ns", "<i8", _HOST, "host_ns", NO_HOST_NS),
 )
-BY_NAME = {column.name: column for column in (*COLUMNS, Column("/raw/sequence", "<u4", {}))}
+BY_NAME = {column.name: column for column in (*COLUMNS, StoredColumn("/raw/sequence", "<u4", {}))}
 """The columns of files of all versions."""
 CHECKED = tuple(column.name for column in COLUMNS if column.field)
 """The columns of a block, whose digests are checked when all blocks are read."""
@@ -95,7 +97,7 @@ def arrays(block: Block, sigma_m: float | None) -> dict[str, NDArray[Any] | None
     return values
 
 
-def attributes(header: Header) -> dict[str, dict[str, Any]]:
+def attributes(header: RunHeader) -> dict[str, dict[str, Any]]:
     """Return the attributes for other tools, by the path of their group or array."""
     info = header.info
     texts = {name: getattr(header, name) for name in ("title", "channel", "format")}
@@ -121,7 +123,7 @@ def attributes(header: Header) -> dict[str, dict[str, Any]]:
     return tree | {path: {"units": unit} for path, unit in named.items() if unit}
 
 
-def _column_attributes(column: Column, header: Header) -> dict[str, Any]:
+def _column_attributes(column: StoredColumn, header: RunHeader) -> dict[str, Any]:
     """Return a column's attributes in this run."""
     attributes = dict(column.attributes)
     if column.name == "time":
@@ -141,7 +143,7 @@ def _column_attributes(column: Column, header: Header) -> dict[str, Any]:
     return attributes
 
 
-def fields(header: Header) -> dict[str, Any]:
+def fields(header: RunHeader) -> dict[str, Any]:
     """Return the scalar fields by path: NeXus uses fields for quantities with a unit."""
     values = {"/entry/title": header.title, "/entry/start_time": _text(header, "start_time")}
     values |= {f"{INSTRUMENT}/{name}": value for name, value in plain(header.info).items()}
@@ -149,7 +151,7 @@ def fields(header: Header) -> dict[str, Any]:
     return {path: value if isinstance(value, str) else float(value) for path, value in stated.items()}
 
 
-def _provenance(header: Header) -> dict[str, Any]:
+def _provenance(header: RunHeader) -> dict[str, Any]:
     attributes: dict[str, Any] = {"malformed_rows": header.malformed_rows}
     texts = {name: _text(header, name) for name in ("software", "version", "created_utc")}
     attributes |= {name: text for name, text in texts.items() if text}
@@ -162,7 +164,7 @@ def _provenance(header: Header) -> dict[str, Any]:
     return attributes
 
 
-def _text(header: Header, key: str) -> str:
+def _text(header: RunHeader, key: str) -> str:
     """Return a text of the provenance; empty if there is none."""
     value = header.provenance.get(key)
     return value if isinstance(value, str) else ""

@@ -18,24 +18,24 @@ from typing import Any, Self
 from numpy.typing import NDArray
 
 from acquisition.block import Block, SourceInfo
-from acquisition.recordings.recording import Original, Trap
+from acquisition.recordings.recording import FormatIssue, Original
 from acquisition.regular_file import open_regular
 from storage.errors import NotARun, RunClosed, RunDamaged, one_line
 from storage.hdf5 import damaged, reading_h5
 from storage.run_file import layout
-from storage.run_file.header import FileEntry, Header
+from storage.run_file.header import FileEntry, RunHeader
 from storage.run_file.layout import CHECKED, CHUNK
 from storage.schema import ValueRefused, plain
 
 _PIECE = 16 * CHUNK
 
 
-def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> Run:
-    """Open a run file for reading; use it in a ``with``, or close it. See :class:`Run`."""
-    return Run(path, unverified=unverified)
+def open_run(path: str | os.PathLike[str], *, unverified: bool = False) -> RunFile:
+    """Open a run file for reading; use it in a ``with``, or close it. See :class:`RunFile`."""
+    return RunFile(path, unverified=unverified)
 
 
-class Run:
+class RunFile:
     """An open run file.
 
     The header is read when the file is opened, samples on demand. Everything is checked: every chunk has a checksum,
@@ -83,9 +83,9 @@ class Run:
         return SourceInfo(**plain(self.header.info))
 
     @property
-    def traps(self) -> tuple[Trap, ...]:
+    def traps(self) -> tuple[FormatIssue, ...]:
         """The remarks of the reader on the recording."""
-        return tuple(Trap(**plain(trap)) for trap in self.header.traps)
+        return tuple(FormatIssue(**plain(trap)) for trap in self.header.traps)
 
     @property
     def provenance(self) -> Mapping[str, Any]:
@@ -126,10 +126,10 @@ class Run:
             except RunDamaged as error:
                 yield error
 
-    def _read_header(self) -> tuple[Header, str]:
+    def _read_header(self) -> tuple[RunHeader, str]:
         text, sha256 = self._header_text()
         try:
-            return Header.decode(text), sha256
+            return RunHeader.decode(text), sha256
         except ValueRefused as error:
             remedy = "springmass does not write such files; ask where it comes from"
             raise RunDamaged(self.path, str(error), remedy) from error

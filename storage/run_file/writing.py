@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.block import UNITS, Block, SourceInfo, concatenate
-from acquisition.recordings.recording import Original, Trap
+from acquisition.recordings.recording import FormatIssue, Original
 from storage.errors import WriteFailed
 from storage.hdf5 import whole_h5, writing_h5
 from storage.run_file import layout
-from storage.run_file.header import FileEntry, Header, Info, TrapEntry
+from storage.run_file.header import FileEntry, Info, RunHeader, TrapEntry
 from storage.run_file.layout import CHUNK
 from storage.schema import plain
 
@@ -35,7 +35,7 @@ def write_run(
     """Write a run file whole.
 
     The blocks are written as they arrive, so at most a chunk of 65536 samples and one block are kept in memory.
-    ``header`` are further fields of :class:`storage.run_file.header.Header`, and the reader's ``traps``.
+    ``header`` are further fields of :class:`storage.run_file.header.RunHeader`, and the reader's ``traps``.
     """
     with run_writer(path, sigma_m=info.sigma_m, overwrite=overwrite) as run:
         for block in blocks:
@@ -107,10 +107,10 @@ class RunWriter:
         with writing_h5(self.path):
             del array  # HDF5 writes the rest
 
-    def finish(self, info: SourceInfo, *, traps: Sequence[Trap] = (), **header: Any) -> None:
+    def finish(self, info: SourceInfo, *, traps: Sequence[FormatIssue] = (), **header: Any) -> None:
         """Write the remaining samples and the header.
 
-        ``header`` has the fields of :class:`storage.run_file.header.Header` that do not follow from the samples and
+        ``header`` has the fields of :class:`storage.run_file.header.RunHeader` that do not follow from the samples and
         the originals. Raises WriteFailed if one of them has a value that is not allowed.
         """
         rest = concatenate(self._pending)
@@ -118,7 +118,7 @@ class RunWriter:
             self._write(rest, growing=bool(self._written))
         with writing_h5(self.path):
             self._write_dimensions()
-            text = Header(
+            text = RunHeader(
                 info=Info(**plain(info)),
                 traps=tuple(TrapEntry(**plain(trap)) for trap in traps),
                 first=self._first or 0,
@@ -156,7 +156,7 @@ class RunWriter:
                 self._write_column(column, exact, growing=growing)
         self._written += len(block)
 
-    def _write_column(self, column: layout.Column, values: NDArray[Any], *, growing: bool) -> None:
+    def _write_column(self, column: layout.StoredColumn, values: NDArray[Any], *, growing: bool) -> None:
         if column.name not in self._digests:
             self._digests[column.name] = hashlib.sha256()
             _create(self._file, column.path, column.dtype, None if growing else len(values))
@@ -164,7 +164,7 @@ class RunWriter:
                 self._extend(column, start, np.full(CHUNK, column.fill, column.dtype))
         self._extend(column, self._written, values)
 
-    def _extend(self, column: layout.Column, start: int, values: NDArray[Any]) -> None:
+    def _extend(self, column: layout.StoredColumn, start: int, values: NDArray[Any]) -> None:
         array = self._file[column.path]
         if array.shape[0] < start + len(values):
             array.resize((start + len(values),))
@@ -183,7 +183,7 @@ class RunWriter:
             _attach(self._file["raw"], "sample", self._file["raw/host_mono_ns"])
 
 
-def _write_header(file: Any, header: Header) -> None:
+def _write_header(file: Any, header: RunHeader) -> None:
     text = header.encode()
     text_array = file.create_dataset(layout.HEADER, data=np.bytes_(text))
     text_array.attrs["sha256"] = np.bytes_(hashlib.sha256(text).hexdigest())

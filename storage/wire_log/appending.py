@@ -17,7 +17,7 @@ from typing import NamedTuple, Protocol
 
 from storage.atomic import sync_folder
 from storage.errors import RunExists, WriteFailed, one_line
-from storage.wire_log.records import Kind, LogHeader, frame
+from storage.wire_log.records import LogHeader, RecordKind, frame
 
 if sys.platform != "win32":
     import fcntl
@@ -63,11 +63,11 @@ def open_log_file(path: Path) -> LogFile:
 SECOND_COPY = 32768
 """Size of the log after which the header is written once more, bytes."""
 
-Item = tuple[Kind, int, int, bytes]
+LogItem = tuple[RecordKind, int, int, bytes]
 """The parts of a record: kind, channel, time on the host's monotonic clock in ns, payload of at most 65535 bytes."""
 
 
-class Written(NamedTuple):
+class LogSize(NamedTuple):
     """Size of a log: number of records, and size of the file in bytes."""
 
     records: int = 0
@@ -93,7 +93,7 @@ class WireLogWriter:
         log: int | None = None,
     ) -> None:
         self.path = Path(path)
-        self.written = self.synced = Written()
+        self.written = self.synced = LogSize()
         self.extended = 0
         self._log = secrets.randbits(32) if log is None else log
         self._copied = False
@@ -113,7 +113,7 @@ class WireLogWriter:
         except OSError as error:
             raise self._failed("could not be made", error) from error
         try:
-            self.extend([(Kind.HEADER, 0, header.mono_ns, self._header)])
+            self.extend([(RecordKind.HEADER, 0, header.mono_ns, self._header)])
             self.sync()
         except BaseException:
             with contextlib.suppress(OSError):
@@ -121,7 +121,7 @@ class WireLogWriter:
                 self.path.unlink()
             raise
 
-    def extend(self, items: Sequence[Item]) -> None:
+    def extend(self, items: Sequence[LogItem]) -> None:
         """Append the records of items in one write.
 
         Raises WriteFailed if the disk does not accept all of them; the writer then refuses further items.
@@ -131,7 +131,7 @@ class WireLogWriter:
             raise refused
         if not self._copied and self.written.bytes >= SECOND_COPY:
             self._copied = True
-            self.extend([(Kind.HEADER, 0, items[0][2], self._header)])
+            self.extend([(RecordKind.HEADER, 0, items[0][2], self._header)])
             self.extended = 0
         records = [
             frame(kind, payload, sequence, mono_ns, self._log, channel)
@@ -153,7 +153,7 @@ class WireLogWriter:
         self._count(len(records), len(data))
 
     def _count(self, records: int, size: int) -> None:
-        self.written = Written(self.written.records + records, self.written.bytes + size)
+        self.written = LogSize(self.written.records + records, self.written.bytes + size)
         self.extended = records
 
     def sync(self) -> None:

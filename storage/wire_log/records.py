@@ -31,7 +31,7 @@ from typing import Annotated, Any, NamedTuple
 
 from msgspec import Meta, Struct, field
 
-from acquisition.block import Kind as SourceKind
+from acquisition.block import SourceKind
 from acquisition.errors import CalibrationError
 from acquisition.live.calibration import Calibration
 from storage.schema import ValueRefused, decoded, json_text, parsed, plain, shown
@@ -53,7 +53,7 @@ WRAP = 1 << 32
 """Sequence numbers count modulo this."""
 
 
-class Kind(enum.IntEnum):
+class RecordKind(enum.IntEnum):
     """The kind of a record; the values are stored in logs and never change."""
 
     HEADER = 1
@@ -63,7 +63,7 @@ class Kind(enum.IntEnum):
     END = 5
 
 
-_KINDS = {kind.value: kind for kind in Kind}
+_KINDS = {kind.value: kind for kind in RecordKind}
 
 
 class Record(NamedTuple):
@@ -72,7 +72,7 @@ class Record(NamedTuple):
     offset: int
     sequence: int
     mono_ns: int
-    kind: Kind
+    kind: RecordKind
     channel: int
     payload: bytes
     lost_before: int = 0
@@ -82,17 +82,17 @@ class Record(NamedTuple):
         return self.payload.decode("utf-8", "replace")
 
 
-def frame(kind: Kind, payload: bytes, sequence: int, mono_ns: int, log: int, channel: int = 0) -> bytes:
+def frame(kind: RecordKind, payload: bytes, sequence: int, mono_ns: int, log: int, channel: int = 0) -> bytes:
     """Return one record with a payload of at most 65535 bytes.
 
-    >>> frame(Kind.DATA, b"R0500", sequence=7, mono_ns=1, log=2, channel=3).hex(" ", -4)
+    >>> frame(RecordKind.DATA, b"R0500", sequence=7, mono_ns=1, log=2, channel=3).hex(" ", -4)
     'f5a90500 07000000 01000000 00000000 02000000 02030000 034438e3 52303530 30'
     """
     head = _HEAD.pack(MAGIC, len(payload), sequence % WRAP, mono_ns, log, kind, channel, 0)
     return head + _CRC.pack(zlib.crc32(payload, zlib.crc32(head))) + payload
 
 
-def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Kind, int, bytes] | None:
+def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, RecordKind, int, bytes] | None:
     """Return the complete and valid record that begins at an index: sequence, mono_ns, log, kind, channel, payload.
 
     Return None if there is none, or if it belongs to another log than number ``log``.

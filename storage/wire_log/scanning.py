@@ -17,7 +17,7 @@ from pathlib import Path
 from acquisition.regular_file import open_regular
 from storage.errors import NotALog, one_line
 from storage.schema import ValueRefused
-from storage.wire_log.records import HEAD_BYTES, LONGEST_RECORD, MAGIC, WRAP, Kind, LogHeader, Record, unframe
+from storage.wire_log.records import HEAD_BYTES, LONGEST_RECORD, MAGIC, WRAP, LogHeader, Record, RecordKind, unframe
 
 FOREIGN = "springmass does not write such logs; ask where it comes from"
 STRETCH = 1 << 20
@@ -106,7 +106,7 @@ class Scan:
             self._expected = sequence + 1
             damage.records += 1
             damage.lost += missing
-            damage.ended = kind is Kind.END
+            damage.ended = kind is RecordKind.END
             yield Record(offset, sequence, mono_ns, kind, channel, payload, missing)
         damage.tail_bytes = size - self._end
 
@@ -151,7 +151,7 @@ class LogContents:
     @property
     def header(self) -> LogHeader | None:
         """The first header; None if both copies are lost. Raises NotALog for a value that is not allowed."""
-        payload = next((record.payload for record in self if record.kind is Kind.HEADER), None)
+        payload = next((record.payload for record in self if record.kind is RecordKind.HEADER), None)
         try:
             return None if payload is None else LogHeader.decode(payload)
         except ValueRefused as error:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from storage.errors import NotALog
 from storage.schema import ValueRefused
-from storage.wire_log.records import HIGHEST_CHANNEL, Kind, LogHeader, Record, demand_calibration, event_content
+from storage.wire_log.records import HIGHEST_CHANNEL, LogHeader, Record, RecordKind, demand_calibration, event_content
 from storage.wire_log.scanning import FOREIGN, LogContents
 
 FIRST_NOTES, LAST_NOTES = 10_000, 100
@@ -69,10 +69,10 @@ def goes_on(facts: Mapping[str, Any]) -> bool:
     return facts.get("sensor") == "continued" and "://" in str(facts.get("port", ""))
 
 
-class Note(NamedTuple):
+class LogNote(NamedTuple):
     """A mark or an event, and the part to which its channel belongs after it."""
 
-    kind: Kind
+    kind: RecordKind
     mono_ns: int
     channel: int
     part: Part | None
@@ -80,7 +80,7 @@ class Note(NamedTuple):
 
 
 @dataclass(slots=True)
-class Span:
+class PartSpan:
     """The time of a part: of its begin and its last read, ns, and the time between its first and last read, s."""
 
     begin_ns: int
@@ -88,7 +88,7 @@ class Span:
     seconds: float = 0.0
 
 
-class Survey:
+class LogSurvey:
     """What a log contains besides its data, and the extent of each part.
 
     A calibration at the end of a log applies to all samples, so it is read before any of them is decoded.
@@ -100,20 +100,22 @@ class Survey:
         self.header, self.end_ns = header, header.mono_ns
         self.calibrations: dict[int, Mapping[str, Any]] = {}
         self._parts = Parts(sensor.channel for sensor in header.sensors)
-        self.spans = {part: Span(header.mono_ns, 0) for part in self._parts.now.values()}
-        first: list[Note] = []
-        last: deque[Note] = deque(maxlen=LAST_NOTES)
+        self.spans = {part: PartSpan(header.mono_ns, 0) for part in self._parts.now.values()}
+        first: list[LogNote] = []
+        last: deque[LogNote] = deque(maxlen=LAST_NOTES)
         count, now, first_ns = 0, self._parts.now, dict[Part, int]()
         for record in log:
             _, _, mono_ns, kind, channel, _, _ = record
-            if kind is Kind.DATA:
+            if kind is RecordKind.DATA:
                 part = now.get(channel) or self._begin(self._parts.unknown(channel), mono_ns)
                 if part is not None:
                     first_ns.setdefault(part, mono_ns)
                     self.spans[part].last_ns = mono_ns
-            elif kind is Kind.MARK or kind is Kind.EVENT:
-                content = {"text": record.text()} if kind is Kind.MARK else self._event(log, record)
-                (first if count < FIRST_NOTES else last).append(Note(kind, mono_ns, channel, now.get(channel), content))
+            elif kind is RecordKind.MARK or kind is RecordKind.EVENT:
+                content = {"text": record.text()} if kind is RecordKind.MARK else self._event(log, record)
+                (first if count < FIRST_NOTES else last).append(
+                    LogNote(kind, mono_ns, channel, now.get(channel), content)
+                )
                 count += 1
             self.end_ns = max(self.end_ns, mono_ns)
         for part, ns in first_ns.items():
@@ -125,7 +127,7 @@ class Survey:
 
     def _begin(self, part: Part | None, mono_ns: int) -> Part | None:
         if part is not None:
-            self.spans[part] = Span(mono_ns, 0)
+            self.spans[part] = PartSpan(mono_ns, 0)
         return part
 
     def _event(self, log: LogContents, record: Record) -> dict[str, Any]:
@@ -141,7 +143,7 @@ class Survey:
 
     def events_of(self, part: Part) -> list[tuple[int, str, Mapping[str, Any]]]:
         """Return time, kind and facts of a part's events."""
-        events = [note for note in self._notes if note.kind is Kind.EVENT and note.part == part]
+        events = [note for note in self._notes if note.kind is RecordKind.EVENT and note.part == part]
         return [(note.mono_ns, note.content["kind"], note.content["facts"]) for note in events]
 
     def parts_of(self, sensor: int) -> list[Part]:
@@ -150,9 +152,9 @@ class Survey:
 
     def provenance(self, origin_ns: int) -> dict[str, Any]:
         """Return marks and events as plain numbers and texts, with their times relative to ``origin_ns``."""
-        by_kind: dict[Kind, list[dict[str, Any]]] = {Kind.MARK: [], Kind.EVENT: []}
+        by_kind: dict[RecordKind, list[dict[str, Any]]] = {RecordKind.MARK: [], RecordKind.EVENT: []}
         for kind, mono_ns, channel, _, content in self._notes:
             t_s = (mono_ns - origin_ns) * 1e-9
             by_kind[kind].append({"mono_ns": mono_ns, "t_s": t_s, "channel": channel, **content})
-        provenance: dict[str, Any] = {"marks": by_kind[Kind.MARK], "events": by_kind[Kind.EVENT]}
+        provenance: dict[str, Any] = {"marks": by_kind[RecordKind.MARK], "events": by_kind[RecordKind.EVENT]}
         return provenance | ({"notes_left_out": self._left_out} if self._left_out else {})

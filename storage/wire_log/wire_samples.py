@@ -11,7 +11,7 @@ from acquisition.block import Block
 from acquisition.decoders.registry import get_family
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from storage.wire_log.records import Kind, Record, SensorEntry, event_content
+from storage.wire_log.records import Record, RecordKind, SensorEntry, event_content
 from storage.wire_log.survey import Part, Parts
 
 BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
@@ -84,7 +84,7 @@ class LogDecoder:
             if lost_before:
                 for part in list(now.values()):
                     self._break(part)
-            if kind is not Kind.DATA:
+            if kind is not RecordKind.DATA:
                 self._note(record)
                 continue
             held = self._held.get(now[channel]) if channel in now else self._begin(self._parts.unknown(channel))
@@ -99,7 +99,7 @@ class LogDecoder:
 
     def _note(self, record: Record) -> None:
         content: dict[str, Any] = {}
-        if record.kind is Kind.EVENT:
+        if record.kind is RecordKind.EVENT:
             content = event_content(record.payload)
             if content["kind"] in BREAKS and record.channel in self._parts.now:
                 self._break(self._parts.now[record.channel])

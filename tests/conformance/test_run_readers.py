@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquisition.block import Block, Flag, SourceInfo
-from acquisition.recordings.recording import Original, Trap
+from acquisition.recordings.recording import FormatIssue, Original
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
 from tests.sampling import sampled
@@ -37,7 +37,7 @@ def write(path: Path, n: int, *, full: bool) -> Path:
         originals=[Original("lauf position.txt", b"0\t1\n" * 40), Original("empty.txt", b"")],
         scene={"bob": {"mass_kg": 0.2}},
         title="Träger ①",
-        traps=[Trap("truncated_row", "One row was cut.")],
+        traps=[FormatIssue("truncated_row", "One row was cut.")],
         provenance={"software": "springmass", "version": "0.1.0", "start_time": "2024-05-01T12:00:00Z"},
     )
 

@@ -15,7 +15,7 @@ from storage.recorder import Recorder
 from storage.recovery.recover import recover
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import LogFile, open_log_file
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.faults.conftest import files_up_to
 
@@ -45,7 +45,7 @@ class Faulty:
 
 def reads_of(log: Path) -> list[bytes]:
     """Return the data records' payloads."""
-    return [record.payload for record in read_log(log) if record.kind is Kind.DATA]
+    return [record.payload for record in read_log(log) if record.kind is RecordKind.DATA]
 
 
 def test_a_log_at_the_file_size_limit_becomes_its_run_file(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import QUEUE_BYTES, Recorder
 from storage.run_file.reading import open_run
-from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry
+from storage.wire_log.records import HEAD_BYTES, LogHeader, Record, RecordKind, SensorEntry
 from tests.faults.conftest import frame_of
 from tests.sampling import sampled
 from tests.wire import WAIT_S, Disk, json_of, parse_log
@@ -103,8 +103,10 @@ def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_
 def demand_complete(put: list[tuple[int, bytes]], records: list[Record], channel: int) -> int:
     """Demand every read of a channel, but those that its overflow event counts in its place; return their number."""
     of_channel = [record for record in records if record.channel == channel]
-    events = [record for record in of_channel if record.kind is Kind.EVENT and json_of(record)["kind"] == "overflow"]
-    recorded = [(record.mono_ns, record.payload) for record in of_channel if record.kind is Kind.DATA]
+    events = [
+        record for record in of_channel if record.kind is RecordKind.EVENT and json_of(record)["kind"] == "overflow"
+    ]
+    recorded = [(record.mono_ns, record.payload) for record in of_channel if record.kind is RecordKind.DATA]
     if not events:
         assert recorded == put
         return 0
@@ -115,7 +117,7 @@ def demand_complete(put: list[tuple[int, bytes]], records: list[Record], channel
     assert (lost[0][0], lost[-1][0]) == (facts["first_ns"], event.mono_ns)
     assert sum(len(data) for _, data in lost) == facts["bytes"]
     assert recorded == put[:first] + put[first + len(lost) :]
-    before = [record for record in of_channel[: of_channel.index(event)] if record.kind is Kind.DATA]
+    before = [record for record in of_channel[: of_channel.index(event)] if record.kind is RecordKind.DATA]
     assert len(before) == first
     return len(lost)
 

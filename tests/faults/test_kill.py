@@ -19,7 +19,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from storage.recorder import Recorder
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
 
 KILLS = int(os.environ.get("SPRINGMASS_KILLS", "12"))
@@ -81,7 +81,7 @@ def test_a_killed_recording_keeps_every_committed_record(mode: str, kills: int, 
         log = tmp_path / f"{number}.wire"
         taken, written, synced = trial(log, mode, rng)
         contents = read_log(log)
-        reads = [record.payload for record in contents if record.kind is Kind.DATA]
+        reads = [record.payload for record in contents if record.kind is RecordKind.DATA]
         assert reads == [packet(n) for n in range(len(reads))], "a wrong record"
         assert contents.header == HEADER
         assert contents.damage.lost == contents.damage.skipped_bytes == 0

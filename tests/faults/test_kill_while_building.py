@@ -20,7 +20,7 @@ import pytest
 from storage.recovery.recover import recover
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from tests.wire import append
 
 TRIALS = max(10, int(os.environ.get("SPRINGMASS_KILLS", "12")) // 2)
@@ -31,8 +31,8 @@ def log_of(path: Path, reads: int) -> None:
     """Write a log."""
     log = WireLogWriter(path, HEADER)
     for number in range(reads):
-        append(log, Kind.DATA, b"R%04d\r" % (1000 + number) * 5, mono_ns=number)
-    append(log, Kind.END, b"{}", mono_ns=reads)
+        append(log, RecordKind.DATA, b"R%04d\r" % (1000 + number) * 5, mono_ns=number)
+    append(log, RecordKind.END, b"{}", mono_ns=reads)
     log.close()
 
 

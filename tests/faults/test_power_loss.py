@@ -16,7 +16,7 @@ import pytest
 from springmass.cli import main
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from tests.wire import Disk, append
 
 KILLS = int(os.environ.get("SPRINGMASS_KILLS", "0"))
@@ -64,7 +64,7 @@ def recording(seed: int, log: int) -> tuple[SyncedDisk, Sent]:
     while at < len(stream):
         read += 1
         size = int(rng.integers(1, 60))
-        append(writer, Kind.DATA, stream[at : at + size], mono_ns=read * STEP_NS)
+        append(writer, RecordKind.DATA, stream[at : at + size], mono_ns=read * STEP_NS)
         at = min(at + size, len(stream))
         sent.by_time[read * STEP_NS] = values[done : at // 6]
         sent.ends += [(len(disk.data), value) for value in values[done : at // 6]]

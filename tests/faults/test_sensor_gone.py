@@ -18,7 +18,7 @@ from serial.tools import list_ports
 
 from acquisition.errors import PortError
 from acquisition.live.serial_port import SerialPort
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from springmass import load, sample_data
 from springmass.cli import main
 from storage.run_file.reading import open_run
@@ -62,7 +62,7 @@ def test_strict_rejects_a_run_whose_sensor_was_lost(tmp_path: Path, capsys: pyte
     """A run that is sound but for that: exit code 0, and 5 under --strict."""
     recording = load(sample_data() / "undamped_simulated_position.txt").loaded
     out = tmp_path / "run.h5"
-    lost = Trap("sensor_lost", "The sensor was gone at the end.")
+    lost = FormatIssue("sensor_lost", "The sensor was gone at the end.")
     write_run(out, [recording.samples], recording.info, traps=[lost])
     assert main(["analyse", str(out), "--json"]) == 0
     assert main(["analyse", str(out), "--json", "--strict"]) == 5

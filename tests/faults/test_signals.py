@@ -21,7 +21,7 @@ import pytest
 from springmass.cli import main
 from storage.run_file.reading import open_run
 from storage.wire_log.appending import WireLogWriter
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from tests.faults.conftest import SIGNALS, line_of, usual_signals
 from tests.wire import append
 
@@ -40,8 +40,8 @@ def inputs(folder: Path, samples: int) -> dict[str, list[str]]:
         folder / "log.wire", LogHeader(sensors=(SensorEntry(0, "line-protocol"),), mono_ns=0, unix_ns=0)
     )
     for number in range(samples):
-        append(log, Kind.DATA, line_of(number), mono_ns=10_000_000 * number)
-    append(log, Kind.END, b"{}", mono_ns=10_000_000 * samples)
+        append(log, RecordKind.DATA, line_of(number), mono_ns=10_000_000 * number)
+    append(log, RecordKind.END, b"{}", mono_ns=10_000_000 * samples)
     log.close()
     return {
         "convert": ["convert", str(folder / "run.csv"), str(folder / "out.h5")],

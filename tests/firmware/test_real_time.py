@@ -14,7 +14,7 @@ import pytest
 
 from acquisition.live.firmware import VERSION
 from storage.run_file.reading import open_run
-from storage.wire_log.records import Kind
+from storage.wire_log.records import RecordKind
 from tests.wire import parse_log
 
 from .conftest import ELF, read_log
@@ -60,7 +60,7 @@ def test_record_reads_the_firmware_in_real_time(running: tuple[Path, subprocess.
     sent = {}
     for row in read_log(tmp_path / "truth.log", 0.0, 0, 0, True).readings():
         sent[row[0]] = (row[1] * 1e-6, float(row[2]) * M_PER_US if row[2] else np.nan)
-    wire = b"".join(record.payload for record in parse_log(log.data) if record.kind is Kind.DATA)
+    wire = b"".join(record.payload for record in parse_log(log.data) if record.kind is RecordKind.DATA)
     numbers = [int(number) for number in re.findall(rb"\$R1,([0-9]+),[^*\n]*\*[0-9A-F]{4}\n", wire)]
     times_s, distances = np.array([sent[number] for number in numbers]).T
     np.testing.assert_allclose(samples.distance, distances, rtol=0, atol=1e-9)

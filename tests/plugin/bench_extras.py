@@ -10,7 +10,6 @@ import numpy as np
 
 from springmass.extend import (
     Equation,
-    Family,
     Formula,
     FramedDecoder,
     Header,
@@ -18,6 +17,7 @@ from springmass.extend import (
     LineSplitter,
     OneStep,
     Reading,
+    Sensor,
     acceleration,
     make_law,
     text_format,
@@ -66,7 +66,7 @@ class MillimetreEncoder:
         return b"%04d\n" % (0 if math.isnan(distance_m) else min(round(distance_m * 1000), 9999))
 
 
-PLAIN_MILLIMETRES = Family(
+PLAIN_MILLIMETRES = Sensor(
     name="plain-millimetres",
     title="a device of this laboratory that prints millimetres",
     baud=9600,

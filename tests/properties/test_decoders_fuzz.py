@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Sensor
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.readings import Reading
 from tests.encoders import ENCODERS, crc16
@@ -79,7 +79,7 @@ ORACLES: dict[str, Callable[[bytes], set[float]]] = {
 }
 
 
-def own_stream(family: Family, seed: int, n: int = 12) -> list[bytes]:
+def own_stream(family: Sensor, seed: int, n: int = 12) -> list[bytes]:
     """Return frames as the simulated sensor sends them."""
     rng = random.Random(seed)
     encoder = ENCODERS[family.name]()
@@ -94,7 +94,7 @@ def own_stream(family: Family, seed: int, n: int = 12) -> list[bytes]:
     return frames
 
 
-def decode(family: Family, data: bytes, cuts: Iterable[int] = ()) -> list[Reading]:
+def decode(family: Sensor, data: bytes, cuts: Iterable[int] = ()) -> list[Reading]:
     """Feed bytes cut at places; hold the decoder to its bounds."""
     decoder = family.decoder()
     edges = [0, *sorted(cuts), len(data)]

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from acquisition.block import Block, SourceInfo, concatenate
-from acquisition.recordings.recording import Original, Trap
+from acquisition.recordings.recording import FormatIssue, Original
 from storage.errors import NotARun, RunDamaged
-from storage.run_file.reading import Run, open_run
+from storage.run_file.reading import RunFile, open_run
 from storage.run_file.writing import write_run
 from tests.sampling import sampled
 
@@ -64,7 +64,7 @@ infos = st.builds(
     clock=st.sampled_from(["nominal", "device", "host"]),
     stated_error_m=st.none() | st.floats(0, 1),
 )
-traps = st.builds(Trap, texts, texts, st.integers(0, 2**40), st.none() | st.integers(1, 2**40))
+traps = st.builds(FormatIssue, texts, texts, st.integers(0, 2**40), st.none() | st.integers(1, 2**40))
 originals = st.builds(Original, texts, st.binary(max_size=40))
 
 
@@ -89,7 +89,7 @@ def test_everything_comes_back_bit_for_bit(
     title: str,
     scene: dict[str, Any] | None,
     provenance: dict[str, Any],
-    seen: list[Trap],
+    seen: list[FormatIssue],
     files: list[Original],
 ) -> None:
     """Any blocks, texts, scene and files come back as they were, however they are read."""
@@ -112,7 +112,7 @@ def test_everything_comes_back_bit_for_bit(
             run.verify()
 
 
-def everything(run: Run) -> tuple[Any, ...]:
+def everything(run: RunFile) -> tuple[Any, ...]:
     """Return all that a run says."""
     return run.header, run.traps, bits(run.samples()), run.originals()
 
@@ -130,7 +130,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
         originals=[Original("a.txt", rng.bytes(2000))],
         scene={"bob": {"mass_kg": 0.2}},
         title="Träger",
-        traps=[Trap("truncated_row", "One row was cut.")],
+        traps=[FormatIssue("truncated_row", "One row was cut.")],
         provenance={"software": "springmass"},
     )
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from storage.wire_log.records import Kind, LogHeader, Record, SensorEntry, frame
+from storage.wire_log.records import LogHeader, Record, RecordKind, SensorEntry, frame
 from storage.wire_log.scanning import LogContents
 from tests.sampling import sampled
 from tests.wire import parse_log
@@ -29,9 +29,9 @@ def key(record: Record) -> Key:
 def log_of(reads: int, seed: int) -> tuple[bytes, list[int]]:
     """Return a log of a header, reads and an end, with the byte at which each record ends."""
     rng = np.random.default_rng(seed)
-    payloads = [(Kind.HEADER, HEADER.encode())]
-    payloads += [(Kind.DATA, rng.bytes(int(rng.integers(1, 40)))) for _ in range(reads)]
-    payloads += [(Kind.END, b"{}")]
+    payloads = [(RecordKind.HEADER, HEADER.encode())]
+    payloads += [(RecordKind.DATA, rng.bytes(int(rng.integers(1, 40)))) for _ in range(reads)]
+    payloads += [(RecordKind.END, b"{}")]
     records = [
         frame(kind, payload, sequence=n, mono_ns=n * 10**7, log=LOG) for n, (kind, payload) in enumerate(payloads)
     ]
@@ -89,11 +89,11 @@ def test_damage_is_seen_and_costs_only_what_it_touches(seed: int, what: str) -> 
 
 PAYLOADS = st.lists(
     st.tuples(
-        st.sampled_from(list(Kind)),
+        st.sampled_from(list(RecordKind)),
         st.one_of(
             st.binary(max_size=60),
             # Records of another log, whole and in part: what a device might send.
-            st.binary(max_size=10).map(lambda inner: frame(Kind.DATA, inner, sequence=1, mono_ns=1, log=LOG + 1)),
+            st.binary(max_size=10).map(lambda inner: frame(RecordKind.DATA, inner, sequence=1, mono_ns=1, log=LOG + 1)),
             st.just(b"\xf5\xa9" * 20),
         ),
     ),
@@ -102,14 +102,14 @@ PAYLOADS = st.lists(
 )
 
 
-def written(payloads: list[tuple[Kind, bytes]]) -> bytes:
+def written(payloads: list[tuple[RecordKind, bytes]]) -> bytes:
     """Return the log of some payloads."""
     items = enumerate(payloads)
     return b"".join(frame(kind, payload, sequence=n, mono_ns=n, log=LOG, channel=n) for n, (kind, payload) in items)
 
 
 @given(PAYLOADS)
-def test_any_payloads_come_back(payloads: list[tuple[Kind, bytes]]) -> None:
+def test_any_payloads_come_back(payloads: list[tuple[RecordKind, bytes]]) -> None:
     """Kinds, channels, times and bytes return, whatever the bytes look like."""
     contents = parse_log(written(payloads))
     got = [(record.mono_ns, record.channel, record.kind, record.payload) for record in contents]
@@ -118,7 +118,7 @@ def test_any_payloads_come_back(payloads: list[tuple[Kind, bytes]]) -> None:
 
 
 @given(PAYLOADS, st.data())
-def test_no_mangling_invents_a_record(payloads: list[tuple[Kind, bytes]], data: st.DataObject) -> None:
+def test_no_mangling_invents_a_record(payloads: list[tuple[RecordKind, bytes]], data: st.DataObject) -> None:
     """Bytes cut out, put in, overwritten, repeated and moved: what is read was written, in its order."""
     log = written(payloads)
     whole = [key(record) for record in parse_log(log)]

@@ -18,7 +18,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import clock_s, parse_number
 from acquisition.recordings.tables.format import text_format
@@ -68,7 +68,7 @@ def header(lines: Sequence[str]) -> Header | None:
         clock = clocks[0]
         headings[clock] = replace(headings[clock], unit="s")
         times = [clock]
-        traps.append(Trap("clock_times", f"the file gives times of day; here time 0 is {table.rows[0][clock]}"))
+        traps.append(FormatIssue("clock_times", f"the file gives times of day; here time 0 is {table.rows[0][clock]}"))
     bare = not table.named and table.at == 0 and all(parse_number(cell) is not None for cell in table.rows[0])
     # A single column besides row numbers contains measured values, even if it rises.
     numbered = bare and len(columns) > 1 and are_row_numbers(columns[0])
@@ -79,7 +79,7 @@ def header(lines: Sequence[str]) -> Header | None:
             if guess or not bare:
                 name = headings[guess].name or f"column {guess + 1}"
                 message = f'"{name}" was read as the times, because no other column rises like it'
-                traps.append(Trap("time_assumed", message))
+                traps.append(FormatIssue("time_assumed", message))
     ignored = {*words, *clocks} | ({0} if formula is not None or numbered else set())
     values = [at for at in range(len(headings)) if at not in ignored and at not in times]
     asides = {at for at in values if is_aside(headings[at], columns[at], bool(times) or len(columns) > 1)}
@@ -132,13 +132,13 @@ def _units_beside(table: Layout) -> tuple[list[Heading], set[int]]:
     return headings, words
 
 
-def _preamble(table: Layout) -> tuple[Trap, ...]:
+def _preamble(table: Layout) -> tuple[FormatIssue, ...]:
     if not table.preamble:
         return ()
     count = len(table.preamble)
     lines = "1 line of text above the table was" if count == 1 else f"{count} lines of text above the table were"
     message = f'{lines} skipped; the first is "{table.preamble[0][:40]}"'
-    return (Trap("preamble", message, count),)
+    return (FormatIssue("preamble", message, count),)
 
 
 def _formula(table: Layout) -> Formula | None:

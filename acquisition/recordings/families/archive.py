@@ -16,7 +16,7 @@ from pathlib import PurePosixPath
 
 from acquisition.errors import FormatError
 from acquisition.recordings.identify import foreign_format, formats
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.table import Table
 from acquisition.recordings.tables.text import HEAD_BYTES
@@ -57,10 +57,10 @@ def _tables_of_parts(
     if any(_is_timed(tables) for _, tables in recordings):  # then no part without times is a recording
         unread += [name for name, tables in recordings if not _is_timed(tables)]
         recordings = [(name, tables) for name, tables in recordings if _is_timed(tables)]
-    traps: tuple[Trap, ...] = ()
+    traps: tuple[FormatIssue, ...] = ()
     if unread:
         listed = ", ".join(f'"{name}"' for name in unread[:8]) + (" and others" if len(unread) > 8 else "")
-        traps = (Trap("preamble", f"not a recording: {what} {listed}", len(unread)),)
+        traps = (FormatIssue("preamble", f"not a recording: {what} {listed}", len(unread)),)
     if len(recordings) == 1:
         name, tables = recordings[0]
         return [replace(each, title=each.title or name, traps=(*each.traps, *traps)) for each in tables]

@@ -21,7 +21,7 @@ import numpy as np
 
 from acquisition.block import B1, F8, I8, Block, Flag
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.recording import Original, Recording, Survey, Trap
+from acquisition.recordings.recording import FormatIssue, Original, Recording, Survey
 from acquisition.recordings.sampling.flags import IRREGULAR, UNREAD_FLAGS, time_flags
 from acquisition.recordings.sampling.timing import median
 from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
@@ -61,7 +61,7 @@ def header(lines: Sequence[str]) -> Header | None:
     if table is None or not shape:
         return None
     at, quantity = title + table.at, "distance" if len(columns) == 3 else "velocity"
-    trap = Trap("unit_assumed", f"no column line: read as time (s) and {shape}, in cm")
+    trap = FormatIssue("unit_assumed", f"no column line: read as time (s) and {shape}, in cm")
     headings, why = _headings(quantity, "cm", len(columns) == 3), why or f"the rows have the shape of {shape}"
     return Header(why, at, table.mark, headings, title=_above(lines[:at]), traps=(trap,))
 
@@ -148,7 +148,7 @@ class MotionSensor(ColumnFormat):
             if error_m is not None and np.mean(errors == error_m) >= _CONSTANT:
                 size = f"{error_m / 10.0**samples.measured.power:g} {column.unit}"
                 message = f"the error column is a constant {size}: a stated value, not the noise"
-                trap = Trap("stated_error_is_not_noise", message)
+                trap = FormatIssue("stated_error_is_not_noise", message)
                 samples = replace(samples, traps=(*samples.traps, trap))
         return samples if velocity else check_values(samples, length=True)
 
@@ -157,7 +157,7 @@ _TEXT = text_format("motion-sensor", "MotionSensor.vi text: position, velocity, 
 FORMAT = MotionSensor(_TEXT.name, _TEXT.title, _TEXT.evidence, _tables)
 
 
-def _summed_up(samples: Samples) -> tuple[Block, Iterable[Trap]]:
+def _summed_up(samples: Samples) -> tuple[Block, Iterable[FormatIssue]]:
     """Integrate velocity to position; the first sample is at zero, because the file does not contain the offset."""
     value, rate_hz, flags = samples.value, samples.timing.rate_hz, samples.flags.copy()
     regular = np.flatnonzero((flags & IRREGULAR) == 0)
@@ -168,16 +168,16 @@ def _summed_up(samples: Samples) -> tuple[Block, Iterable[Trap]]:
     flags[regular[bridged]] |= Flag.GAP_BEFORE.value
     flags[np.isnan(distance)] |= Flag.MISSING.value
     summed = "the position was integrated from the velocity: its offset is unknown, and the first sample is at 0 m"
-    traps = [Trap("offset_unknown", summed, samples.t.size)]
+    traps = [FormatIssue("offset_unknown", summed, samples.t.size)]
     if holes := int(np.count_nonzero(bridged)):
         first = float(samples.t[regular[bridged]][0])
         gaps = f"{holes} gap{'s' if holes > 1 else ''}, the first before t = {first:g} s"
         message = f"the velocity has {gaps}: the integrated position may jump there"
-        traps.append(Trap("offset_unknown_after_gap", message, holes))
+        traps.append(FormatIssue("offset_unknown_after_gap", message, holes))
     return Block(0, samples.t, distance, flags, None, value), traps
 
 
-def _joined(p: Samples, v: Samples) -> tuple[Block, Iterable[Trap]]:
+def _joined(p: Samples, v: Samples) -> tuple[Block, Iterable[FormatIssue]]:
     """Join positions and velocities by their times."""
     rate_hz = p.timing.rate_hz
     if abs(v.timing.rate_hz - rate_hz) > 1e-6 * rate_hz:
@@ -198,7 +198,7 @@ def _joined(p: Samples, v: Samples) -> tuple[Block, Iterable[Trap]]:
     return Block(0, t, distance, flags, None, speed), _join_traps(p, v, from_p, from_v)
 
 
-def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[Trap]:
+def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[FormatIssue]:
     """Yield the remarks on the velocity file, except those that apply to both files, and on the two together."""
     for trap in v.traps:
         if trap.code not in ("nominal_clock", "rate_assumed", "rate_given"):
@@ -206,10 +206,10 @@ def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[Trap
     alone_p, alone_v = int(np.count_nonzero(from_v < 0)), int(np.count_nonzero(from_p < 0))
     if alone_v:
         message = f"{alone_v} times are only in the velocity file, so they have no distance"
-        yield Trap("missing_samples", message, alone_v)
+        yield FormatIssue("missing_samples", message, alone_v)
     if alone_p:
         message = f"{alone_p} times are only in the position file, so they have no velocity"
-        yield Trap("velocity_missing", message, alone_p)
+        yield FormatIssue("velocity_missing", message, alone_p)
     # The velocity of a sample must be its difference from the previous position, multiplied by the rate.
     both = np.flatnonzero((from_p[1:] >= 0) & (from_v[1:] >= 0) & (from_p[:-1] >= 0)) + 1
     x, rate_hz = p.value, p.timing.rate_hz
@@ -218,7 +218,7 @@ def _join_traps(p: Samples, v: Samples, from_p: I8, from_v: I8) -> Iterator[Trap
     wrong = int(np.count_nonzero(apart > 1.01 * (p.resolution * rate_hz + v.resolution)))
     if wrong > 0.5 * apart.size:
         message = f"{wrong} of {apart.size} velocities contradict the positions; the two files may be of different runs"
-        yield Trap("pair_mismatch", message, wrong)
+        yield FormatIssue("pair_mismatch", message, wrong)
 
 
 def _integrate(velocity: F8, index: I8, rate_hz: float) -> tuple[F8, B1]:

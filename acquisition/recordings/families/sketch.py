@@ -25,11 +25,11 @@ from acquisition.recordings.tables.text import Text, in_turn, is_text, text_of
 _FEWEST, _SHARE, _MOST, _HEAD = 3, 0.6, 40, 120
 _BRACKETS = re.compile(r"\s*[(\[]")  # as Python prints tuples and lists
 _CLOCK = re.compile(rf"\s*\[?(?:{CLOCK.pattern})(?=[\]\s,;|-])", re.ASCII)
-Kind = tuple[tuple[tuple[str, ...], str], ...]
+LineForm = tuple[tuple[tuple[str, ...], str], ...]
 """The words and units of the numbers of a line."""
 
 
-def _usual(of: list[tuple[int, str]]) -> tuple[bool, Kind] | None:
+def _usual(of: list[tuple[int, str]]) -> tuple[bool, LineForm] | None:
     """Return whether commas are decimal commas, and the usual kind of line; None without words or units."""
     lines = [line for _, line in of[: _MOST + 1][:-1]]  # the last may be cut
     pairs = [match for line in lines if (match := re.search(r"(\d+),\d", line))]
@@ -53,7 +53,7 @@ def _joined(lines: list[str]) -> list[tuple[int, str]]:
     return [(number, f"{line}\t{below}") for (number, line), (_, below) in pairs]
 
 
-def _kind(found: list[Number]) -> Kind:
+def _kind(found: list[Number]) -> LineForm:
     return tuple((each.label, each.unit) for each in found)
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import FormatError
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import is_time
@@ -53,11 +53,13 @@ def _tables(path: str, data: bytes) -> list[Table]:
     if not tables:
         raise FormatError(path, "expected channels of numbers, got none", "check that the recording was saved")
     traps = (
-        [Trap("truncated_row", "the file ends inside its last segment: what followed is lost")] if _cut(data) else []
+        [FormatIssue("truncated_row", "the file ends inside its last segment: what followed is lost")]
+        if _cut(data)
+        else []
     )
     if not traps:  # else it describes the same
         remarks = dict.fromkeys(line.partition("] ")[2] for line in said.getvalue().splitlines())
-        traps += [Trap("reader_remark", f"npTDMS says: {remark}") for remark in remarks]
+        traps += [FormatIssue("reader_remark", f"npTDMS says: {remark}") for remark in remarks]
     return [replace(each, title=title, traps=(*each.traps, *traps)) for each in tables]
 
 

@@ -18,7 +18,7 @@ from acquisition.regular_file import open_regular_text
 from acquisition.units import TIMES, time_unit
 
 
-class _Column(msgspec.Struct, forbid_unknown_fields=True):
+class _DeclaredColumn(msgspec.Struct, forbid_unknown_fields=True):
     name: Annotated[str, msgspec.Meta(min_length=1)]
     unit: str = ""
     time: bool = False
@@ -31,7 +31,7 @@ class _Column(msgspec.Struct, forbid_unknown_fields=True):
 
 class _Declared(msgspec.Struct, forbid_unknown_fields=True):
     begins: Annotated[str, msgspec.Meta(pattern=r"\S")]
-    column: Annotated[list[_Column], msgspec.Meta(min_length=1)]
+    column: Annotated[list[_DeclaredColumn], msgspec.Meta(min_length=1)]
     title: str = ""
     separator: Literal["tab", "blank", ";", ",", "|"] = ","
     heading: Annotated[int, msgspec.Meta(ge=0, le=1000)] = 1

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from acquisition.block import B1, F8, I8, U8, Flag
-from acquisition.recordings.recording import Trap
-from acquisition.recordings.sampling.timing import Grid, Rows, Timing, median, snap
+from acquisition.recordings.recording import FormatIssue
+from acquisition.recordings.sampling.timing import ChannelRows, Grid, Timing, median, snap
 
 IRREGULAR = np.uint8(Flag.DUPLICATE_TIME | Flag.NON_MONOTONIC_TIME)
 UNREAD_FLAGS = np.uint8(Flag.MALFORMED | Flag.MISSING)
@@ -66,7 +66,7 @@ def time_flags(t: F8, step: float) -> U8:
     return flags
 
 
-def place(rows: Rows, timing: Timing) -> F8:
+def place(rows: ChannelRows, timing: Timing) -> F8:
     """Return the time of each row in seconds, from its row number or from the printed time, snapped to the grid.
 
     The time of an unread row is inferred if possible, else NaN. The array of printed times may be overwritten.
@@ -83,15 +83,17 @@ def place(rows: Rows, timing: Timing) -> F8:
     return place_unread(t, unread, grid) if unread.any() else t
 
 
-def row_traps(rows: Rows, timed: B1, zeros: int) -> Iterator[Trap]:
+def row_traps(rows: ChannelRows, timed: B1, zeros: int) -> Iterator[FormatIssue]:
     """Report the rows that could not be read; ``timed`` marks the rows with a time, which become samples."""
     if zeros:
-        yield Trap("zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted")
+        yield FormatIssue(
+            "zero_filled_tail", f"the file ends in {zeros} zero bytes, left out: its writer was interrupted"
+        )
     unread = rows.unread
     last = unread.size - 1
     if rows.cut:
         outcome = "its sample counts as missing" if timed[last] else "it was left out, because its time is unknown"
-        yield Trap("truncated_row", f"the last row is incomplete; {outcome}", 1, line_of(rows.lines, last))
+        yield FormatIssue("truncated_row", f"the last row is incomplete; {outcome}", 1, line_of(rows.lines, last))
     unread_rows = np.flatnonzero(unread[:-1] if rows.cut else unread)
     if unread_rows.size:
         first = line_of(rows.lines, int(unread_rows[0]))
@@ -99,7 +101,7 @@ def row_traps(rows: Rows, timed: B1, zeros: int) -> Iterator[Trap]:
         rows_are = "1 row" if unread_rows.size == 1 else f"{unread_rows.size} rows"
         where = "" if first is None else f", the first in line {first}"
         message = f"{rows_are} could not be read{where}; {kept_rows} kept as missing samples"
-        yield Trap("malformed_rows", message, int(unread_rows.size), first)
+        yield FormatIssue("malformed_rows", message, int(unread_rows.size), first)
 
 
 def line_of(lines: I8 | None, row: int) -> int | None:
@@ -107,7 +109,7 @@ def line_of(lines: I8 | None, row: int) -> int | None:
     return None if lines is None else int(lines[row])
 
 
-def sample_traps(flags: U8, t: F8, rate_hz: float, lines: I8 | None) -> Iterator[Trap]:
+def sample_traps(flags: U8, t: F8, rate_hz: float, lines: I8 | None) -> Iterator[FormatIssue]:
     """Report the flagged samples, grouped by flag; ``lines`` are the line numbers of the samples."""
     if not flags.any():
         return
@@ -119,19 +121,21 @@ def sample_traps(flags: U8, t: F8, rate_hz: float, lines: I8 | None) -> Iterator
     for code, flag, what in kinds:
         rows = np.flatnonzero(flags & flag.value)
         if rows.size:
-            yield Trap(code, f"{rows.size} {what}; kept and flagged", int(rows.size), line_of(lines, int(rows[0])))
+            yield FormatIssue(
+                code, f"{rows.size} {what}; kept and flagged", int(rows.size), line_of(lines, int(rows[0]))
+            )
     gaps = np.flatnonzero(flags & Flag.GAP_BEFORE.value)
     if gaps.size:
         reached = np.maximum.accumulate(np.where(flags & IRREGULAR, -np.inf, t))
         lost = int(np.sum(np.rint((t[gaps] - reached[gaps - 1]) * rate_hz) - 1))
         gaps_are = "1 gap" if gaps.size == 1 else f"{gaps.size} gaps"
         message = f"about {lost} samples are missing in {gaps_are}; the sample after each is flagged"
-        yield Trap("missing_samples", message, lost, line_of(lines, int(gaps[0])))
+        yield FormatIssue("missing_samples", message, lost, line_of(lines, int(gaps[0])))
 
 
 def value_traps(
     distance: F8, flags: U8, resolution: float, lines: I8 | None, *, length: bool
-) -> tuple[float, tuple[Trap, ...]]:
+) -> tuple[float, tuple[FormatIssue, ...]]:
     """Find zeros that fill the end, a lost target, and distances rounded more coarsely than printed.
 
     Zeros that fill the end become NaN and MISSING, and samples of a lost target FALSE_ECHO, in place. ``resolution``
@@ -144,18 +148,18 @@ def value_traps(
         distance[tail:] = np.nan
         flags[tail:] |= Flag.MISSING.value
         message = f"the last {count} distances are exactly 0, which no rangefinder reads; kept as missing samples"
-        traps.append(Trap("zero_filled_tail", message, count, line_of(lines, tail)))
+        traps.append(FormatIssue("zero_filled_tail", message, count, line_of(lines, tail)))
     far = _far(distance, resolution) if length else np.empty(0, np.int64)
     if far.size:
         flags[far] |= Flag.FALSE_ECHO.value
         low, high = float(np.min(distance[far])), float(np.max(distance[far]))
         distances = f"{far.size} distances of {low:.3g} to {high:.3g} m are far from all others"
         message = f"{distances}: the target was lost; kept and flagged"
-        traps.append(Trap("lost_target", message, int(far.size), line_of(lines, int(far[0]))))
+        traps.append(FormatIssue("lost_target", message, int(far.size), line_of(lines, int(far[0]))))
     quantum = _common_step(distance, resolution)
     if length and quantum >= _COARSE_M * (1 - 1e-9):
         message = f"distances are multiples of {quantum * 1e3:g} mm: smaller motion is lost by rounding"
-        traps.append(Trap("quantised", message, distance.size))
+        traps.append(FormatIssue("quantised", message, distance.size))
     return quantum, tuple(traps)
 
 

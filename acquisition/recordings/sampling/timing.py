@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acquisition.block import B1, F8, I8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.questions import Missing, MissingItem, Question
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 
 _USUAL_RATES_HZ = (100.0, 60.0, 125.0, 50.0, 20.0, 25.0, 30.0, 40.0, 10.0, 200.0, 250.0, 500.0, 1000.0)
 _SHARE_ON_GRID = 0.5
@@ -128,7 +128,7 @@ class Formula:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class ChannelRows:
     """The rows of one channel, before they become samples; every array has one element for each row.
 
     ``printed`` are the times as printed, s, or None; ``value`` the values in SI, NaN if unread or absent. ``remark``
@@ -163,7 +163,7 @@ class Timing(NamedTuple):
     grid: Grid | None
     resolution_s: float
     by_row: bool = False
-    traps: tuple[Trap, ...] = ()
+    traps: tuple[FormatIssue, ...] = ()
 
 
 def rate_needed(instead: MissingItem | None = None) -> MissingItem:
@@ -171,27 +171,27 @@ def rate_needed(instead: MissingItem | None = None) -> MissingItem:
     return MissingItem(Missing.RATE_HZ, (), _ANY_RATE_HZ, instead=instead)
 
 
-def find_timing(path: str, rows: Rows, formula: Formula | None, rate_hz: float | None) -> Timing:
+def find_timing(path: str, rows: ChannelRows, formula: Formula | None, rate_hz: float | None) -> Timing:
     """Return the rate and the grid of the times: those of the header if no column contradicts it, or of the column.
 
     Without any times the user must give the rate.
     """
-    traps: list[Trap] = []
+    traps: list[FormatIssue] = []
     timing = None
     if formula is not None:
         samples, count = formula.samples, int(np.count_nonzero(~rows.remark))
         if samples is not None and samples != count:
             message = f"the header declares {samples} samples, but there are {count} rows; all are kept"
-            traps.append(Trap("stale_header", message, abs(samples - count)))
+            traps.append(FormatIssue("stale_header", message, abs(samples - count)))
         timing = _by_formula(path, formula, rows, rate_hz)
         if formula.step_s == _PLACEHOLDER_S and rate_hz is None and rows.printed is None:
             steps = "the header states steps of 1 s, as LabVIEW does if no rate was set"
-            traps.append(Trap("rate_assumed", f"{steps}; if they are not, state the rate"))
+            traps.append(FormatIssue("rate_assumed", f"{steps}; if they are not, state the rate"))
         if timing is None:
             stated = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
             what = "which are impossible" if rows.printed is None else "but the column of times differs and is used"
             size = 1 if rows.printed is None else rows.printed.size
-            traps.append(Trap("stale_header", f"{stated}, {what}", size))
+            traps.append(FormatIssue("stale_header", f"{stated}, {what}", size))
     if timing is None and rows.printed is not None:
         known = rows.printed[~rows.unread]
         timing = _in_bursts(path, known, rows.time_resolution, rate_hz)
@@ -201,15 +201,15 @@ def find_timing(path: str, rows: Rows, formula: Formula | None, rate_hz: float |
             reason = "no column of times and no sampling interval"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
         timing = Timing(rate_hz, Grid(rate_hz), 0.0, by_row=True, traps=_nominal(rate_hz))
-    given = () if rate_hz is None else (Trap("rate_given", f"you stated the sampling rate: {rate_hz:g} Hz"),)
+    given = () if rate_hz is None else (FormatIssue("rate_given", f"you stated the sampling rate: {rate_hz:g} Hz"),)
     return timing._replace(traps=(*traps, *timing.traps, *given))
 
 
-def _nominal(rate_hz: float) -> tuple[Trap]:
-    return (Trap("nominal_clock", f"times are row numbers over a nominal {rate_hz:g} Hz, not measured times"),)
+def _nominal(rate_hz: float) -> tuple[FormatIssue]:
+    return (FormatIssue("nominal_clock", f"times are row numbers over a nominal {rate_hz:g} Hz, not measured times"),)
 
 
-def _by_formula(path: str, formula: Formula, rows: Rows, rate_hz: float | None) -> Timing | None:
+def _by_formula(path: str, formula: Formula, rows: ChannelRows, rate_hz: float | None) -> Timing | None:
     """Return the times of a header; None if they are impossible or the column of times differs beyond its rounding."""
     start_s, step_s = formula.start_s, formula.step_s
     if not (math.isfinite(start_s) and math.isfinite(step_s) and 1e-12 < step_s < 1e12):
@@ -250,10 +250,10 @@ def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None)
     if grid is None:
         measured = f"are measured: their steps vary from {jitter}"
         times = measured if jitter else "fit no regular grid and are used as printed"
-        traps = (Trap("jittered_time", f"the times {times} ({rate:.6g} Hz on average)"),)
+        traps = (FormatIssue("jittered_time", f"the times {times} ({rate:.6g} Hz on average)"),)
         return Timing(rate, None, resolution, traps=traps)
     likely = f"the rate of {rate:g} Hz is the most likely one: there are too few rows to be certain"
-    assumed = () if certain else (Trap("rate_assumed", likely),)
+    assumed = () if certain else (FormatIssue("rate_assumed", likely),)
     return Timing(rate, grid, resolution, traps=(*_nominal(rate), *assumed))
 
 
@@ -301,4 +301,4 @@ def _in_bursts(path: str, t: F8, resolution: float, rate_hz: float | None) -> Ti
         raise NeedsAnswer(Question(path, (rate_needed(),), reason=f"the times come in {bursts}, some missing"))
     rate = rate_hz or 1.0 / step
     message = f"the times come in {bursts}; the samples were spread evenly, at {rate:.6g} Hz"
-    return Timing(rate, Grid(rate, start), resolution, by_row=True, traps=(Trap("times_in_bursts", message),))
+    return Timing(rate, Grid(rate, start), resolution, by_row=True, traps=(FormatIssue("times_in_bursts", message),))

@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.block import F8, I8, Flag
 from acquisition.errors import FormatError
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.flags import (
     UNREAD_FLAGS,
     line_of,
@@ -20,7 +20,7 @@ from acquisition.recordings.sampling.flags import (
     time_flags,
     value_traps,
 )
-from acquisition.recordings.sampling.timing import Rows, find_timing
+from acquisition.recordings.sampling.timing import ChannelRows, find_timing
 from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.samples import Samples
@@ -48,7 +48,7 @@ def read_channel(path: str, tables: Sequence[Table], answers: Answers, differenc
 
 def read_samples(
     path: str,
-    rows: Rows,
+    rows: ChannelRows,
     table: Table,
     column: Column,
     measured: Measure,
@@ -59,7 +59,7 @@ def read_samples(
     timing = find_timing(path, rows, table.formula, rate_hz)
     found = list(timing.traps)
     if table.formula is None and table.times is not None and not table.times.unit:
-        found.insert(0, Trap("time_unit_assumed", "the times have no unit: read as seconds"))
+        found.insert(0, FormatIssue("time_unit_assumed", "the times have no unit: read as seconds"))
     unread, t = rows.unread, place(rows, timing)
     timed = np.isfinite(t)
     t, value = t[timed], rows.value[timed]
@@ -80,9 +80,9 @@ def read_samples(
     )
 
 
-def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[Trap]:
+def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[FormatIssue]:
     """Report where a clock was set forward: by full hours, as for summer time, or by more than a day."""
-    traps: list[Trap] = []
+    traps: list[FormatIssue] = []
     if rate_hz < _SLOWEST_HZ or float(t.max() - t.min()) < 0.5 * _HOUR_S:
         return traps
     steps = np.diff(t)
@@ -92,7 +92,7 @@ def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[Trap]:
             where = f"samples {row + 1} and {row + 2}" if lines is None else f"lines {lines[row]} and {lines[row + 1]}"
             perhaps = "for summer time" if round(step) == _HOUR_S else "during the recording"
             message = f"the times jump by {step:.0f} s between {where}: the clock was perhaps set {perhaps}"
-            traps.append(Trap("time_jump", message, 1, line_of(lines, row + 1)))
+            traps.append(FormatIssue("time_jump", message, 1, line_of(lines, row + 1)))
     return traps
 
 
@@ -102,7 +102,7 @@ def check_values(samples: Samples, *, length: bool) -> Samples:
     return replace(samples, quantum=quantum or None, traps=(*samples.traps, *found))
 
 
-def rows_of(path: str, table: Table, column: Column, measured: Measure) -> Rows:
+def rows_of(path: str, table: Table, column: Column, measured: Measure) -> ChannelRows:
     """Return the rows of a channel, including those that could not be read; raise an error if there are no numbers."""
     unit = table.times.unit if table.times else ""
     seconds = time_unit(unit or "s")
@@ -114,7 +114,7 @@ def rows_of(path: str, table: Table, column: Column, measured: Measure) -> Rows:
     return _text_rows(path, table, table.lines, column, measured, seconds)
 
 
-def _binary_rows(times: Column | None, column: Column, measured: Measure, seconds: Measure) -> Rows:
+def _binary_rows(times: Column | None, column: Column, measured: Measure, seconds: Measure) -> ChannelRows:
     size = max(column.values.size, times.values.size if times else 0)
     value, t, unread = scaled(column.of_size(size).values, None, measured.power), None, np.zeros(size, bool)
     value *= measured.factor
@@ -123,10 +123,12 @@ def _binary_rows(times: Column | None, column: Column, measured: Measure, second
         unread = ~np.isfinite(t)
     value[unread] = np.nan
     largest = 0.0 if t is None else float(np.fmax.reduce(np.abs(t), initial=0.0))
-    return Rows(t, value, unread, np.zeros(size, bool), None, max(float(np.spacing(largest)), 1e-12), 0.0)
+    return ChannelRows(t, value, unread, np.zeros(size, bool), None, max(float(np.spacing(largest)), 1e-12), 0.0)
 
 
-def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: Measure, seconds: Measure) -> Rows:
+def _text_rows(
+    path: str, table: Table, lines: Lines, column: Column, measured: Measure, seconds: Measure
+) -> ChannelRows:
     own, time = column.of_size(lines.rows), table.times and table.times.of_size(lines.rows)
     form = own.forms
     # A row of words without a value is a remark between rows; a row of a longer channel is none of this channel's.
@@ -160,7 +162,7 @@ def _text_rows(path: str, table: Table, lines: Lines, column: Column, measured: 
     numbers = lines.numbers[keep]
     if unknown.all():
         raise _no_numbers(path, column, unknown.size, int(numbers[0]))
-    return Rows(
+    return ChannelRows(
         printed=printed,
         value=value,
         unread=unknown,

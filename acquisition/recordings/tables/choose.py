@@ -11,7 +11,7 @@ import numpy as np
 from acquisition.block import F8
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.questions import Missing, MissingItem, Question
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import median, rate_needed
 from acquisition.recordings.tables.headings import BRACKETED, name_and_unit
 from acquisition.recordings.tables.table import Column, Table
@@ -100,7 +100,7 @@ def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Chan
     return table, column
 
 
-def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple[Trap, ...]]:
+def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple[FormatIssue, ...]]:
     """Return the measure of a channel's values, and the assumptions made for it."""
     stated, given = column.measure, measure_of(unit or "")
     if unit is None and stated is not None:
@@ -113,14 +113,14 @@ def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple
         problem = f'unit must be {unit_words(column.unit)} as stated by "{column.label}", got "{unit}"'
         raise FormatError(path, problem, "leave the unit out")
     if not column.unit:
-        return given, (Trap("unit_given", f'you stated the unit of "{column.name}": {unit}'),)
+        return given, (FormatIssue("unit_given", f'you stated the unit of "{column.name}": {unit}'),)
     holds = "times, frequencies and damping rates are not affected"
     if given.quantity == "number":
-        return given, (Trap("unit_given", f'"{column.label}" is read as plain numbers, as you asked; {holds}'),)
+        return given, (FormatIssue("unit_given", f'"{column.label}" is read as plain numbers, as you asked; {holds}'),)
     kind = f"is no {'distance' if given.quantity == 'length' else given.quantity.replace('_', ' ')}"
     holds += ", but everything in metres is in that unit" if given.quantity == "length" else ""
     message = f'"{column.label}" {kind}: one {column.unit} counts as one {unit}, as you asked; {holds}'
-    return given, (Trap("unit_assumed", message),)
+    return given, (FormatIssue("unit_assumed", message),)
 
 
 def _candidates(channels: Sequence[Channel]) -> Sequence[Channel]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from acquisition.block import Block
 from acquisition.errors import FormatError, NeedsAnswer
-from acquisition.recordings.recording import Recording, Survey, Trap
+from acquisition.recordings.recording import FormatIssue, Recording, Survey
 from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.rows import read_rows
@@ -74,7 +74,7 @@ def _survey(path: str, table: Table, column: Column) -> Survey:
         return Survey(table.run, column.name, column.unit, rows.value.size, None, ())
     except FormatError as error:
         # A channel without numbers must not prevent the listing of other channels.
-        none = Trap("empty_channel", str(error).removeprefix(path).lstrip(", :"))
+        none = FormatIssue("empty_channel", str(error).removeprefix(path).lstrip(", :"))
         return Survey(table.run, column.name, column.unit, 0, None, (none,))
     span_s = float(samples.t.max() - samples.t.min())
     return Survey(table.run, column.name, column.unit, samples.t.size, samples.timing.rate_hz, samples.traps, span_s)

@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.block import B1, F8
 from acquisition.errors import FormatError
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.cells import (
     EMPTY,
     EXPONENT,
@@ -95,7 +95,7 @@ def count_from_first(column: Column) -> None:
         column.values[known] = np.round(at - at[0] + 86400.0 * days, column.forms[known].max())
 
 
-def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -> tuple[Trap, ...]:
+def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -> tuple[FormatIssue, ...]:
     """Refuse ``1,234`` if its comma may separate thousands: as a decimal mark it gives an error of a factor 1000.
 
     A comma or point is a decimal mark if anywhere it is not followed by exactly three digits, or follows a zero or four
@@ -120,4 +120,4 @@ def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -
     if not doubtful or any(mark == "." for mark, _, _ in doubtful):
         return ()
     message = f'the comma in "{doubtful[0][1]}" was read as a decimal comma, not as a thousands separator'
-    return (Trap("decimal_comma", message),)
+    return (FormatIssue("decimal_comma", message),)

@@ -8,8 +8,8 @@ from pathlib import PurePath
 
 import numpy as np
 
-from acquisition.block import B1, F8, I8, U8, Block, ClockKind, Kind, SourceInfo
-from acquisition.recordings.recording import Original, Recording, Trap
+from acquisition.block import B1, F8, I8, U8, Block, ClockKind, SourceInfo, SourceKind
+from acquisition.recordings.recording import FormatIssue, Original, Recording
 from acquisition.recordings.sampling.timing import Timing
 from acquisition.recordings.tables.table import Column, Table
 from acquisition.recordings.tables.text import says_simulated
@@ -34,7 +34,7 @@ class Samples:
     flags: U8
     timing: Timing
     resolution: float
-    traps: tuple[Trap, ...]
+    traps: tuple[FormatIssue, ...]
     lines: I8 | None
     sound: B1
     quantum: float | None = None
@@ -45,10 +45,12 @@ class Samples:
         """The file's name without its folder."""
         return PurePath(self.path).name
 
-    def recording(self, family: str, data: bytes, block: Block, more: Iterable[Trap] = ()) -> Recording:
+    def recording(self, family: str, data: bytes, block: Block, more: Iterable[FormatIssue] = ()) -> Recording:
         """Return the recording of a block, which is made of these samples."""
         table, column, name = self.table, self.column, self.name
-        kind: Kind = "simulated" if says_simulated(f"{table.title} {table.run} {column.name} {name}") else "replay"
+        kind: SourceKind = (
+            "simulated" if says_simulated(f"{table.title} {table.run} {column.name} {name}") else "replay"
+        )
         clock: ClockKind = "device" if self.timing.grid is None else "nominal"
         return Recording(
             format=family,

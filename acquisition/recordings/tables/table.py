@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition.block import B1, F8, I8
-from acquisition.recordings.recording import Trap
+from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula, median
 from acquisition.recordings.tables.cells import EMPTY, I1
 from acquisition.recordings.tables.headings import Heading, role_of, unique
@@ -120,7 +120,7 @@ class Stated:
         Name of the run, title of the file, start time in ISO 8601; empty if the file does not state them.
     ragged : bool
         Whether a channel may end before its times, because longer channels share them.
-    traps : tuple of Trap
+    traps : tuple of FormatIssue
         Remarks on the file as a whole.
     """
 
@@ -129,7 +129,7 @@ class Stated:
     title: str = ""
     start_time: str = ""
     ragged: bool = False
-    traps: tuple[Trap, ...] = ()
+    traps: tuple[FormatIssue, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

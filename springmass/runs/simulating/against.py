@@ -27,7 +27,7 @@ COEFFICIENTS = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class InputShift:
     """The change of one input alone that brings the prediction closest to the run, and the rms that is then left."""
 
     name: str
@@ -43,7 +43,7 @@ class Against:
 
     ``free`` has the times since the first sample, the displacements and the fitted velocities without false echoes.
     ``band`` has the quantiles (4, n) of the predicted distance relative to ``predicted``; ``inside`` is the share of
-    the samples within its 95 % widened by the noise, and ``leaves_s`` the time from which the run leaves it.
+    the samples within its 95 % widened by the noise, and ``leaves_band_s`` the time from which the run leaves it.
     """
 
     t: F8
@@ -54,8 +54,8 @@ class Against:
     free: tuple[F8, F8, F8]
     band: F8 | None = None
     inside: float | None = None
-    leaves_s: float | None = None
-    moves: tuple[Move, ...] = ()
+    leaves_band_s: float | None = None
+    shifts: tuple[InputShift, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return the comparison as the JSON of ``springmass simulate`` has it."""
@@ -63,15 +63,15 @@ class Against:
             "rms_m": self.rms_m,
             "noise_m": self.noise_m,
             "inside_95": self.inside,
-            "leaves_s": self.leaves_s,
+            "leaves_s": self.leaves_band_s,
             "moves": [
-                {"name": move.name, "from": move.given, "to": move.value, "in_u": move.in_u, "rms_m": move.rms_m}
-                for move in self.moves
+                {"name": shift.name, "from": shift.given, "to": shift.value, "in_u": shift.in_u, "rms_m": shift.rms_m}
+                for shift in self.shifts
             ],
         }
 
 
-def completed(scene: Scene, analysis: Analysis, *, damping: bool = True) -> tuple[Scene, Joint]:
+def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) -> tuple[Scene, Joint]:
     """Return a scene completed with values from a run's analysis, and the joint distribution of those values.
 
     The start is always taken from the run, because nobody releases a bob exactly at the first sample; the damping only
@@ -118,7 +118,7 @@ def completed(scene: Scene, analysis: Analysis, *, damping: bool = True) -> tupl
     return replace(scene, **known), measured
 
 
-def lay_over(
+def compare_with_run(
     analysis: Analysis,
     problem: Problem,
     method: str,
@@ -149,10 +149,10 @@ def lay_over(
     around = band.displacement_at(t - t[0])
     left = measured - predicted
     outside = (left < around[0] - WIDER * noise) | (left > around[3] + WIDER * noise)
-    moves = _moves(band, t - t[0], left, values or {})
+    shifts = _shifts(band, t - t[0], left, values or {})
     inside = 1.0 - float(np.mean(outside))
-    leaves_s = _leaves(t, outside, problem)
-    return Against(t, measured, predicted, rms, noise, free, around, inside, leaves_s, moves)
+    leaves_band_s = _leaves(t, outside, problem)
+    return Against(t, measured, predicted, rms, noise, free, around, inside, leaves_band_s, shifts)
 
 
 def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None:
@@ -167,7 +167,7 @@ def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None
     return float(t[found[0]]) if found.size else None
 
 
-def _moves(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> tuple[Move, ...]:
+def _shifts(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> tuple[InputShift, ...]:
     """Return the least-squares change of each input alone that brings the prediction closest to the record."""
     from scipy.optimize import minimize_scalar
 
@@ -191,8 +191,8 @@ def _moves(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> t
         step = float(grid[1] - grid[0])
         shift = float(minimize_scalar(rms, bounds=(best - step, best + step), method="bounded").x)
         given = values[name]
-        found.append(Move(name, given.value, given.value + shift * given.u, shift, rms(shift)))
-    return tuple(sorted(found, key=lambda move: move.rms_m))
+        found.append(InputShift(name, given.value, given.value + shift * given.u, shift, rms(shift)))
+    return tuple(sorted(found, key=lambda shift: shift.rms_m))
 
 
 def deviation_text(against: Against) -> list[str]:
@@ -200,15 +200,17 @@ def deviation_text(against: Against) -> list[str]:
     if against.inside is None:
         return []
     lines = [f"in the band      {against.inside:.1%} of the samples lie within 95 % and the noise"]
-    if against.leaves_s is None:
+    if against.leaves_band_s is None:
         lines.append("                 the record never leaves it for half a period")
         return lines
-    lines.append(f"leaves the band  from {against.leaves_s:.3g} s on more than half of a period's samples are outside")
-    for move in against.moves[:3]:
-        far = abs(move.in_u) > 0.99 * FURTHEST_U
+    lines.append(
+        f"leaves the band  from {against.leaves_band_s:.3g} s on more than half of a period's samples are outside"
+    )
+    for shift in against.shifts[:3]:
+        far = abs(shift.in_u) > 0.99 * FURTHEST_U
         lines.append(
-            f"                 {move.name} alone would have to be {move.value:.6g}, not {move.given:.6g} "
-            f"({'more than ' if far else ''}{move.in_u:+.1f} u): rms {move.rms_m * 1e3:.3g} mm would be left"
+            f"                 {shift.name} alone would have to be {shift.value:.6g}, not {shift.given:.6g} "
+            f"({'more than ' if far else ''}{shift.in_u:+.1f} u): rms {shift.rms_m * 1e3:.3g} mm would be left"
         )
     return lines
 

@@ -63,9 +63,9 @@ def prepare(scene: Scene, seconds: float, *, analysis: Analysis | None = None, w
     """
     derived, measured = needs_drag(scene), None
     if analysis is not None:
-        from springmass.runs.simulating.against import completed
+        from springmass.runs.simulating.against import scene_from_run
 
-        scene, measured = completed(scene, analysis, damping=not derived)
+        scene, measured = scene_from_run(scene, analysis, damping=not derived)
     from_run = () if measured is None else measured.names
     solved, problem, drag = scene, Problem.from_scene(scene, where=where), None
     if derived:

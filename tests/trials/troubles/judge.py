@@ -16,7 +16,7 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.options import options_for
 from pipeline.track import Track
-from springmass.runs.options import How
+from springmass.runs.options import AnalysisOptions
 from springmass.runs.run import Run
 from tests.trials.troubles.record import Kind, Record
 
@@ -108,7 +108,7 @@ def _analysed(record: Record, tier: str) -> Analysis:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "trial_position.txt"
         path.write_bytes(record.text)
-        return Run.of(path, scene, How(accuracy=tier)).analysis
+        return Run.of(path, scene, AnalysisOptions(accuracy=tier)).analysis
 
 
 def _held_against(analysis: Analysis, record: Record) -> dict[str, Given]:

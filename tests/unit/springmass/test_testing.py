@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springmass.extend import Family, FramedDecoder, LineSplitter, OneStep, Reading, acceleration, make_law
+from springmass import extend
+from springmass.extend import FramedDecoder, LineSplitter, OneStep, Reading, Sensor, acceleration, make_law
 from springmass.testing import File, check
 from tests.plugin import bench_extras as right
 
@@ -38,13 +39,13 @@ class Careless(FramedDecoder):
         return Reading(host_ns, distance_m=int(frame) / 1000)
 
 
-SENSORS: dict[str, tuple[Family, dict[str, Any]]] = {
+SENSORS: dict[str, tuple[Sensor, dict[str, Any]]] = {
     "Reading of NaN for no target": (replace(right.PLAIN_MILLIMETRES, decoder=Careless), {}),
     "handle what raises ValueError": (replace(right.PLAIN_MILLIMETRES, decoder=Careless), {}),
     "half of resolution_m": (replace(right.PLAIN_MILLIMETRES, resolution_m=1e-5), {}),
     "let a flip of": (right.PLAIN_MILLIMETRES, {"checksum": True}),
     "leave has_device_time out": (replace(right.PLAIN_MILLIMETRES, has_device_time=True), {}),
-    "give the Family an encoder": (replace(right.PLAIN_MILLIMETRES, encoder=None), {}),
+    "give the Sensor an encoder": (replace(right.PLAIN_MILLIMETRES, encoder=None), {}),
 }
 
 
@@ -119,9 +120,17 @@ def test_an_integrator() -> None:
 
 def test_what_is_no_extension_is_refused() -> None:
     """As is a law or a format without an example, or an example without a coefficient."""
-    with pytest.raises(TypeError, match="expected a Family, Format, Law or Integrator, got 3"):
+    with pytest.raises(TypeError, match="expected a Sensor, Format, Law or Integrator, got 3"):
         check(3)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="give an example"):
         check(right.THREE_HALVES)
     with pytest.raises(AssertionError, match="a number for d"):
         check(right.THREE_HALVES, {"A0": 0.05})
+
+
+@pytest.mark.parametrize(("earlier", "name"), [("Family", "Sensor"), ("Trap", "FormatIssue")])
+def test_an_earlier_name_is_imported_with_a_warning(earlier: str, name: str) -> None:
+    """A package written for 0.3 gets the class itself, and the name that it has now."""
+    with pytest.warns(DeprecationWarning, match=name):
+        found = getattr(extend, earlier)
+    assert found is getattr(extend, name)

@@ -13,7 +13,7 @@ from acquisition.live.reader import Sink
 from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
 from storage.wire_log.appending import SECOND_COPY
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.wire import WAIT_S, Disk, json_of, parse_log
 
@@ -39,13 +39,13 @@ def test_everything_put_is_in_the_log_in_order(tmp_path: Path) -> None:
         recording.mark("stopped", host_ns=9, channel=1)
         sink.event(1, 501, "lost", {"why": "unplugged"})
     whole = list(read_log(tmp_path / "run.wire"))
-    records = [record for record in whole if record.kind is not Kind.HEADER]
+    records = [record for record in whole if record.kind is not RecordKind.HEADER]
     data = [(record.channel, record.mono_ns, record.payload) for record in records[:501]]
     assert data == [(n % 2, n, b"R%04d\r" % n) for n in range(500)] + [(1, 500, b"last")]
     reported = [(record.kind, record.channel, record.mono_ns, record.payload) for record in records[501:503]]
-    assert reported == [(Kind.MARK, 0, 7, b"let go"), (Kind.MARK, 1, 9, b"stopped")]
+    assert reported == [(RecordKind.MARK, 0, 7, b"let go"), (RecordKind.MARK, 1, 9, b"stopped")]
     assert json_of(records[503]) == {"kind": "lost", "facts": {"why": "unplugged"}}
-    assert (records[504].kind, len(records)) == (Kind.END, 505)
+    assert (records[504].kind, len(records)) == (RecordKind.END, 505)
     assert json_of(records[504]) == {"records": len(whole) - 1, "dropped_records": 0, "dropped_bytes": 0}
     assert read_log(tmp_path / "run.wire").damage.intact
 
@@ -119,12 +119,12 @@ def test_events_and_marks_outlast_an_overflow() -> None:
     recording.put(0, 21, b"after")
     recording.close()
     _, _, *records, after, _ = list(parse_log(bytes(disk.data)))
-    events = [json_of(record) for record in records if record.kind is Kind.EVENT]
+    events = [json_of(record) for record in records if record.kind is RecordKind.EVENT]
     assert [event["facts"]["number"] for event in events if event["kind"] == "lost"] == list(range(1, 20))
-    assert [record.text() for record in records if record.kind is Kind.MARK] == ["now"]
+    assert [record.text() for record in records if record.kind is RecordKind.MARK] == ["now"]
     assert after.payload == b"after"
     (overflow,) = [event for event in events if event["kind"] == "overflow"]
-    recorded = sum(record.kind is Kind.DATA for record in records)
+    recorded = sum(record.kind is RecordKind.DATA for record in records)
     assert recorded + overflow["facts"]["records"] == 19 == recorded + recording.status.dropped_records
 
 
@@ -149,7 +149,7 @@ def test_a_read_longer_than_a_record_is_divided() -> None:
     recording = recorder(disk)
     recording.put(1, 5, long)
     recording.close()
-    records = [record for record in parse_log(bytes(disk.data)) if record.kind is Kind.DATA]
+    records = [record for record in parse_log(bytes(disk.data)) if record.kind is RecordKind.DATA]
     assert b"".join(record.payload for record in records) == long
     assert {(record.channel, record.mono_ns) for record in records} == {(1, 5)}
 
@@ -166,7 +166,7 @@ def test_a_full_disk_stops_the_recording_and_counts_what_it_lost() -> None:
         recording.put(0, number, b"R%04d\r" % number)
     disk.writes_pass.set()
     status = recording.drain()
-    kept = sum(record.kind is Kind.DATA for record in parse_log(bytes(disk.data)))
+    kept = sum(record.kind is RecordKind.DATA for record in parse_log(bytes(disk.data)))
     assert 1 < kept < 201
     assert kept + status.dropped_records == 201
     with pytest.raises(WriteFailed, match="No space left on device"):

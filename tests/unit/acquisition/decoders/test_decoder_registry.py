@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from acquisition.decoders.family import Family
+from acquisition.decoders.family import Sensor
 from acquisition.decoders.registry import describe_bytes, families, get_family, probe
 from acquisition.errors import SensorError
 from tests.encoders import ENCODERS
@@ -25,7 +25,7 @@ LOOK_ALIKE = {
 every_family = pytest.mark.parametrize("family", families(), ids=lambda family: family.name)
 
 
-def stream(family: Family, n: int = 20) -> bytes:
+def stream(family: Sensor, n: int = 20) -> bytes:
     """Return frames of a bob that swings."""
     encoder = ENCODERS[family.name]()
     distances = [0.7 + 0.2 * math.sin(0.3 * i) for i in range(n)]
@@ -43,7 +43,7 @@ def test_a_name_that_is_not_known_is_refused_in_one_line() -> None:
 
 
 @every_family
-def test_the_bytes_of_a_family_are_recognised(family: Family) -> None:
+def test_the_bytes_of_a_family_are_recognised(family: Sensor) -> None:
     """Its own name, those that differ in the unit alone, and no other; also from the middle of a frame."""
     data = stream(family)
     for start in (0, 1) if family.self_framing else (0,):

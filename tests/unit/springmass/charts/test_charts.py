@@ -13,7 +13,7 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import F8
-from springmass.charts.chart import Chart, Note, Panel, Series, decoded, to_json
+from springmass.charts.chart import Chart, ChartNote, Panel, Series, decoded, to_json
 from springmass.charts.draw import render
 from springmass.charts.run import charts_of
 from springmass.charts.several import comparison, course, drag_map, overlay
@@ -56,7 +56,7 @@ def motion(damped: Analysis) -> Oscillation:
 @pytest.fixture(scope="module")
 def charts(damped: Analysis) -> dict[str, Drawn]:
     """Its charts."""
-    made = charts_of(damped, [Note(2.0, "door", "mark")], classic(damped.track, damped.scene))
+    made = charts_of(damped, [ChartNote(2.0, "door", "mark")], classic(damped.track, damped.scene))
     return {name: Drawn(chart) for name, chart in made.items()}
 
 

@@ -19,7 +19,7 @@ from pipeline.track import F8, Track
 from springmass.charts.chart import decoded
 from springmass.page.feeds import LogFeed, view_of
 from springmass.page.live_analysis import motion_of
-from springmass.page.view import MOST_PER_MESSAGE, Series
+from springmass.page.view import MOST_PER_MESSAGE, SampleBuffer
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
 
@@ -29,7 +29,7 @@ def test_messages_hold_every_sample_once() -> None:
     count = 2 * MOST_PER_MESSAGE + 17
     t = np.arange(count) / 100
     y = np.where(np.arange(count) % 7, 0.2 + 1e-3 * t, np.nan)
-    series = Series()
+    series = SampleBuffer()
     for start in range(0, count, 999):
         part = slice(start, start + 999)
         series.push(Block(start, t[part], y[part], np.zeros(t[part].size, np.uint8)))

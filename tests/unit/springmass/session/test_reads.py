@@ -20,7 +20,7 @@ from acquisition.readings import Read, Readings
 from springmass.session import reads
 from springmass.session.failures import Failures
 from springmass.session.reads import Tee
-from springmass.session.sensors import Sensor
+from springmass.session.sensors import OpenSensor
 from storage.recorder import Recorder
 
 STEP_NS = 10_000_000
@@ -149,7 +149,7 @@ class Bench:
 
     def __init__(self, address: str) -> None:
         port = SimpleNamespace(name=address, is_network="://" in address)
-        sensor = Sensor(get_family("line-protocol"), cast(SerialPort, port), rate_hz=100.0)
+        sensor = OpenSensor(get_family("line-protocol"), cast(SerialPort, port), rate_hz=100.0)
         self.chains = [sensor.chain()]
         self.tee = Tee(self.chains, sensors=[sensor])
         self.log = started(self.tee, self.chains, 0)

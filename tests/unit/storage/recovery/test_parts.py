@@ -15,8 +15,8 @@ from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
-from storage.run_file.reading import Run, open_run
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.run_file.reading import RunFile, open_run
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.wire import line
 
@@ -49,7 +49,7 @@ def recording(path: Path, sensors: int = 1, port: str = "COM3") -> Recorder:
     return Recorder(path, LogHeader(sensors=entries, mono_ns=0, unix_ns=0), VirtualClock(90 * SECOND_NS))
 
 
-def codes(run: Run) -> set[str]:
+def codes(run: RunFile) -> set[str]:
     """Return the codes of a run's traps."""
     return {trap.code for trap in run.traps}
 
@@ -137,7 +137,7 @@ def test_a_part_whose_beginning_is_damaged_is_found(tmp_path: Path) -> None:
         send(recorder, 1, 20.0, 20.0)
     data = bytearray(log.read_bytes())
     for record in read_log(log):
-        if record.kind is Kind.EVENT:
+        if record.kind is RecordKind.EVENT:
             data[record.offset + 30] ^= 1
     log.write_bytes(data)
     assert [run.samples for run in recover(log).runs] == [1500, 2000]

@@ -19,9 +19,9 @@ from acquisition.live.decoding import SensorChain
 from storage.errors import LogGrowing, NotALog, RunDamaged, RunExists
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
-from storage.run_file.reading import Run, open_run
+from storage.run_file.reading import RunFile, open_run
 from storage.wire_log.appending import WireLogWriter
-from storage.wire_log.records import Kind, LogHeader, SensorEntry
+from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
 from storage.wire_log.scanning import read_log
 from tests.wire import append, line
 
@@ -74,7 +74,7 @@ def samples_of(path: Path) -> Block:
         return run.samples()
 
 
-def traps(run: Run) -> set[str]:
+def traps(run: RunFile) -> set[str]:
     """Return the codes of a run's traps."""
     return {trap.code for trap in run.traps}
 
@@ -105,7 +105,7 @@ def test_a_torn_log_gives_what_it_holds_and_says_so(tmp_path: Path) -> None:
     """A log cut in a record and damaged in another gives the rest; the damage is in the provenance and the traps."""
     log = write(tmp_path / "run.wire")
     data = bytearray(log.read_bytes()[:-40])
-    victim = [record for record in read_log(log) if record.kind is Kind.DATA][100]
+    victim = [record for record in read_log(log) if record.kind is RecordKind.DATA][100]
     data[victim.offset + 30] ^= 4
     log.write_bytes(data)
     report = recover(log)
@@ -144,7 +144,7 @@ def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
     sensor = SensorEntry(0, FAMILY, calibration=Calibration(offset_m=1.0).to_mapping())
     log = WireLogWriter(tmp_path / "run.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0))
     for host_ns, data in wire(50):
-        append(log, Kind.DATA, data, mono_ns=host_ns)
+        append(log, RecordKind.DATA, data, mono_ns=host_ns)
     log.close()
     recover(log.path, tmp_path / "a.h5")
     with Recorder(tmp_path / "b.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
@@ -173,11 +173,11 @@ def test_the_log_goes_only_when_the_run_file_verifies(tmp_path: Path, monkeypatc
     """Asked to remove the log, recovery does so after reading the run file back, and not before."""
     log = write(tmp_path / "run.wire", count=10)
 
-    def damaged(_: Run) -> None:
+    def damaged(_: RunFile) -> None:
         raise RunDamaged("run.h5", "the column 'time' is damaged", "restore it")
 
     with monkeypatch.context() as patch:
-        patch.setattr(Run, "verify", damaged)
+        patch.setattr(RunFile, "verify", damaged)
         with pytest.raises(RunDamaged):
             recover(log, remove_log=True)
     assert log.exists()
@@ -206,14 +206,14 @@ def test_a_recovery_that_was_killed_is_called_again(tmp_path: Path) -> None:
 def test_a_log_that_grew_meanwhile_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bytes that came after the reading are in no run file yet."""
     log = write(tmp_path / "run.wire", count=10)
-    real = Run.verify
+    real = RunFile.verify
 
-    def slow(run: Run) -> None:
+    def slow(run: RunFile) -> None:
         real(run)
         with log.open("ab") as file:
             file.write(b"more")
 
-    monkeypatch.setattr(Run, "verify", slow)
+    monkeypatch.setattr(RunFile, "verify", slow)
     assert not recover(log, remove_log=True).log_removed
     assert log.read_bytes().endswith(b"more")
 

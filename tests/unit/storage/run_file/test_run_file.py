@@ -17,7 +17,7 @@ import pytest
 
 from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.errors import PortError
-from acquisition.recordings.recording import Original, Trap
+from acquisition.recordings.recording import FormatIssue, Original
 from storage.errors import NotARun, RunClosed, RunDamaged, RunExists, RunOpen, WriteFailed
 from storage.run_file.layout import CHUNK, HEADER
 from storage.run_file.reading import open_run
@@ -26,7 +26,7 @@ from tests.sampling import sampled
 
 INFO = SourceInfo("live", "COM3", 100.0, sigma_m=3e-4, quantum_m=1e-4, clock="device", stated_error_m=0.001)
 SCENE = {"bob": {"mass_kg": {"value": 0.2176, "u": 0.00005}}, "sensor": {"position": "below"}}
-TRAPS = (Trap("truncated_row", "The last row was cut.", 1, 12003), Trap("nominal_clock", "No times."))
+TRAPS = (FormatIssue("truncated_row", "The last row was cut.", 1, 12003), FormatIssue("nominal_clock", "No times."))
 ORIGINALS = (Original("run position.txt", bytes(range(256)) * 3), Original("run velocity.txt", b""))
 PROVENANCE = {"software": "springmass", "version": "0.1.0", "configuration": {"rate_hz": 100.0}}
 

@@ -14,7 +14,7 @@ import pytest
 from storage.errors import WriteFailed
 from storage.schema import ValueRefused
 from storage.wire_log.appending import WireLogWriter
-from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry, event_payload, frame
+from storage.wire_log.records import HEAD_BYTES, LogHeader, Record, RecordKind, SensorEntry, event_payload, frame
 from storage.wire_log.scanning import Scan, read_log
 from tests.sampling import sampled
 from tests.wire import Disk, append, json_of, parse_log
@@ -43,11 +43,11 @@ def test_what_is_appended_comes_back(tmp_path: Path) -> None:
     path = tmp_path / "run.wire"
     log = WireLogWriter(path, HEADER)
     reported = [
-        (Kind.DATA, 7, 1, bytes(range(256))),
-        (Kind.DATA, 0, 2, b""),
-        (Kind.MARK, 0, 3, "Stoß ∂".encode()),
-        (Kind.EVENT, 7, 4, event_payload("reopened", {"gap_s": 0.25})),
-        (Kind.END, 0, 5, b"{}"),
+        (RecordKind.DATA, 7, 1, bytes(range(256))),
+        (RecordKind.DATA, 0, 2, b""),
+        (RecordKind.MARK, 0, 3, "Stoß ∂".encode()),
+        (RecordKind.EVENT, 7, 4, event_payload("reopened", {"gap_s": 0.25})),
+        (RecordKind.END, 0, 5, b"{}"),
     ]
     for number, (kind, channel, mono_ns, payload) in enumerate(reported, 1):
         append(log, kind, payload, mono_ns=mono_ns, channel=channel)
@@ -56,7 +56,7 @@ def test_what_is_appended_comes_back(tmp_path: Path) -> None:
     contents = read_log(path)
     header, *records = contents
     assert [content(record) for record in records] == reported
-    assert (header.kind, header.offset, contents.header) == (Kind.HEADER, 0, HEADER)
+    assert (header.kind, header.offset, contents.header) == (RecordKind.HEADER, 0, HEADER)
     assert (records[2].text(), json_of(records[3])) == ("Stoß ∂", {"kind": "reopened", "facts": {"gap_s": 0.25}})
     assert contents.damage.intact
     assert contents.damage.ended
@@ -64,7 +64,7 @@ def test_what_is_appended_comes_back(tmp_path: Path) -> None:
 
 def test_a_record_lies_in_the_file_as_documented() -> None:
     """The layout of the docstring is the layout of the bytes."""
-    record = frame(Kind.DATA, b"R0500\r", sequence=2**32 + 7, mono_ns=123, log=0xCAFE, channel=3)
+    record = frame(RecordKind.DATA, b"R0500\r", sequence=2**32 + 7, mono_ns=123, log=0xCAFE, channel=3)
     head = struct.pack("<2sHIqIBBH", b"\xf5\xa9", 6, 7, 123, 0xCAFE, 2, 3, 0)
     assert record == head + struct.pack("<I", zlib.crc32(head + b"R0500\r")) + b"R0500\r"
     assert len(record) == HEAD_BYTES + 6 == 34
@@ -84,7 +84,7 @@ def test_a_failed_sync_is_never_taken_back() -> None:
     """After one failed sync nothing more counts as safe: the kernel forgets which pages it could not write."""
     disk = Disk()
     log = WireLogWriter("run.wire", HEADER, open_file=disk)
-    append(log, Kind.DATA, b"R0500\r", mono_ns=0)
+    append(log, RecordKind.DATA, b"R0500\r", mono_ns=0)
     disk.sync_trouble = OSError(errno.EIO, "Input/output error")
     with pytest.raises(WriteFailed, match="could not be synced"):
         log.sync()
@@ -92,7 +92,7 @@ def test_a_failed_sync_is_never_taken_back() -> None:
     with pytest.raises(WriteFailed, match="could not be synced"):
         log.sync()
     with pytest.raises(WriteFailed, match="could not be synced"):
-        append(log, Kind.DATA, b"R0500\r", mono_ns=0)
+        append(log, RecordKind.DATA, b"R0500\r", mono_ns=0)
     assert (log.synced.records, log.written.records) == (1, 2)
 
 
@@ -101,7 +101,7 @@ def test_the_header_survives_its_first_page() -> None:
     disk = Disk()
     log = WireLogWriter("run.wire", HEADER, open_file=disk)
     while log.written.bytes < 100_000:
-        append(log, Kind.DATA, bytes(100), mono_ns=0)
+        append(log, RecordKind.DATA, bytes(100), mono_ns=0)
     disk.data[:4096] = bytes(4096)
     contents = parse_log(bytes(disk.data))
     assert contents.header == HEADER
@@ -110,25 +110,25 @@ def test_the_header_survives_its_first_page() -> None:
 
 def test_records_of_another_log_are_no_records() -> None:
     """Old disk blocks, or a device that sends a log as its data, add nothing."""
-    mine = [frame(Kind.DATA, bytes([n]), sequence=n, mono_ns=n, log=1) for n in range(4)]
-    foreign = frame(Kind.DATA, b"foreign", sequence=2, mono_ns=2, log=2)
+    mine = [frame(RecordKind.DATA, bytes([n]), sequence=n, mono_ns=n, log=1) for n in range(4)]
+    foreign = frame(RecordKind.DATA, b"foreign", sequence=2, mono_ns=2, log=2)
     contents = parse_log(mine[0] + mine[1] + foreign + mine[3])
     assert [(record.payload, record.lost_before) for record in contents] == [(b"\0", 0), (b"\1", 0), (b"\3", 1)]
     damage = contents.damage
     assert (damage.skipped_at, damage.skipped_bytes) == (len(mine[0] + mine[1]), len(foreign))
     # The record that carries a record is torn: the carried one stays where it is.
-    carrier = frame(Kind.DATA, foreign * 3, sequence=2, mono_ns=2, log=1)
+    carrier = frame(RecordKind.DATA, foreign * 3, sequence=2, mono_ns=2, log=1)
     torn = carrier[:-1] + b"?"
     assert [record.payload for record in parse_log(mine[0] + mine[1] + torn + mine[3])] == [b"\0", b"\1", b"\3"]
 
 
 def test_a_record_that_comes_twice_is_delivered_once() -> None:
     """A number that runs back is an old copy; a number that wraps is not."""
-    mine = [frame(Kind.DATA, bytes([n]), sequence=n, mono_ns=n, log=1) for n in range(3)]
+    mine = [frame(RecordKind.DATA, bytes([n]), sequence=n, mono_ns=n, log=1) for n in range(3)]
     contents = parse_log(mine[0] + mine[1] + mine[0] + mine[2])
     assert [record.payload for record in contents] == [b"\0", b"\1", b"\2"]
     assert (contents.damage.strays, contents.damage.lost, contents.damage.intact) == (1, 0, False)
-    last = [frame(Kind.DATA, b"", sequence=n, mono_ns=0, log=1) for n in (2**31 - 1, 2**32 - 2, 2**32 - 1, 2**32)]
+    last = [frame(RecordKind.DATA, b"", sequence=n, mono_ns=0, log=1) for n in (2**31 - 1, 2**32 - 2, 2**32 - 1, 2**32)]
     assert [record.sequence for record in parse_log(b"".join(last))] == [2**31 - 1, 2**32 - 2, 2**32 - 1, 0]
 
 
@@ -146,7 +146,9 @@ def test_a_header_is_checked() -> None:
 
 def test_an_event_is_told_whatever_its_facts_are() -> None:
     """Facts that JSON cannot hold go in as text: the reading thread must not fail on them."""
-    record = Record(0, 0, 0, Kind.EVENT, 0, event_payload("lost", {"why": OSError(5, "gone"), "gap_s": float("nan")}))
+    record = Record(
+        0, 0, 0, RecordKind.EVENT, 0, event_payload("lost", {"why": OSError(5, "gone"), "gap_s": float("nan")})
+    )
     assert json_of(record)["facts"] == {"why": "OSError(5, 'gone')", "gap_s": "nan"}
 
 
@@ -154,8 +156,8 @@ def written(folder: Path) -> bytes:
     """Return a log of 300 reads and an end."""
     log = WireLogWriter(folder / "whole.wire", HEADER, log=7)
     for number in range(300):
-        append(log, Kind.DATA, b"R%04d\r" % number, mono_ns=number)
-    append(log, Kind.END, b"{}", mono_ns=400)
+        append(log, RecordKind.DATA, b"R%04d\r" % number, mono_ns=number)
+    append(log, RecordKind.END, b"{}", mono_ns=400)
     log.close()
     return log.path.read_bytes()
 
@@ -200,8 +202,8 @@ def test_half_a_record_waits_and_damage_is_passed_over(tmp_path: Path) -> None:
     follower = Follower(path)
     assert len(follower.records()) == 301
     path.write_bytes(whole)
-    assert [record.kind for record in follower.records()] == [Kind.END]
+    assert [record.kind for record in follower.records()] == [RecordKind.END]
     count = read_log(path).damage.records
-    path.write_bytes(whole + b"damaged" + frame(Kind.DATA, b"late", sequence=count + 2, mono_ns=500, log=7))
+    path.write_bytes(whole + b"damaged" + frame(RecordKind.DATA, b"late", sequence=count + 2, mono_ns=500, log=7))
     (late,) = follower.records()
     assert (late.payload, late.lost_before) == (b"late", 2)
