@@ -16,7 +16,7 @@ help:
 	@echo "make mutants  planted faults, and whether tests and goldens notice them: an hour"
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
-	@echo "make lint     ruff, mypy, import contracts, spelling"
+	@echo "make lint     ruff, mypy, import contracts, names, spelling"
 	@echo "make firmware the rangefinder's hex, as it travels in the package (Debian: gcc-avr avr-libc arduino-core-avr)"
 	@echo "make docs     the pages and the reference of the Python API as a site, docs/_build/index.html"
 
@@ -69,6 +69,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python benchmarks/names.py
 	git ls-files -z | xargs -0 $(BIN)/codespell
 
 docs: $(VENV)/.installed-dev

@@ -19,7 +19,7 @@ _OTHERS = {
     "C": "c degc °c celsius",
     "other": "f degf °f % v mv hz khz mhz pa hpa kpa mbar bar deg rad g kg n ft feet foot yd lux lx db dbm rpm baud",
 }
-UNITS = {
+UNIT_OF_WORD = {
     **{form: unit for unit in (*LENGTHS_M, *TIMES_US) for word in SPELLINGS[unit] for form in (word, f"{word}s")},
     **{unit: unit for unit in (*LENGTHS_M, *TIMES_US)},
     **{word: unit for unit, words in _OTHERS.items() for word in words.split()},
@@ -121,11 +121,11 @@ def numbers(text: str, *, decimal_comma: bool = False, colon_separates: bool = F
         label = tuple(word.casefold() for word in _WORD.findall(before))
         digits = len(match[1] or match[2] or "") - int(match[3] or 0)
         word = _AFTER.match(after)
-        unit = UNITS.get(word[1].casefold(), "") if word else ""
+        unit = UNIT_OF_WORD.get(word[1].casefold(), "") if word else ""
         if word and unit and word[2]:
             unit = "other"  # cm/s
         end = match.end() + (word.end() if word and unit else 0)
-        unit = unit or (UNITS.get(label[-1], "") if label else "")
+        unit = unit or (UNIT_OF_WORD.get(label[-1], "") if label else "")
         found.append(Number(float(match[0].replace(",", ".")), 10.0**-digits, match.start(), before, label, unit))
     return found
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from acquisition.block import UNITS
 
-LENGTHS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
+LENGTH_POWERS = {"m": 0, "cm": -2, "mm": -3, "um": -6}
 """Units of length, each with the power of ten that converts it to metres."""
 
 _OTHERS = {
@@ -77,7 +77,7 @@ class Measure(NamedTuple):
 
 MEASURES = {
     unit: Measure(quantity, unit, power, _FACTORS.get(unit, 1.0))
-    for quantity, units in (("length", LENGTHS), *_OTHERS.items())
+    for quantity, units in (("length", LENGTH_POWERS), *_OTHERS.items())
     for unit, power in units.items()
 }
 """The measure of each unit that a channel may have."""
@@ -104,7 +104,7 @@ def unit_words(unit: str) -> str:
         rate = f"{unit_words(per['what'] or per['of'])}/s" + ("^2" if per["two"] or per["power"] == "2" else "")
         if rate in MEASURES:
             return rate
-    return lower if lower in LENGTHS or lower in TIMES else plain
+    return lower if lower in LENGTH_POWERS or lower in TIMES else plain
 
 
 def measure_of(unit: str) -> Measure | None:

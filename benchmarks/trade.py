@@ -20,14 +20,14 @@ from pipeline.errors import AnalysisError
 from pipeline.options import TIERS, options_for
 from pipeline.results.classic import classic
 from pipeline.track import F8, Track
-from springmass.trade import QUANTITIES, Motion, Trouble, bounds, record
+from springmass.trade import SCORED_QUANTITIES, RecordDefect, TrueMotion, bounds, record
 
 FIGURE = Path(__file__).resolve().parents[1] / "docs" / "figures" / "trade.svg"
-MOTION = Motion(seconds=120.0)
+MOTION = TrueMotion(seconds=120.0)
 CASES = {
-    "f, A, γ at 0.3 mm": (MOTION, Trouble()),
-    "f, A, γ at 2.39 mm": (replace(MOTION, noise_m=0.00239), Trouble()),
-    "f, A, γ at 0.3 mm, 5 % echoes": (MOTION, Trouble(echoes=0.05)),
+    "f, A, γ at 0.3 mm": (MOTION, RecordDefect()),
+    "f, A, γ at 2.39 mm": (replace(MOTION, noise_m=0.00239), RecordDefect()),
+    "f, A, γ at 0.3 mm, 5 % echoes": (MOTION, RecordDefect(echoes=0.05)),
 }
 Values = Mapping[str, float]
 Row = tuple[float, dict[str, float]]  # time in s, and errors over their bounds
@@ -37,7 +37,7 @@ def _tier(name: str) -> Callable[[Track], Values]:
     def run(track: Track) -> Values:
         found = analyse(track, options=options_for(name))
         linear = found.motion.damping.fits["linear"].joint["gamma"].value
-        return {**{each: found.estimates[each].value for each in QUANTITIES[:2]}, "damping_rate": linear}
+        return {**{each: found.estimates[each].value for each in SCORED_QUANTITIES[:2]}, "damping_rate": linear}
 
     return run
 
@@ -104,7 +104,7 @@ def damped_sine(t: F8, y: F8) -> Values:
 METHODS: dict[str, Callable[[Track], Values]] = {
     **{f"`{tier}`": _tier(tier) for tier in TIERS},
     "classic lab method": lambda track: {
-        name: each.value for name, each in classic(track).estimates.items() if name in QUANTITIES
+        name: each.value for name, each in classic(track).estimates.items() if name in SCORED_QUANTITIES
     },
     "zero crossings": lambda track: zero_crossings(track.t, track.y),
     "FFT peak": lambda track: fft_peak(track.t, track.y),
@@ -113,7 +113,7 @@ METHODS: dict[str, Callable[[Track], Values]] = {
 }
 
 
-def measure(motion: Motion, kind: Trouble, seeds: int) -> dict[str, Row]:
+def measure(motion: TrueMotion, kind: RecordDefect, seeds: int) -> dict[str, Row]:
     """Run all methods in turn on each record, so that a busy machine slows all of them alike."""
     bound, truth = bounds(motion, kind), motion.truth()
     errors: dict[str, dict[str, list[float]]] = {name: {} for name in METHODS}
@@ -142,7 +142,7 @@ def table(seeds: int = 100, figure: Path | None = None) -> str:
     fit_s = first["scipy damped sine"][0]
     lines = [f"| method | time / fit | {' | '.join(cases)} |", "| --- " * (2 + len(cases)) + "|"]
     for name, (seconds, _) in first.items():
-        errors = (", ".join(_ratio(case[name][1].get(each)) for each in QUANTITIES) for case in cases.values())
+        errors = (", ".join(_ratio(case[name][1].get(each)) for each in SCORED_QUANTITIES) for case in cases.values())
         lines.append(f"| {name} | {seconds / fit_s:.2f} | {' | '.join(errors)} |")
     return "\n".join(lines)
 
@@ -161,7 +161,7 @@ def _draw(rows: Mapping[str, Row], path: Path) -> None:
     with style():
         figure = Figure(figsize=(7.2, 7.8), layout="constrained")
         axes = figure.subplots(3, 1, sharex=True)
-        for axis, quantity in zip(axes, QUANTITIES, strict=True):
+        for axis, quantity in zip(axes, SCORED_QUANTITIES, strict=True):
             for marker, (name, (seconds, errors)) in zip("oDsx^vP*", rows.items(), strict=True):
                 axis.loglog(1e3 * seconds, errors.get(quantity, math.nan), marker, mfc="none", label=name.strip("`"))
             axis.axhline(1.0, color="grey", ls="--", label="bound")

@@ -71,6 +71,6 @@ ReadingsPerSecond = Annotated[float, _where(lambda x: 1e-3 <= x <= 1e6, "must li
 PartsPerMillion = Annotated[float, _where(lambda x: 0.0 <= x <= 1e6, "must lie in 0 to 1000000")]
 SpeedOfSound = Annotated[float, _where(lambda x: 100.0 < x < 2000.0, "must lie between 100 and 2000 m/s")]
 Whole = Annotated[int, Parameter(converter=_whole)]
-Count = Annotated[Whole, _where(lambda x: x >= 1, "must be 1 or more")]
+PositiveCount = Annotated[Whole, _where(lambda x: x >= 1, "must be 1 or more")]
 WholeNumber = Annotated[Whole, _where(lambda x: x >= 0, "must be 0 or more")]
 TcpPort = Annotated[Whole, _where(lambda x: 0 <= x <= 65535, "must be a port from 0 to 65535")]

@@ -26,14 +26,18 @@ from pipeline.options import TIERS, options_for
 from pipeline.track import F8, Track
 from springmass.runs.simulating.simulation import reference
 
-QUANTITIES = ("frequency", "amplitude", "damping_rate")
-DRAGS = {"gamma": ("linear", "gamma_per_s"), "beta": ("quadratic", "beta_per_m_s"), "mu": ("friction", "mu_m_per_s")}
-PARTS, RTOLS, TOLERANCES = (1, 4, 16), (1e-6, 1e-9, 1e-12), (1e-3, 1e-6, 1e-9, 1e-12)
+SCORED_QUANTITIES = ("frequency", "amplitude", "damping_rate")
+SCENE_DRAGS = {
+    "gamma": ("linear", "gamma_per_s"),
+    "beta": ("quadratic", "beta_per_m_s"),
+    "mu": ("friction", "mu_m_per_s"),
+}
+STEP_PARTS, RTOLS, TOLERANCES = (1, 4, 16), (1e-6, 1e-9, 1e-12), (1e-3, 1e-6, 1e-9, 1e-12)
 LONGEST_ADAPTIVE = 2e4  # rad; a longer motion takes adaptive methods minutes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Motion:
+class TrueMotion:
     """A free oscillation as it is sampled: ``theta`` has the law's parameters, the amplitude at t = 0 in m first."""
 
     frequency_hz: float = 1.3183
@@ -59,17 +63,17 @@ class Motion:
     def problem(self) -> Problem | None:
         """Return the equation of the motion and its start; None if its law is no sum of drags."""
         drags = dict(zip([*self.law.parameters][1:], self.theta[1:].tolist(), strict=True))
-        if not drags.keys() <= DRAGS.keys():
+        if not drags.keys() <= SCENE_DRAGS.keys():
             return None
-        found = {DRAGS[name][1]: max(value, 0.0) for name, value in drags.items()}
+        found = {SCENE_DRAGS[name][1]: max(value, 0.0) for name, value in drags.items()}
         return Problem(Equation.from_laws(2.0 * math.pi * self.frequency_hz, **found), float(self.theta[0]))
 
 
-def motion_of(analysis: Analysis, oscillation: Oscillation) -> Motion:
+def motion_of(analysis: Analysis, oscillation: Oscillation) -> TrueMotion:
     """Return the motion that an analysis found, by the law that it selected."""
     law, t = oscillation.damping.best, analysis.track.t
     seconds = float(t[-1] - t[0])
-    return Motion(
+    return TrueMotion(
         frequency_hz=analysis.estimates["frequency"].value,
         law=find_law(law.name),
         theta=np.asarray(law.joint.values),
@@ -79,17 +83,17 @@ def motion_of(analysis: Analysis, oscillation: Oscillation) -> Motion:
     )
 
 
-def motion_of_problem(problem: Problem, noise_m: float | None, seconds: float) -> Motion:
+def motion_of_problem(problem: Problem, noise_m: float | None, seconds: float) -> TrueMotion:
     """Return the motion of an equation, released at its greatest displacement."""
-    drags = dict(zip(DRAGS, problem.equation.laws(), strict=True))
-    law = find_law("+".join(words for name, (words, _) in DRAGS.items() if drags[name]) or "none")
+    drags = dict(zip(SCENE_DRAGS, problem.equation.laws(), strict=True))
+    law = find_law("+".join(words for name, (words, _) in SCENE_DRAGS.items() if drags[name]) or "none")
     theta = np.array([problem.amplitude_m(), *(drags[each] for each in list(law.parameters)[1:])])
     frequency_hz = problem.equation.angular_frequency_per_s / (2.0 * math.pi)
-    return Motion(frequency_hz=frequency_hz, law=law, theta=theta, noise_m=noise_m or 3e-4, seconds=seconds)
+    return TrueMotion(frequency_hz=frequency_hz, law=law, theta=theta, noise_m=noise_m or 3e-4, seconds=seconds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trouble:
+class RecordDefect:
     """What spoils a record; lengths are relative to the amplitude."""
 
     periods: float | None = None
@@ -101,21 +105,21 @@ class Trouble:
     second: float = 0.0  # amplitude of a mode at six tenths of the frequency
 
 
-TROUBLES = {
-    "clean": Trouble(),
-    "1.6 periods": Trouble(periods=1.6),
-    "3 periods": Trouble(periods=3.0),
-    "noise 10 dB above the motion": Trouble(noise_db=10.0),
-    "5 % false echoes": Trouble(echoes=0.05),
-    "20 % false echoes": Trouble(echoes=0.2),
-    "crests clipped at 80 %": Trouble(clip=0.8),
-    "quantised to 2 %": Trouble(quantum=0.02),
-    "rest drifts by 4 %": Trouble(drift=0.04),
-    "second mode of 2 %": Trouble(second=0.02),
+RECORD_DEFECTS = {
+    "clean": RecordDefect(),
+    "1.6 periods": RecordDefect(periods=1.6),
+    "3 periods": RecordDefect(periods=3.0),
+    "noise 10 dB above the motion": RecordDefect(noise_db=10.0),
+    "5 % false echoes": RecordDefect(echoes=0.05),
+    "20 % false echoes": RecordDefect(echoes=0.2),
+    "crests clipped at 80 %": RecordDefect(clip=0.8),
+    "quantised to 2 %": RecordDefect(quantum=0.02),
+    "rest drifts by 4 %": RecordDefect(drift=0.04),
+    "second mode of 2 %": RecordDefect(second=0.02),
 }
 
 
-def spoilt(motion: Motion, kind: Trouble) -> Motion:
+def spoilt(motion: TrueMotion, kind: RecordDefect) -> TrueMotion:
     """Return the motion with the length and the noise of a kind of records."""
     if kind.periods is not None:
         motion = replace(motion, seconds=kind.periods / motion.frequency_hz)
@@ -125,7 +129,7 @@ def spoilt(motion: Motion, kind: Trouble) -> Motion:
     return motion
 
 
-def record(motion: Motion, kind: Trouble, rng: np.random.Generator) -> F8:
+def record(motion: TrueMotion, kind: RecordDefect, rng: np.random.Generator) -> F8:
     """Return the distances of one record in m, with a random phase."""
     t, size = motion.t, float(motion.theta[0])
     angle, rest = 2.0 * math.pi * motion.frequency_hz * t, 4.0 * size
@@ -140,7 +144,7 @@ def record(motion: Motion, kind: Trouble, rng: np.random.Generator) -> F8:
     return np.asarray(y)
 
 
-def bounds(motion: Motion, kind: Trouble) -> dict[str, float]:
+def bounds(motion: TrueMotion, kind: RecordDefect) -> dict[str, float]:
     """Return the least standard deviations of unbiased estimates (Cramér-Rao) where the law is known.
 
     They follow from the inverse Fisher information of frequency, phase, offset and the law's parameters in white noise,
@@ -163,7 +167,7 @@ def bounds(motion: Motion, kind: Trouble) -> dict[str, float]:
         covariance = np.linalg.pinv((columns / scale).T @ (columns / scale)) / np.outer(scale, scale)
         variances.append([covariance[0, 0], covariance[3, 3], gradient @ covariance[3:, 3:] @ gradient])
     u = motion.noise_m / math.sqrt(1.0 - kind.echoes) * np.sqrt(np.mean(variances, axis=0))
-    return dict(zip(QUANTITIES, u.tolist(), strict=True))
+    return dict(zip(SCORED_QUANTITIES, u.tolist(), strict=True))
 
 
 def _rate(law: Law, theta: F8) -> float:
@@ -171,12 +175,12 @@ def _rate(law: Law, theta: F8) -> float:
     return float(-law.rate(theta[:1], theta)[0] / theta[0])
 
 
-def measure_tiers(motion: Motion, seeds: int) -> Iterator[list[dict[str, Any]]]:
+def measure_tiers(motion: TrueMotion, seeds: int) -> Iterator[list[dict[str, Any]]]:
     """Yield for each kind of records the errors and the time of every tier; all evaluate the same records in turn."""
-    for name, kind in TROUBLES.items():
+    for name, kind in RECORD_DEFECTS.items():
         found = spoilt(motion, kind)
         bound, truth = bounds(found, kind), found.truth()
-        asked = [each for each in QUANTITIES if bound[each] > 0.0]  # without damping there is no rate to find
+        asked = [each for each in SCORED_QUANTITIES if bound[each] > 0.0]  # without damping there is no rate to find
         errors: dict[str, list[list[float]]] = {tier: [] for tier in TIERS}
         times = dict.fromkeys(TIERS, math.inf)
         for seed in range(seeds):
@@ -200,7 +204,7 @@ def measure_tiers(motion: Motion, seeds: int) -> Iterator[list[dict[str, Any]]]:
 
 def measure_integrators(problem: Problem, spacing_s: float, count: int) -> Iterator[dict[str, Any]]:
     """Yield error over the amplitude, steps and time of every integrator, and of ``auto`` at several tolerances."""
-    truth = reference(problem, spacing_s, count, 4 * PARTS[-1])[0].y
+    truth = reference(problem, spacing_s, count, 4 * STEP_PARTS[-1])[0].y
     long = spacing_s * count * problem.equation.angular_frequency_per_s > LONGEST_ADAPTIVE
 
     def row(method: str, setting: str, y: F8, steps: int, seconds: float, *, unstable: bool = False) -> dict[str, Any]:
@@ -213,7 +217,7 @@ def measure_integrators(problem: Problem, spacing_s: float, count: int) -> Itera
             continue
         settings: list[tuple[str, Any, int]] = [("", integrator, 1)]
         if integrator.order:
-            settings = [(f"step {spacing_s / parts:.3g} s", integrator, parts) for parts in PARTS]
+            settings = [(f"step {spacing_s / parts:.3g} s", integrator, parts) for parts in STEP_PARTS]
         elif isinstance(integrator, SolveIvp):
             settings = [(f"rtol {rtol:g}", replace(integrator, rtol=rtol), 1) for rtol in RTOLS]
         for setting, solver, parts in settings:

@@ -22,7 +22,14 @@ from acquisition.clock import Clock
 from acquisition.readings import Read
 from storage.errors import DiskNearlyFull, NotALog, WriteFailed, one_line
 from storage.wire_log.appending import LogFile, LogItem, WireLogWriter, open_log_file
-from storage.wire_log.records import HEAD_BYTES, HIGHEST_CHANNEL, MAX_PAYLOAD, LogHeader, RecordKind, event_payload
+from storage.wire_log.records import (
+    HIGHEST_CHANNEL,
+    MAX_PAYLOAD,
+    RECORD_HEAD_BYTES,
+    LogHeader,
+    RecordKind,
+    event_payload,
+)
 from storage.wire_log.scanning import LogContents, read_log
 
 QUEUE_BYTES = 16 << 20
@@ -177,7 +184,7 @@ class Recorder:
             accepting = self._error is None and not self._closing
             was_waiting = bool(self._queue or self._overflows)
             for channel, mono_ns, payload in _in_records(records):
-                size = HEAD_BYTES + len(payload)
+                size = RECORD_HEAD_BYTES + len(payload)
                 # After an overflow, its event comes first, so that the reads around the loss do not look consecutive.
                 # Marks and events are never dropped: later readings cannot be decoded without those of ports.
                 room = kind is not RecordKind.DATA or not (self._overflows or self._queued_bytes + size > self._limit)

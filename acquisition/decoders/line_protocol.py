@@ -16,7 +16,7 @@ from acquisition.decoders.family import DeviceStatus, Identity, Sensor
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
 from acquisition.readings import NAN, Reading
 
-LONGEST = 96  # maximum length of a line without its line feed, bytes
+LONGEST_LINE = 96  # maximum length of a line without its line feed, bytes
 
 SETTINGS = ("rate_hz", "near_us", "far_us", "spread_us", "thermometer")
 """Settings in an identity line, after model, version and name: rate, gate limits, ping spread, thermometer."""
@@ -68,7 +68,7 @@ class LineProtocolDecoder(FramedDecoder):
         faults = dict.fromkeys(
             ("garbage_bytes", "bad_checksum", "bad_frame", "unknown_record", "refused_command", "comment"), 0
         )
-        super().__init__(LineSplitter(b"\n", LONGEST, faults))
+        super().__init__(LineSplitter(b"\n", LONGEST_LINE, faults))
         self.status = DeviceStatus()
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:

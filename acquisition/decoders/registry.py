@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from importlib.metadata import EntryPoint
 
-GROUP = "springmass.sensors"
+SENSORS_GROUP = "springmass.sensors"
 
 _MODULES = {
     "line-protocol": "line_protocol",
@@ -37,7 +37,7 @@ _ENOUGH = 0.5
 
 def families() -> tuple[Sensor, ...]:
     """Return all families, with those of this package first."""
-    added = [_load(entry) for name, entry in entry_points_of(GROUP).items() if name not in _MODULES]
+    added = [_load(entry) for name, entry in entry_points_of(SENSORS_GROUP).items() if name not in _MODULES]
     return (*map(_built_in, _MODULES), *added)
 
 
@@ -45,7 +45,7 @@ def get_family(name: str) -> Sensor:
     """Return the family with a given name; the SensorError of an unknown name lists the known ones."""
     if name in _MODULES:
         return _built_in(name)
-    entries = entry_points_of(GROUP)
+    entries = entry_points_of(SENSORS_GROUP)
     if name in entries:
         return _load(entries[name])
     known = ", ".join(dict.fromkeys([*_MODULES, *entries]))

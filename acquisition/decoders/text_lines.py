@@ -19,7 +19,7 @@ from acquisition.errors import SensorError
 from acquisition.line_numbers import LENGTHS_M, TIMES_US, Number, find_distance, has_decimal_comma, numbers
 from acquisition.readings import NAN, Reading
 
-LONGEST = 256  # maximum length of a line, bytes
+LONGEST_TEXT_LINE = 256  # maximum length of a line, bytes
 
 SEPARATORS = {"tab": "\t", "space": " ", "comma": ",", "semicolon": ";", None: "", "any": ""}
 
@@ -34,7 +34,7 @@ _NO_TARGET = re.compile(
     re.IGNORECASE,
 )
 
-Found = tuple[str, list[Number], list[tuple[int, int]]]
+FoundNumber = tuple[str, list[Number], list[tuple[int, int]]]
 """A line, its numbers, and where its cells begin and end."""
 
 
@@ -59,7 +59,7 @@ class TextLinesDecoder(FramedDecoder):
         temperature: int | str | None = None,
     ) -> None:
         faults = {"garbage_bytes": 0, "bad_frame": 0, "partial_line": 0, "blank_line": 0}
-        super().__init__(LineSplitter(b"\n", LONGEST, faults, skip_first=True))
+        super().__init__(LineSplitter(b"\n", LONGEST_TEXT_LINE, faults, skip_first=True))
         _demand("unit", unit, {**LENGTHS_M, "us": 1.0})
         _demand("time_unit", time_unit, TIMES_US)
         self._unit, self._time_unit = unit or "", time_unit
@@ -145,14 +145,14 @@ class TextLinesDecoder(FramedDecoder):
         example = f"--option column={_cell(likely[0], cells)}" + ("" if likely[0].unit else " --option unit=cm")
         return f"{quoted}: state the column of the distance, counted from 0, and its unit: for example {example}{time}"
 
-    def _found(self, text: str) -> Found:
+    def _found(self, text: str) -> FoundNumber:
         comma = has_decimal_comma(text, self._separator)
         separator = re.escape(self._separator) if self._separator else r"[\s;]+" if comma else r"[\s,;]+"
         ends = [match.span() for match in re.finditer(separator, text)]
         cells = list(zip([0, *(end for _, end in ends)], [*(start for start, _ in ends), len(text)], strict=True))
         return text, numbers(text, decimal_comma=bool(comma), colon_separates=self._separator == ":"), cells
 
-    def _distance(self, line: Found) -> Number | None:
+    def _distance(self, line: FoundNumber) -> Number | None:
         text, known, _ = line
         if self._column is not None:
             number = _at(self._column, line)
@@ -189,7 +189,7 @@ def _text(line: bytes) -> str:
     return text if text.replace("\t", " ").isprintable() else ""
 
 
-def _at(where: int | str, line: Found) -> Number | None:
+def _at(where: int | str, line: FoundNumber) -> Number | None:
     """Return the number in a cell, given by its index, or behind a name; None unless it is the only one there."""
     _, known, cells = line
     if isinstance(where, int):
@@ -206,14 +206,14 @@ def _cell(number: Number, cells: list[tuple[int, int]]) -> int:
     return next(index for index, (begin, end) in enumerate(cells) if begin <= number.start <= end)
 
 
-def _counts(cell: int, lines: list[Found]) -> bool:
+def _counts(cell: int, lines: list[FoundNumber]) -> bool:
     """Return whether the numbers of a cell count evenly, apart from lines that were lost."""
     values = [number.value for line in lines if (number := _at(cell, line)) is not None]
     steps = [b - a for a, b in pairwise(values)]
     return len(steps) >= 4 and min(steps) > 0 and sorted(steps)[3 * len(steps) // 4] <= 1.5 * min(steps)
 
 
-def _whole(where: int | str | None, line: Found, scale: float | None) -> int | None:
+def _whole(where: int | str | None, line: FoundNumber, scale: float | None) -> int | None:
     """Return the scaled whole number in a column; -1 without a column, None without a valid number of at least 0.
 
     Without a scale, the number is a time in the unit printed with it, else in microseconds.

@@ -20,9 +20,9 @@ COUNTER_PPM = 100_000.0
 
 STALL_S = 0.25
 """Minimum delay of a stall, s; delays by jitter are shorter."""
-SILENCE_S = 0.05
+SILENCE_STEP_S = 0.05
 """Minimum step in the delays that indicates a silence, s."""
-STEP_S = 0.02
+JUMP_STEP_S = 0.02
 """Minimum step in the minimum delay that indicates a clock jump, s: USB bridges delay by 16 ms (FTDI AN232B-04)."""
 MIN_SAMPLES = 24
 MAX_SAMPLES = 1 << 19
@@ -159,7 +159,7 @@ def _stalls(x: F8, delay: F8, late: F8) -> list[tuple[int, int]]:
     spread, while a stall includes a silence or delivers its readings together.
     """
     change = np.diff(delay)
-    silence = np.concatenate([[False], change > max(SILENCE_S, 5.0 * float(np.median(np.abs(change))))])
+    silence = np.concatenate([[False], change > max(SILENCE_STEP_S, 5.0 * float(np.median(np.abs(change))))])
     edges = np.flatnonzero(np.diff(np.concatenate([[False], late > 0.0, [False]]).astype(np.int8)))
     stalls = []
     for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -179,7 +179,7 @@ def _steps(x: F8, delay: F8) -> I8:
     dx, rise = np.diff(x[lowest]), np.diff(delay[lowest])
     deviation = rise - float(np.median(rise / dx)) * dx
     scatter = 1.4826 * float(np.median(np.abs(deviation - np.median(deviation))))
-    jumps = np.flatnonzero(np.abs(deviation) > max(STEP_S, 10.0 * scatter))
+    jumps = np.flatnonzero(np.abs(deviation) > max(JUMP_STEP_S, 10.0 * scatter))
     return np.array([parts[at + 1][0] for at in jumps.tolist()], np.int64)
 
 

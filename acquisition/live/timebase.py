@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from acquisition.block import ClockKind, Flag
 from acquisition.errors import SensorError
+from acquisition.live.clock_fit import NANO
 from acquisition.readings import Reading
 
 RATES_HZ = (1e-6, 1e9)
@@ -21,7 +22,6 @@ KEPT_GAPS = 10_000
 
 WRAP_US = 1 << 32
 WRAP_S = WRAP_US * 1e-6
-NANO = 1e-9
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from springmass.session.session import Session
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
 
-RATE_HZ, BLOCK = 100.0, 16
+SIMULATED_RATE_HZ, BLOCK_SAMPLES = 100.0, 16
 SIGMA_M = 8e-5  # noise of a simulated rangefinder if its scene states none
 POLL_S = 0.05
 
@@ -119,7 +119,7 @@ def _clock(speed: float) -> Clock:
 def _bench(scene: Scene, speed: float) -> _Played:
     """Return a simulated bench, whose samples are made as they are wanted."""
     sigma_m = SIGMA_M if scene.sensor_sigma_m is None else scene.sensor_sigma_m.value
-    info, nothing = SourceInfo("simulated", "scene", RATE_HZ, sigma_m), concatenate(())
+    info, nothing = SourceInfo("simulated", "scene", SIMULATED_RATE_HZ, sigma_m), concatenate(())
     track, tables = to_track(nothing, info), scene.to_mapping()
     loaded = Loaded(Path("scene"), "memory", info, "distance", "", nothing, track, scene=tables)
     return _Played(loaded, _swing(scene, sigma_m, _clock(speed), speed))
@@ -128,11 +128,11 @@ def _bench(scene: Scene, speed: float) -> _Played:
 def _swing(scene: Scene, sigma_m: float, clock: Clock, speed: float) -> Iterator[Block]:
     """Yield the samples of a simulated rangefinder without end, each block when its last sample is due."""
     position, rng, began_ns = bench_position(scene), np.random.default_rng(0), clock.now_ns()
-    for first in count(0, BLOCK):
-        t = np.arange(first, first + BLOCK) / RATE_HZ
-        distance = np.array([position(each) for each in t]) + sigma_m * rng.standard_normal(BLOCK)
+    for first in count(0, BLOCK_SAMPLES):
+        t = np.arange(first, first + BLOCK_SAMPLES) / SIMULATED_RATE_HZ
+        distance = np.array([position(each) for each in t]) + sigma_m * rng.standard_normal(BLOCK_SAMPLES)
         clock.sleep_until_ns(began_ns + int(1e9 * t[-1] / speed))
-        yield Block(first, t, distance, np.zeros(BLOCK, np.uint8))
+        yield Block(first, t, distance, np.zeros(BLOCK_SAMPLES, np.uint8))
 
 
 class _Played:

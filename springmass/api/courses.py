@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from failure import Error
 from springmass.api.analysing import AnalysisKeywords, AnyScene, analyse
-from springmass.course.results_csv import NUMBERS, WHOLE, columns_of, read_rows
+from springmass.course.results_csv import NUMERIC_COLUMNS, WHOLE, columns_of, read_rows
 from springmass.course.worker import row_of
 
 if TYPE_CHECKING:
@@ -93,4 +93,6 @@ def _frame(rows: Sequence[dict[str, Any]], tags: Sequence[str]) -> pd.DataFrame:
     import pandas as pd
 
     frame = pd.DataFrame(rows, columns=columns_of(tags))
-    return frame.astype({name: "float64" if name in NUMBERS else "Int64" for name in (*NUMBERS, *WHOLE)})
+    return frame.astype(
+        {name: "float64" if name in NUMERIC_COLUMNS else "Int64" for name in (*NUMERIC_COLUMNS, *WHOLE)}
+    )

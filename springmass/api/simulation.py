@@ -18,11 +18,11 @@ from springmass.runs.simulating.simulation import band_of, default_tolerance, in
 if TYPE_CHECKING:
     import xarray as xr
 
-Step = Callable[[float, float, float, Callable[[float, float], float]], tuple[float, float]]
+StepFunction = Callable[[float, float, float, Callable[[float, float], float]], tuple[float, float]]
 
 
 def simulate(
-    scene: AnyScene, t: ArrayLike, *, method: str | Step = "auto", tolerance: float | None = None
+    scene: AnyScene, t: ArrayLike, *, method: str | StepFunction = "auto", tolerance: float | None = None
 ) -> xr.Dataset:
     """Solve the equation of motion that a scene implies, as ``springmass simulate`` does.
 
@@ -86,6 +86,6 @@ def simulate(
     return xr.Dataset(data, time, {name: value for name, value in about.items() if value not in (None, "")})
 
 
-def _own(step: Step) -> OneStep:
+def _own(step: StepFunction) -> OneStep:
     name = getattr(step, "__name__", "own")
     return OneStep(name, name, 1, lambda equation, h: lambda y, v: step(y, v, h, acceleration(equation)))

@@ -15,7 +15,9 @@ from springmass.runs.run import Run
 from springmass.runs.scenes import scene_from
 
 FEWEST = 32  # samples before the first analysis
-GROWTH = 1.1  # the next analysis waits for so many times as many samples, so a second of data costs the same throughout
+SAMPLES_RATIO = (
+    1.1  # the next analysis waits for so many times as many samples, so a second of data costs the same throughout
+)
 
 
 class Stream:
@@ -55,7 +57,7 @@ class Stream:
         self._y.append(np.atleast_1d(np.asarray(y, np.float64)))
         self._count += self._t[-1].size
         if self._count >= self._due:
-            self._due = int(self._count * GROWTH) + 1
+            self._due = int(self._count * SAMPLES_RATIO) + 1
             with contextlib.suppress(AnalysisError):  # too few are usable so far; ``finish`` says so
                 self._run = self._analysed()
         return self._run

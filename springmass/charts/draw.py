@@ -26,8 +26,11 @@ if TYPE_CHECKING:
 
 PictureFormat = Literal["svg", "pdf", "png"]
 STYLE = Path(__file__).with_name("figures.mplstyle")
-WIDTH = 7.2  # inches, the width of the text on A4
-MOST_OF_LINE, RASTER_POINTS = 3000, 300  # of a line; more markers than the latter are pixels, which are fewer bytes
+FIGURE_WIDTH_IN = 7.2  # inches, the width of the text on A4
+MOST_OF_DRAWN_LINE, RASTER_POINTS = (
+    3000,
+    300,
+)  # of a line; more markers than the latter are pixels, which are fewer bytes
 LONG_LABEL = 30  # characters; three columns of such labels fill the width of a page
 
 
@@ -91,7 +94,7 @@ def figure_of(chart: Chart) -> Figure:
         again = [panel for panel in chart.panels if panel.x_label == chart.panels[0].x_label]
         parts += [(panel, chart.detail) for panel in again]
     heights = [panel.height * 1.15 if panel.equal else max(1.3, 0.8 * panel.height) for panel, _ in parts]
-    width = 5.6 if any(panel.equal for panel in chart.panels) else WIDTH
+    width = 5.6 if any(panel.equal for panel in chart.panels) else FIGURE_WIDTH_IN
     figure = Figure(figsize=(width, sum(heights) + 0.3), layout="constrained")
     axes = list(figure.subplots(len(parts), 1, squeeze=False, height_ratios=heights).ravel())
     figure.align_ylabels(axes)
@@ -141,7 +144,7 @@ def draw(panel: Panel, ax: Axes) -> Axes:
     low, high = panel.reach()
     others = list(dict.fromkeys(one.label for one in panel.series if one.role == "other"))
     named: set[str] = set()
-    for i, series in enumerate(each if panel.equal else thinned(each, MOST_OF_LINE) for each in panel.series):
+    for i, series in enumerate(each if panel.equal else thinned(each, MOST_OF_DRAWN_LINE) for each in panel.series):
         label = "_" if series.label in named else series.label.replace("$", r"\$")
         named.add(series.label)
         number = others.index(series.label) if series.role == "other" else 0

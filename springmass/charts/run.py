@@ -32,8 +32,8 @@ EXPONENTIAL = "linear"
 MOST_NAMED = 4  # laws with an entry of their own in the legend
 DETAIL_PERIODS = 8
 PER_PERIOD = 26  # points of a drawn period: a polygon that looks round
-MOST_PERIODS = 460  # of more periods the envelope is drawn, which a screen cannot tell from the motion
-MOST_STRETCHES, LEAST_WINDOWS = 24, 6
+MOST_PERIODS_DRAWN = 460  # of more periods the envelope is drawn, which a screen cannot tell from the motion
+MOST_STRETCHES, FEWEST_WINDOWS = 24, 6
 TURNS_OF_SAMPLES = 24  # more would cover each other
 MOST_TURNS = 230  # of the phase plot: 6000 points, of which none may be left out
 MOST_SLIDING = 2000  # amplitudes of the classic method, which overlap
@@ -101,9 +101,9 @@ def _fit_lines(a: Analysis, motion: Oscillation, factor: float) -> list[Series]:
     inside = np.isfinite(a.track.t) & ((a.flags & Quality.OUTSIDE) == 0)
     start, end = float(np.min(a.track.t[inside])), float(np.max(a.track.t[inside]))
     periods = (end - start) * motion.cycles.frequency_hz
-    grid = np.linspace(start, end, int(PER_PERIOD * min(periods, MOST_PERIODS)) + 2)
+    grid = np.linspace(start, end, int(PER_PERIOD * min(periods, MOST_PERIODS_DRAWN)) + 2)
     rest = motion.rest.at(grid)
-    if periods <= MOST_PERIODS:
+    if periods <= MOST_PERIODS_DRAWN:
         return [line_of("fit", grid, (rest + model_motion(motion, grid)[0]) * factor)]
     reach = motion.damping.best.amplitude(grid - motion.damping.t0)
     return [line_of("fit: rest ± amplitude", grid, (rest + s * reach) * factor) for s in (1, -1)]
@@ -194,7 +194,7 @@ def frequency(a: Analysis) -> Chart | None:
     In each stretch a straight line is fitted to the phases of its windows, weighted by their inverse variances, which
     are multiplied by the reduced chi-square of all phases if that exceeds one.
     """
-    if not isinstance(a.motion, Oscillation) or a.motion.demodulated.t.size < LEAST_WINDOWS:
+    if not isinstance(a.motion, Oscillation) or a.motion.demodulated.t.size < FEWEST_WINDOWS:
         return None
     phase, windows = a.motion.phase, a.motion.demodulated
     order = np.argsort(windows.t, kind="stable")
@@ -432,9 +432,9 @@ def charts_of(
 SHOWN_MULTIPLES = 8.0  # range of the spectrum in multiples of the oscillation's frequency
 LEAST_ROWS = 8
 MOST_PEAKS, MOST_TRIED = 5, 200
-FALSE_ALARM = 1e-3  # probability that white noise has a labelled peak
+PEAK_FALSE_ALARM = 1e-3  # probability that white noise has a labelled peak
 SURROUNDINGS = 101  # rows whose median is the noise level around a peak
-APART = 0.03  # of the range of frequencies; of two peaks that are nearer, the higher is labelled
+PEAK_SPACING = 0.03  # of the range of frequencies; of two peaks that are nearer, the higher is labelled
 
 
 def spectrum_of(a: Analysis, motion: Oscillation) -> tuple[F8, F8, F8] | None:
@@ -470,14 +470,14 @@ def peaks_of(amplitude: F8) -> list[int]:
     The amplitudes of white noise have a Rayleigh distribution: with probability :math:`\\alpha`, the largest of n
     exceeds :math:`\\sqrt{\\ln(n/\\alpha)/\\ln 2}` times their median.
     """
-    limit = np.sqrt(np.log(amplitude.size / FALSE_ALARM) / np.log(2.0))
+    limit = np.sqrt(np.log(amplitude.size / PEAK_FALSE_ALARM) / np.log(2.0))
     inner = amplitude[1:-1]
     # scipy has functions for both, but they take longer to import than all charts take to make.
     tops = np.flatnonzero((inner > amplitude[:-2]) & (inner >= amplitude[2:])) + 1
     taken: list[int] = []
     for row in tops[np.argsort(amplitude[tops])[::-1]][:MOST_TRIED].tolist():
         noise = float(np.median(amplitude[max(row - SURROUNDINGS // 2, 0) : row + SURROUNDINGS // 2 + 1]))
-        alone = all(abs(row - other) > APART * amplitude.size for other in taken)
+        alone = all(abs(row - other) > PEAK_SPACING * amplitude.size for other in taken)
         if len(taken) < MOST_PEAKS and alone and amplitude[row] > limit * max(noise, 1e-30):
             taken.append(row)
     return taken

@@ -115,7 +115,7 @@ def course(label: str, rows: Sequence[tuple[str, float, float]], differing: Mapp
     return Chart("course", "All runs", "Point at a run to read its name.", (panel,))
 
 
-BINS, FEWEST_BINS = 60, 8
+MOST_BINS, FEWEST_BINS = 60, 8
 
 
 def outline(analysis: Analysis) -> str:
@@ -129,7 +129,7 @@ def outline(analysis: Analysis) -> str:
     span = t[-1] - t[0]
     # A bin shorter than a period would not show the outline.
     period = analysis.estimates.get("period")
-    count = BINS if period is None else int(np.clip(span / period.value, FEWEST_BINS, BINS))
+    count = MOST_BINS if period is None else int(np.clip(span / period.value, FEWEST_BINS, MOST_BINS))
     ends = np.searchsorted(t, t[0] + span * np.arange(count + 1) / count)
     filled = np.flatnonzero(np.diff(ends))
     low, high = (edge.reduceat(y, ends[filled]) for edge in (np.minimum, np.maximum))
@@ -142,8 +142,8 @@ def outline(analysis: Analysis) -> str:
     return "M" + "L".join(f"{a:g} {b:g}" for a, b in edge) + "Z"
 
 
-POINTS = 8  # of one run
-LARGEST = 1e100  # maximum magnitude of a number in a row, whose square is still finite; larger ones are left out
+POINTS_OF_RUN = 8  # of one run
+LARGEST_DRAWN = 1e100  # maximum magnitude of a number in a row, whose square is still finite; larger ones are left out
 
 
 def drag_points(analysis: Analysis) -> list[list[float]]:
@@ -159,13 +159,13 @@ def drag_points(analysis: Analysis) -> list[list[float]]:
     order = np.argsort(lengths)
     if not lengths[order[0]] > 0:
         return []
-    at = np.geomspace(lengths[order[0]], lengths[order[-1]], POINTS)
+    at = np.geomspace(lengths[order[0]], lengths[order[-1]], POINTS_OF_RUN)
     value, u = (np.interp(at, lengths[order], each[order]) for each in (curve.y, curve.u))
     # The Re estimate uses the rms velocity of the whole run; at amplitude A the rms velocity is omega A / sqrt 2.
     per_velocity = estimates["reynolds_number"].value / estimates["velocity_rms"].value
     reynolds = per_velocity * estimates["angular_frequency"].value * at / np.sqrt(2.0)
     points = np.column_stack([reynolds, 2.0 * np.pi * at / diameter.value, value, u])
-    kept = np.isfinite(points).all(axis=1) & (np.abs(points).max(axis=1) <= LARGEST)
+    kept = np.isfinite(points).all(axis=1) & (np.abs(points).max(axis=1) <= LARGEST_DRAWN)
     return [[float(f"{x:.6g}") for x in point] for point in points[kept].tolist()]
 
 

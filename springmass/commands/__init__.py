@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions
 
 EVERY_COMMAND = Group("Every command", sort_key=5)
-FIRST = {
+MAIN_COMMANDS = {
     "demo": "Analyse and compare the bundled recordings.",
     "analyse": "Print period, damping and warnings of recordings; write a report.",
     "explain": "Explain a warning, or list all of them.",
@@ -32,7 +32,7 @@ FIRST = {
     "page": "Show a recording in a browser, live or afterwards.",
 }
 """The commands that a student, a course and a bench need, with their help."""
-FURTHER = {
+FURTHER_COMMANDS = {
     "recover": "Build a run file from a wire log, even from a damaged one.",
     "replay": "Play a recording through the interface of a live sensor.",
     "convert": "Convert a recording, or extract the original from a run file.",
@@ -42,7 +42,7 @@ FURTHER = {
     "firmware": "Wire and set the 100 Hz rangefinder; how to flash it.",
     "doctor": "Check this installation.",
 }
-COMMANDS = (*FIRST, *FURTHER)
+COMMANDS = (*MAIN_COMMANDS, *FURTHER_COMMANDS)
 
 
 def _columns(console: Console, options: ConsoleOptions, panel: HelpPanel) -> None:
@@ -71,7 +71,10 @@ app = App(
 app.meta.suppress_keyboard_interrupt = False
 app["--help"].help = "show this help"
 app["--version"].help = "show the version"
-for _group, _commands in ((Group("Commands", sort_key=1), FIRST), (Group("Further commands", sort_key=2), FURTHER)):
+for _group, _commands in (
+    (Group("Commands", sort_key=1), MAIN_COMMANDS),
+    (Group("Further commands", sort_key=2), FURTHER_COMMANDS),
+):
     for _name, _words in _commands.items():
         _order = COMMANDS.index(_name)
         app.command(f"springmass.commands.{_name}:{_name}", name=_name, help=_words, group=_group, sort_key=_order)

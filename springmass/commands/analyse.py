@@ -16,7 +16,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from springmass.commands.options import FURTHER, BenchOptions, Figures, File, Json, Scenes, Strict
+from springmass.commands.options import FURTHER_OPTIONS, BenchOptions, FiguresOption, FileArgument, Json, Scenes, Strict
 from springmass.errors import (
     OK,
     REJECTED,
@@ -51,23 +51,26 @@ class AnalyseOptions:
 
     scene: Scenes = ()
     method: Annotated[
-        Literal["classic"] | None, option("NAME", "also apply the lab report's classic method, for comparison"), FURTHER
+        Literal["classic"] | None,
+        option("NAME", "also apply the lab report's classic method, for comparison"),
+        FURTHER_OPTIONS,
     ] = None
-    output: Annotated[File | None, output("DIR", "output folder (default: here; with --json: none)")] = None
+    output: Annotated[FileArgument | None, output("DIR", "output folder (default: here; with --json: none)")] = None
     no_report: Annotated[bool, flag("print the results, but write no files")] = False
     full: Annotated[bool, flag("print all warnings and notes, and the sources of uncertainty")] = False
-    template: Annotated[Literal["latex"] | None, option("KIND", "also write a lab report template: latex"), FURTHER] = (
-        None
-    )
-    figures: Annotated[Figures, FURTHER] = ()
-    si: Annotated[bool, flag("print SI units without prefixes"), FURTHER] = False
+    template: Annotated[
+        Literal["latex"] | None, option("KIND", "also write a lab report template: latex"), FURTHER_OPTIONS
+    ] = None
+    figures: Annotated[FiguresOption, FURTHER_OPTIONS] = ()
+    si: Annotated[bool, flag("print SI units without prefixes"), FURTHER_OPTIONS] = False
     json: Json = False
-    strict: Annotated[Strict, FURTHER] = False
+    strict: Annotated[Strict, FURTHER_OPTIONS] = False
 
 
 def analyse(
     *recordings: Annotated[
-        File, argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True)
+        FileArgument,
+        argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True),
     ],
     options: AnalyseOptions = AnalyseOptions(),
     how: AnalysisOptions = AnalysisOptions(),

@@ -9,14 +9,14 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from springmass.commands.options import File, refuse
-from springmass.course.page import GROUPS, PAGE
+from springmass.commands.options import FileArgument, refuse
+from springmass.course.page import COURSE_PAGE, GROUPS_FILE
 from springmass.course.plan import plan, template
 from springmass.course.results_csv import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
-from springmass.parameters import Count, WholeNumber, argument, flag, option, output
+from springmass.parameters import PositiveCount, WholeNumber, argument, flag, option, output
 from springmass.runs.options import AnalysisOptions
 from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
@@ -28,12 +28,14 @@ class BatchOptions:
     """The options of ``springmass batch``."""
 
     output: Annotated[
-        File | None, output("DIR", "folder for table, page and reports; an existing course is continued")
+        FileArgument | None, output("DIR", "folder for table, page and reports; an existing course is continued")
     ] = None
-    runs: Annotated[File | None, option("FILE", "CSV table with what you know about each run")] = None
+    runs: Annotated[FileArgument | None, option("FILE", "CSV table with what you know about each run")] = None
     template: Annotated[bool, flag("print an empty table for --runs to fill in")] = False
-    scene: Annotated[File | None, option("FILE", "scene file for all runs; values in the table take precedence")] = None
-    jobs: Annotated[Count | None, option("N", "number of processes (default: one per core)")] = None
+    scene: Annotated[
+        FileArgument | None, option("FILE", "scene file for all runs; values in the table take precedence")
+    ] = None
+    jobs: Annotated[PositiveCount | None, option("N", "number of processes (default: one per core)")] = None
     dask: Annotated[str | None, option("ADDRESS", "analyse on the workers of this dask scheduler")] = None
     reports: Annotated[
         WholeNumber, option("N", "write full reports of the N runs that most need a look (default: 20)")
@@ -41,7 +43,7 @@ class BatchOptions:
 
 
 def batch(
-    *recordings: Annotated[File, argument("INPUT", "recordings, folders (with subfolders), or patterns")],
+    *recordings: Annotated[FileArgument, argument("INPUT", "recordings, folders (with subfolders), or patterns")],
     options: BatchOptions = BatchOptions(),
     how: AnalysisOptions = AnalysisOptions(),
 ) -> int:
@@ -78,8 +80,10 @@ def batch(
         complain(line)
     failed = sum(row["status"] in FAILED for row in rows)
     tell(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
-    suggest(f"open {folder / PAGE} in a browser")
-    tell(f"written: {folder / PAGE}, {folder / GROUPS}, {folder / CSV}; the data are in {folder / DATABASE}")
+    suggest(f"open {folder / COURSE_PAGE} in a browser")
+    tell(
+        f"written: {folder / COURSE_PAGE}, {folder / GROUPS_FILE}, {folder / CSV}; the data are in {folder / DATABASE}"
+    )
     if failed and failed == len(rows):
         return UNREADABLE
     return SOME_FAILED if failed or unwritten else OK

@@ -14,12 +14,12 @@ from cyclopts import Parameter
 
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
-from springmass.commands.options import Figures, File, Json, Scenes, Strict, refuse
+from springmass.commands.options import FiguresOption, FileArgument, Json, Scenes, Strict, refuse
 from springmass.course.results_csv import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
 from springmass.parameters import Share, argument, option, output
 from springmass.runs.comparing import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
-from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
+from springmass.runs.json_results import RESULT_SCHEMA, plain, provenance_of, rejected
 from springmass.runs.options import AnalysisOptions
 from springmass.runs.outputs import distinct_names, make_folder, now_utc
 from springmass.runs.run import Run, Task, analysed, law_lines
@@ -39,20 +39,21 @@ class CompareOptions:
         Share, option("R", "correlation between the errors of two bobs' masses (default: 0)")
     ] = 0.0
     reported: Annotated[
-        File | None, option("FILE", "table of printed values to judge: columns run, name, value, u, unit")
+        FileArgument | None, option("FILE", "table of printed values to judge: columns run, name, value, u, unit")
     ] = None
     hooke: Annotated[
-        File | None, option("FILE", "table of masses and rest positions: k by Hooke's law beside that of the runs")
+        FileArgument | None,
+        option("FILE", "table of masses and rest positions: k by Hooke's law beside that of the runs"),
     ] = None
-    output: Annotated[File | None, output("DIR", "folder for a report (default: write no report)")] = None
-    figures: Figures = ()
+    output: Annotated[FileArgument | None, output("DIR", "folder for a report (default: write no report)")] = None
+    figures: FiguresOption = ()
     json: Json = False
     strict: Strict = False
 
 
 def compare(
     *recordings: Annotated[
-        File, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
+        FileArgument, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
     ],
     options: CompareOptions = CompareOptions(),
     how: AnalysisOptions = AnalysisOptions(),
@@ -104,7 +105,7 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
     found = compare_rows(rows)
     print(
-        json.dumps({"schema": SCHEMA, **plain(found)}, allow_nan=False)
+        json.dumps({"schema": RESULT_SCHEMA, **plain(found)}, allow_nan=False)
         if options.json
         else visible_lines(_course_text(found))
     )

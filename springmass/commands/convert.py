@@ -8,7 +8,7 @@ from pathlib import Path, PurePath
 from typing import Annotated
 
 from acquisition.recordings.writers import WRITERS
-from springmass.commands.options import PART, File, Overwrite, refuse
+from springmass.commands.options import PART, FileArgument, Overwrite, refuse
 from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
 from springmass.parameters import argument, option, output
 from springmass.runs.loading import Loaded, load
@@ -21,14 +21,14 @@ RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
 
 
 def convert(
-    recording: Annotated[File, argument("IN", "recording, run file or wire log")],
+    recording: Annotated[FileArgument, argument("IN", "recording, run file or wire log")],
     target: Annotated[
-        File | None, argument("OUT", ".h5 (run file), .txt (pair) or .csv; or a folder to copy the original to")
+        FileArgument | None, argument("OUT", ".h5 (run file), .txt (pair) or .csv; or a folder to copy the original to")
     ] = None,
     /,
     *,
-    output: Annotated[File | None, output("OUT", "the output, instead of a second argument")] = None,
-    scene: Annotated[File | None, option("FILE", "scene file to store in the run file")] = None,
+    output: Annotated[FileArgument | None, output("OUT", "the output, instead of a second argument")] = None,
+    scene: Annotated[FileArgument | None, option("FILE", "scene file to store in the run file")] = None,
     overwrite: Overwrite = False,
     read: ReadOptions = ReadOptions(),
 ) -> int:

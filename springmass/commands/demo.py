@@ -8,7 +8,7 @@ from typing import Annotated
 
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import File
+from springmass.commands.options import FileArgument
 from springmass.errors import OK, suggest
 from springmass.parameters import output
 from springmass.report.write import write_report
@@ -21,18 +21,18 @@ from springmass.runs.scenes import read_scene
 from springmass.terminal.printing import findings_text, text_table
 from springmass.terminal.style import style_of
 
-RUNS = ("undamped", "damped")
+BUNDLED_RUNS = ("undamped", "damped")
 
 
 def demo(
-    *, output: Annotated[File, output("DIR", "output folder (default: springmass-demo)")] = "springmass-demo"
+    *, output: Annotated[FileArgument, output("DIR", "output folder (default: springmass-demo)")] = "springmass-demo"
 ) -> int:
     """Replay both recordings into run files, analyse and compare them, print Table 1, write the report."""
     out = make_folder(output)
-    runs = [_one(name, out) for name in RUNS]
+    runs = [_one(name, out) for name in BUNDLED_RUNS]
     compared = compare_runs(runs)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
-    print(text_table(RUNS, [a.analysis for a in runs], style_of(sys.stdout)))
+    print(text_table(BUNDLED_RUNS, [a.analysis for a in runs], style_of(sys.stdout)))
     for one in runs:
         print(f"\n{one.name.capitalize()}:")
         print(findings_text(one.result["findings"]))

@@ -21,7 +21,7 @@ LIBRARIES = (
     *("serial", "nptdms", "python_calamine", "rich", "cyclopts", "tomli_w", "platformdirs", "starlette", "uvicorn"),
     *("websockets", "segno", "msgspec"),
 )
-Check = tuple[str, bool, str, str]
+InstallationCheck = tuple[str, bool, str, str]
 """The name of a check, whether it is met, what was found, and what to do if it is not."""
 
 
@@ -29,7 +29,7 @@ def doctor(*, as_json: Json = False) -> int:
     """Print every check; exit with 1 where one failed."""
     from acquisition.errors import visible  # imported here because doctor checks for a foreign package of this name
 
-    checks: list[Check] = [*_packages(), *_libraries()]
+    checks: list[InstallationCheck] = [*_packages(), *_libraries()]
     if whole := all(ok for _, ok, _, _ in checks):
         checks += [_bundled(), _round_trip()]  # these run the packages and libraries
         whole = all(ok for _, ok, _, _ in checks)
@@ -44,7 +44,7 @@ def doctor(*, as_json: Json = False) -> int:
     return OK if whole else SOME_FAILED
 
 
-def _packages() -> Iterator[Check]:
+def _packages() -> Iterator[InstallationCheck]:
     """Check Python, and that our packages are found and no others of these names, without running them.
 
     In a checkout they have names that other distributions use too; a wheel has them inside ``springmass``.
@@ -58,7 +58,7 @@ def _packages() -> Iterator[Check]:
         yield f"package {name}", place == part(name), found, remedy
 
 
-def _libraries() -> Iterator[Check]:
+def _libraries() -> Iterator[InstallationCheck]:
     for name in LIBRARIES:
         remedy = "install springmass again: pip install --force-reinstall"
         try:
@@ -69,7 +69,7 @@ def _libraries() -> Iterator[Check]:
         yield f"library {name}", ok, found, remedy
 
 
-def _bundled() -> Check:
+def _bundled() -> InstallationCheck:
     from springmass.runs.loading import sample_data
 
     try:
@@ -78,7 +78,7 @@ def _bundled() -> Check:
         return "bundled recordings", False, str(error), "install springmass again"
 
 
-def _round_trip() -> Check:
+def _round_trip() -> InstallationCheck:
     """Write a run file and read it back: HDF5, its filters and the temporary folder in one."""
     import numpy as np
 

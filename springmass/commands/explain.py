@@ -14,8 +14,8 @@ from springmass.errors import OK, ProgramError
 from springmass.parameters import argument
 from springmass.terminal.printing import wrapped
 
-COLUMNS = 80
-INDENT = " " * 9
+PAGE_WIDTH = 80
+EXPLANATION_INDENT = " " * 9
 
 
 def explain(
@@ -64,11 +64,13 @@ def _explained(code: str, kind: Kind) -> str:
     if kind.figure:
         rows.append(("Figure", f"The {kind.figure} figure of the report shows it."))
     lines = [f"{code} ({severity}; {kind.symptom.lower()})"]
-    return "\n".join([*lines, *(wrapped(f"{name + ':':<9}{text}", INDENT, COLUMNS) for name, text in rows)])
+    return "\n".join(
+        [*lines, *(wrapped(f"{name + ':':<9}{text}", EXPLANATION_INDENT, PAGE_WIDTH) for name, text in rows)]
+    )
 
 
 def _listed(known: Mapping[str, Kind]) -> str:
     groups: dict[str, list[str]] = {}
     for code, kind in known.items():
-        groups.setdefault(kind.symptom, []).append(wrapped(f"  {code}: {kind.meaning}", " " * 6, COLUMNS))
+        groups.setdefault(kind.symptom, []).append(wrapped(f"  {code}: {kind.meaning}", " " * 6, PAGE_WIDTH))
     return "\n\n".join("\n".join([symptom, *lines]) for symptom, lines in groups.items())

@@ -13,7 +13,7 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.family import Identity
 from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.errors import visible
-from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
+from acquisition.live.firmware import BOOTLOADER_BAUDS, FIRMWARE_VERSION, HEX, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
 from springmass.errors import OK, SENSOR, ProgramError, suggest
 from springmass.parameters import Whole, option
@@ -69,9 +69,9 @@ def firmware(
 
 
 def _show_flashing(port: str) -> None:
-    print(f"firmware {VERSION}: {HEX}")
+    print(f"firmware {FIRMWARE_VERSION}: {HEX}")
     print("avrdude (Debian: apt install avrdude, macOS: brew install avrdude) writes it by the bootloader:")
-    for baud, boards in zip(BAUDS, ("Uno, Nano", "Nano with the old bootloader"), strict=True):
+    for baud, boards in zip(BOOTLOADER_BAUDS, ("Uno, Nano", "Nano with the old bootloader"), strict=True):
         print(f"  {shlex.join(avrdude_arguments(port, baud))}    # {boards}")
     print("or open firmware/springmass_rangefinder in the Arduino IDE, and press Upload")
 

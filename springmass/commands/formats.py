@@ -14,7 +14,7 @@ from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.identify import Inspection, inspect
 from acquisition.recordings.identify import formats as every_format
 from acquisition.recordings.recording import Survey
-from springmass.commands.options import PART, File, Json, refuse
+from springmass.commands.options import PART, FileArgument, Json, refuse
 from springmass.errors import OK, suggest
 from springmass.parameters import argument
 from springmass.runs.inputs import kind_of
@@ -31,7 +31,7 @@ WHY = {"run": "it begins with the signature of HDF5", "wire": "it begins with th
 
 
 def formats(
-    file: Annotated[File | None, argument("FILE", "identify this file")] = None,
+    file: Annotated[FileArgument | None, argument("FILE", "identify this file")] = None,
     /,
     *,
     as_json: Json = False,

@@ -15,10 +15,10 @@ from springmass.parameters import LawName, Positive, TcpPort, argument, flag, op
 from springmass.runs.options import ReadOptions
 from springmass.runs.questions import option_of
 
-File = str | Path
+FileArgument = str | Path
 """The name of a file; a shell completes it."""
 THE_PAGE = Group("The page", sort_key=4)
-FURTHER = Parameter(group=Group("Further options", sort_key=4))
+FURTHER_OPTIONS = Parameter(group=Group("Further options", sort_key=4))
 """Marks an option that few people use, which the help shows below the others."""
 
 
@@ -38,11 +38,11 @@ def _formats(_: Any, tokens: Sequence[Token]) -> tuple[str, ...]:
     return kinds
 
 
-Recording = Annotated[File, argument("INPUT", "recording, run file or wire log")]
+RecordingArgument = Annotated[FileArgument, argument("INPUT", "recording, run file or wire log")]
 Scenes = Annotated[
-    tuple[File, ...], option("FILE", "scene file: one for all inputs, or one per input in the same order")
+    tuple[FileArgument, ...], option("FILE", "scene file: one for all inputs, or one per input in the same order")
 ]
-Figures = Annotated[
+FiguresOption = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],
     Parameter(
         name="--figures",

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from springmass.commands.options import PART, PageOptions, Recording, refuse
+from springmass.commands.options import PART, PageOptions, RecordingArgument, refuse
 from springmass.errors import OK, ProgramError, manner, tell
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
@@ -23,7 +23,7 @@ from springmass.stops import STOPS
 
 
 def page(
-    recording: Recording,
+    recording: RecordingArgument,
     /,
     *,
     page: PageOptions = PageOptions(),

@@ -26,7 +26,7 @@ from pipeline.bench.air import speed_of_sound
 from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
-from springmass.commands.options import File, PageOptions, converted
+from springmass.commands.options import FileArgument, PageOptions, converted
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
 from springmass.page.recorder_side import PageProcess
 from springmass.parameters import (
@@ -83,13 +83,13 @@ class RecordOptions:
     sensor: Annotated[tuple[str, ...], option("NAME", "family of the sensor, from the list of `springmass ports`")] = ()
     simulate: Annotated[bool, flag("record a simulated bench instead of a port; --scene says which")] = False
     output: Annotated[
-        File | None, output("RUN.h5", "run file to create, never overwritten (default: date, time and title)")
+        FileArgument | None, output("RUN.h5", "run file to create, never overwritten (default: date, time and title)")
     ] = None
     seconds: Annotated[Positive | None, option("N", "length of the recording, s (default: until Ctrl-C)")] = None
     page: Annotated[bool, flag("show the recording in a browser, with buttons for marks and stop")] = False
     ready: Annotated[bool, flag("set zero, arm and record from the page; needs --page")] = False
     scene: Annotated[
-        File | None, option("FILE", "scene file to store with the run; its air sets the speed of sound")
+        FileArgument | None, option("FILE", "scene file to store with the run; its air sets the speed of sound")
     ] = None
     title: Annotated[str, option("TEXT", "title of the run")] = ""
     baud: Annotated[Whole | None, option("B", "baud rate of the ports (default: that of the sensor family)")] = None

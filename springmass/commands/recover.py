@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
-from springmass.commands.options import File, Overwrite
+from springmass.commands.options import FileArgument, Overwrite
 from springmass.errors import OK, suggest, tell
 from springmass.parameters import SpeedOfSound, argument, option, output
 from springmass.runs.outputs import made_now
@@ -15,10 +15,10 @@ from storage.recovery.recover import recover as build
 
 
 def recover(
-    log: Annotated[File, argument("RUN.wire", "wire log")],
+    log: Annotated[FileArgument, argument("RUN.wire", "wire log")],
     /,
     *,
-    output: Annotated[File | None, output("RUN.h5", "run file to create (default: next to the log)")] = None,
+    output: Annotated[FileArgument | None, output("RUN.h5", "run file to create (default: next to the log)")] = None,
     overwrite: Overwrite = False,
     speed_of_sound: Annotated[
         SpeedOfSound | None, option("C", "speed of sound for converting echo times, m/s (default: the log's)")

@@ -12,7 +12,7 @@ from cyclopts import Parameter, Token
 
 from acquisition.clock import SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import PART, Recording, refuse
+from springmass.commands.options import PART, RecordingArgument, refuse
 from springmass.errors import OK
 from springmass.parameters import Finite, flag, option
 from springmass.runs.loading import load
@@ -31,7 +31,7 @@ def _speed(_: Any, tokens: Sequence[Token]) -> float:
 
 
 def replay(
-    recording: Recording,
+    recording: RecordingArgument,
     /,
     *,
     speed: Annotated[

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Annotated
 
 from acquisition.errors import visible
-from springmass.commands.options import File, converted
+from springmass.commands.options import FileArgument, converted
 from springmass.errors import OK, ProgramError, suggest, tell
 from springmass.parameters import argument, option
 
-TEMPLATE = """\
+SCENE_TEMPLATE = """\
 # What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
 # { value = ..., u = ... } states a standard uncertainty; a plain number counts as exact. What is not known is not used.
 
@@ -61,12 +61,14 @@ def _mark(text: str) -> tuple[float, str]:
 
 def scene(
     recording: Annotated[
-        File | None, argument("RECORDING", "save scene, remarks and marks next to this recording")
+        FileArgument | None, argument("RECORDING", "save scene, remarks and marks next to this recording")
     ] = None,
     /,
     *,
-    check: Annotated[File | None, option("FILE", "show what a scene file states and which values are unusual")] = None,
-    scene: Annotated[File | None, option("FILE", "scene file to use with the recording from now on")] = None,
+    check: Annotated[
+        FileArgument | None, option("FILE", "show what a scene file states and which values are unusual")
+    ] = None,
+    scene: Annotated[FileArgument | None, option("FILE", "scene file to use with the recording from now on")] = None,
     note: Annotated[tuple[str, ...], option("TEXT", "a remark; may be repeated")] = (),
     mark: Annotated[
         tuple[tuple[float, str], ...],
@@ -92,7 +94,7 @@ def scene(
     if recording is None:
         if noted:
             raise ProgramError("--scene, --note and --mark belong to a recording; name it")
-        print(TEMPLATE, end="")
+        print(SCENE_TEMPLATE, end="")
         suggest("springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:

@@ -15,7 +15,7 @@ from pipeline.dynamics.band import Band
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
-from springmass.commands.options import Figures, File, Json, Overwrite
+from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite
 from springmass.errors import OK, ProgramError, suggest, tell
 from springmass.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.runs.json_results import picked
@@ -37,13 +37,13 @@ from springmass.runs.simulating.simulation import (
 )
 from springmass.terminal.printing import wrapped
 
-GROWTH = ("method", "predicted", "measured", "fails_above_s")
+GROWTH_COLUMNS = ("method", "predicted", "measured", "fails_above_s")
 
 
 def simulate(
     *,
     scene: Annotated[
-        File | None, option("S.toml", "scene file: masses, spring, start, damping (default: that of RUN)")
+        FileArgument | None, option("S.toml", "scene file: masses, spring, start, damping (default: that of RUN)")
     ] = None,
     method: Annotated[str, option("NAME", "integrator, or auto (default: auto)")] = "auto",
     dt: Annotated[Positive, option("S", "sampling interval and step of the solver, s (default: 0.01)")] = 0.01,
@@ -55,17 +55,17 @@ def simulate(
     ] = None,
     check: Annotated[bool, flag("also measure the error; this takes longer than the simulation")] = False,
     force: Annotated[bool, flag("simulate even if the step is unstable")] = False,
-    against: Annotated[File | None, option("RUN", "measured run to compare with the prediction")] = None,
-    output: Annotated[File | None, output("RUN.h5", "write the readings of a sensor to a run file")] = None,
+    against: Annotated[FileArgument | None, option("RUN", "measured run to compare with the prediction")] = None,
+    output: Annotated[FileArgument | None, output("RUN.h5", "write the readings of a sensor to a run file")] = None,
     overwrite: Overwrite = False,
     sensor: Annotated[Literal["ideal", "rangefinder"], option("NAME", "sensor of RUN.h5 (default: rangefinder)")] = (
         "rangefinder"
     ),
     seed: Annotated[Whole, option("N", "seed of the sensor's noise (default: 0)")] = 0,
     folder: Annotated[
-        File | None, option("DIR", "folder for NAME.simulated (default: here; with --json or -o: none)")
+        FileArgument | None, option("DIR", "folder for NAME.simulated (default: here; with --json or -o: none)")
     ] = None,
-    figures: Figures = (),
+    figures: FiguresOption = (),
     as_json: Json = False,
     read: ReadOptions = ReadOptions(),
 ) -> int:
@@ -109,7 +109,7 @@ def simulate(
     grown = growths(ready.problem, dt, count)
     print("\n".join(_grown(each) for each in grown), file=say)
     results, over = (
-        summary(simulation, effects, wanted, band) | {"growth": [picked(each, GROWTH) for each in grown]},
+        summary(simulation, effects, wanted, band) | {"growth": [picked(each, GROWTH_COLUMNS) for each in grown]},
         None,
     )
     if analysis is not None:

@@ -8,17 +8,17 @@ from typing import Annotated, Any
 
 from pipeline.analysis import Oscillation
 from springmass import __version__
-from springmass.commands.options import File, Json
+from springmass.commands.options import FileArgument, Json
 from springmass.errors import OK, UNREADABLE, ProgramError, manner
-from springmass.parameters import Count, Positive, argument, option
+from springmass.parameters import Positive, PositiveCount, argument, option
 from springmass.runs.options import AnalysisOptions
 from springmass.runs.run import Run
 from springmass.runs.scenes import read_scene
 from springmass.terminal.progress import counted
 from springmass.trade import (
-    QUANTITIES,
-    TROUBLES,
-    Motion,
+    RECORD_DEFECTS,
+    SCORED_QUANTITIES,
+    TrueMotion,
     measure_integrators,
     measure_tiers,
     motion_of,
@@ -27,17 +27,17 @@ from springmass.trade import (
 
 
 def trade(
-    recording: Annotated[File | None, argument("INPUT", "take the motion from this recording")] = None,
+    recording: Annotated[FileArgument | None, argument("INPUT", "take the motion from this recording")] = None,
     /,
     *,
-    scene: Annotated[File | None, option("FILE", "scene of the recording, or take the motion from it")] = None,
-    seeds: Annotated[Count, option("N", "simulated records of each kind (default: 20)")] = 20,
+    scene: Annotated[FileArgument | None, option("FILE", "scene of the recording, or take the motion from it")] = None,
+    seeds: Annotated[PositiveCount, option("N", "simulated records of each kind (default: 20)")] = 20,
     seconds: Annotated[Positive, option("S", "length of the records without a recording, s (default: 60)")] = 60.0,
     as_json: Json = False,
     how: AnalysisOptions = AnalysisOptions(),
 ) -> int:
     """Simulate records of one motion, evaluate them with every tier, and solve the motion with every integrator."""
-    motion = Motion(seconds=seconds)
+    motion = TrueMotion(seconds=seconds)
     stated = None if scene is None else read_scene(scene)
     if recording is not None:
         analysis = Run.of(recording, stated, how).analysis
@@ -56,7 +56,7 @@ def trade(
             f"expected a motion of two periods, got {motion.seconds:g} s at {motion.frequency_hz:.3g} Hz from "
             f"{motion.theta[0]:g} m; take more --seconds, or state a start in the scene"
         )
-    kinds = counted(measure_tiers(motion, seeds), len(TROUBLES), "kinds of records", quiet=manner()[0])
+    kinds = counted(measure_tiers(motion, seeds), len(RECORD_DEFECTS), "kinds of records", quiet=manner()[0])
     tiers = [row for rows in kinds for row in rows]
     problem = motion.problem()
     solved = [] if problem is None else [*measure_integrators(problem, 1.0 / motion.rate_hz, motion.t.size)]
@@ -82,7 +82,7 @@ def trade(
 
 def _tier(row: Mapping[str, Any]) -> list[str]:
     found = row["error_over_bound"]
-    errors = [f"{found[each]:.3g}" if each in found else "-" for each in QUANTITIES]
+    errors = [f"{found[each]:.3g}" if each in found else "-" for each in SCORED_QUANTITIES]
     return [row["record"], row["tier"], *errors, _ms(row), str(row["failed"] or "-")]
 
 

@@ -24,11 +24,11 @@ from typing import Any, TypeVar
 
 from springmass.errors import SOME_FAILED, ProgramError, adopt, manner
 
-Task = TypeVar("Task")
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 AHEAD = 2  # tasks handed out per worker, so that no worker waits for its next one
-MANY = 500  # tasks handed out if the number of workers is not known
-FEW = 3  # up to this many tasks, starting a second process takes longer than it saves
+TASKS_AHEAD = 500  # tasks handed out if the number of workers is not known
+FEW_TASKS = 3  # up to this many tasks, starting a second process takes longer than it saves
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ def workers(tasks: int, processes: int | None = None, dask: str | None = None) -
     if dask is not None:
         with _dask(dask) as cluster:
             yield cluster
-    elif number <= 1 or tasks <= FEW:
+    elif number <= 1 or tasks <= FEW_TASKS:
         yield Workers(_ThisProcess, 1)
     else:
         yield Workers(lambda: pool(number), AHEAD * number)
@@ -89,12 +89,12 @@ def _dask(address: str) -> Iterator[Workers]:
             executor.shutdown(wait=False)
 
     with client:
-        yield Workers(start, MANY, KilledWorker, address)
+        yield Workers(start, TASKS_AHEAD, KilledWorker, address)
 
 
 def outcomes(
-    work: Callable[[Task], Result], tasks: Iterable[Task], by: Workers
-) -> Iterator[list[tuple[Task, Result | None]]]:
+    work: Callable[[Item], Result], tasks: Iterable[Item], by: Workers
+) -> Iterator[list[tuple[Item, Result | None]]]:
     """Yield tasks with their results, those together that are finished at the same time; ``work`` is picklable.
 
     If a worker dies, the tasks that were handed out are repeated one by one. If a worker dies again during one of them,
@@ -109,11 +109,11 @@ def outcomes(
 
 
 def _until_one_dies(
-    work: Callable[[Task], Result], waiting: deque[Task], by: Workers, ahead: int
-) -> Generator[list[tuple[Task, Result | None]], None, list[Task]]:
+    work: Callable[[Item], Result], waiting: deque[Item], by: Workers, ahead: int
+) -> Generator[list[tuple[Item, Result | None]], None, list[Item]]:
     """Yield tasks and results of one executor until a worker dies; return the tasks that were lost with it."""
-    running: dict[Future[Result], Task] = {}
-    lost: list[Task] = []
+    running: dict[Future[Result], Item] = {}
+    lost: list[Item] = []
     with by.start() as executor:
         try:
             while running or (waiting and not lost):
@@ -123,7 +123,7 @@ def _until_one_dies(
                         running[executor.submit(work, task)] = task
                     except by.died:
                         lost.append(task)
-                done: list[tuple[Task, Result | None]] = []
+                done: list[tuple[Item, Result | None]] = []
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     task = running.pop(future)
                     try:

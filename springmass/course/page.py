@@ -21,8 +21,8 @@ from springmass.report.advice import sentence
 from springmass.terminal.printing import visible_lines
 from storage.atomic import write_whole
 
-PAGE, GROUPS = "index.html", "groups.txt"
-SHOWN = {
+COURSE_PAGE, GROUPS_FILE = "index.html", "groups.txt"
+COLUMN_HEADINGS = {
     "period": "T / s",
     "spring_constant": "k / (N/m)",
     "amplitude": "A₀",
@@ -41,7 +41,7 @@ def write_page(
     """Write ``index.html``; the link of a line is empty if its run has no report."""
     from springmass.report.html import SHARED, Figures, drawn_by_script, template
 
-    there = [name for name in SHOWN if any(line["cells"][name] for line in lines)]  # only with numbers
+    there = [name for name in COLUMN_HEADINGS if any(line["cells"][name] for line in lines)]  # only with numbers
     shown = [{**line, "link": quote(line["link"])} for line in lines]
     figures = Figures()
     differing = {visible(line["name"]): line["differs"] for line in lines if line["differs"]}
@@ -50,12 +50,12 @@ def write_page(
         title=folder.resolve().name,
         lines=sorted(shown, key=lambda line: (*(-x for x in line["need"]), line["name"])),
         tags=tags,
-        quantities={name: SHOWN[name] for name in there},
+        quantities={name: COLUMN_HEADINGS[name] for name in there},
         counts={kind: sum(line["look"] == kind for line in shown) for kind in LOOKS},
         figures={figure["name"]: figure for figure in drawn},
         **drawn_by_script(figures.charts, SHARED),
     )
-    write_whole(folder / PAGE, page.encode("utf-8", "backslashreplace"))
+    write_whole(folder / COURSE_PAGE, page.encode("utf-8", "backslashreplace"))
 
 
 def _of_all(rows: Sequence[Mapping[str, Any]], differing: Mapping[str, str]) -> Chart | None:
@@ -94,7 +94,7 @@ def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
         "notes": [message for _, message in json.loads(row.get("messages") or "[]")],
         "differs": "",
         "tags": [row[tag] or "" for tag in tags],
-        "cells": {name: _cell(row, name) for name in SHOWN},
+        "cells": {name: _cell(row, name) for name in COLUMN_HEADINGS},
         "law": row.get("law") or "",
         "thumbnail": row["thumbnail"],
     }
@@ -134,7 +134,7 @@ def write_groups(folder: Path, lines: Sequence[Mapping[str, Any]], tags: Sequenc
         texts = [f"  {', '.join(names)}: {text}" for text, names in runs_of.items()] or ["  nothing to mend"]
         paragraphs.append("\n".join([f"{title}: {runs}", *texts]))
     text = visible_lines("\n\n".join(paragraphs))
-    write_whole(folder / GROUPS, text.encode("utf-8", "backslashreplace") + b"\n")
+    write_whole(folder / GROUPS_FILE, text.encode("utf-8", "backslashreplace") + b"\n")
 
 
 def _cell(row: Mapping[str, Any], name: str) -> tuple[str, str] | None:

@@ -189,13 +189,13 @@ def _digest(value: object) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
-NUMBERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
+NUMERIC_ANSWERS = ("rate_hz", "from_s", "to_s", "clock_ppm")
 LAW = "law"
-ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", LAW, *NUMBERS)
+ANSWERS = ("velocity", "channel", "run", "unit", "time", "time_unit", "delimiter", "decimal", LAW, *NUMERIC_ANSWERS)
 POSITION = "sensor_position"
 _U = tuple(f"{name}_u" for name in PLACES)
 KNOWN = ("path", "scene", POSITION, *ANSWERS, *PLACES, *_U)
-TEMPLATE = (
+TEMPLATE_COLUMNS = (
     "path", "bob_mass_kg", "bob_mass_kg_u", "spring_mass_kg", "spring_mass_kg_u", "disc_diameter_m",
     "disc_diameter_m_u", "air_temperature_c", "group", "section", "spring", "disc",
 )  # fmt: skip
@@ -233,8 +233,8 @@ def template(paths: Sequence[str]) -> str:
     """Return a ``runs.csv`` to fill in, with one row per path."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(TEMPLATE)
-    writer.writerows([path, *[""] * (len(TEMPLATE) - 1)] for path in paths)
+    writer.writerow(TEMPLATE_COLUMNS)
+    writer.writerows([path, *[""] * (len(TEMPLATE_COLUMNS) - 1)] for path in paths)
     return out.getvalue()
 
 
@@ -271,7 +271,7 @@ def _tags(path: Path, names: Sequence[str]) -> tuple[str, ...]:
 def _values(folder: Path, row: Row) -> Values:
     texts = row.cells
     values: dict[str, Any] = {name: text for name, text in texts.items() if name != "path" and name not in _U}
-    values |= {name: row.number(name) for name in NUMBERS if name in texts}
+    values |= {name: row.number(name) for name in NUMERIC_ANSWERS if name in texts}
     values |= {name: os.path.join(folder, texts[name]) for name in ("scene", "velocity") if name in texts}
     for name in PLACES:
         if name in texts:

@@ -23,7 +23,7 @@ QUALITY = (
     "used", "missing", "false_echo", "clipped", "duplicate_time", "non_monotonic_time", "outside", "malformed_rows",
 )  # fmt: skip
 WHOLE = ("samples", *QUALITY, "errors", "warnings")
-NUMBERS = (
+NUMERIC_COLUMNS = (
     "rate_hz", "duration_s", "u_clock", "reduced_chi2", "disc_damping_rate",
     *(name for pair in ((x, f"{x}_u") for x in (*ESTIMATES, *PLACES)) for name in pair),
 )  # fmt: skip
@@ -32,12 +32,13 @@ DETAILS = ("findings", "messages", "correlations", "drag_points")
 _FIRST = ("run", "path", "status", "error")
 _LAWS = ("law", "admissible", "stated_law", "one_law", "undetermined")
 _HASHES = ("input_sha256", "scene_sha256", "parameters_sha256", "code_sha256")
-COLUMNS = (
-    *_FIRST, "format", "kind", "channel", "unit", "start_time", "clock", *_LAWS, *WHOLE, *NUMBERS, *_HASHES, *DETAILS,
+COURSE_COLUMNS = (
+    *_FIRST, "format", "kind", "channel", "unit", "start_time", "clock", *_LAWS, *WHOLE, *NUMERIC_COLUMNS, *_HASHES,
+    *DETAILS,
 )  # fmt: skip
 COURSE = "course"
 """Column with the folder of the course, used when several courses are read together."""
-RESERVED = frozenset((COURSE, *COLUMNS))
+RESERVED = frozenset((COURSE, *COURSE_COLUMNS))
 """Names that no tag may have."""
 FAILED = ("failed", "ended", "no_oscillation")
 """Values of ``status`` for runs without a period; "ended" means that the worker process died."""
@@ -47,7 +48,7 @@ _QUOTED = re.compile(r"'(?=\s*[-=+@＝＋－＠])")
 
 def columns_of(tags: Sequence[str]) -> tuple[str, ...]:
     """Return the columns of a course's table, with its tags after the status."""
-    return (*_FIRST, *tags, *COLUMNS[len(_FIRST) :])
+    return (*_FIRST, *tags, *COURSE_COLUMNS[len(_FIRST) :])
 
 
 def write_rows(folder: Path, rows: Iterable[Mapping[str, Any]], tags: Sequence[str]) -> None:
@@ -80,8 +81,8 @@ def read_rows(folder: str | os.PathLike[str]) -> tuple[list[dict[str, Any]], tup
     try:
         with open_regular_text(path, "utf-8", newline="") as file:
             rows = list(csv.DictReader(file, strict=True))
-        names = tuple(rows[0]) if rows else COLUMNS
-        if missing := [name for name in COLUMNS if name not in names]:
+        names = tuple(rows[0]) if rows else COURSE_COLUMNS
+        if missing := [name for name in COURSE_COLUMNS if name not in names]:
             raise ValueError(f"no column {missing[0]}")
         found = [{name: _value(name, row[name]) for name in names} for row in rows]
     except (OSError, ValueError, TypeError, csv.Error) as error:
@@ -95,4 +96,4 @@ def _value(name: str, text: str) -> Any:
     return float(text) if name in _FLOATS else int(text) if name in WHOLE else _QUOTED.sub("", text, count=1)
 
 
-_FLOATS = frozenset(NUMBERS)
+_FLOATS = frozenset(NUMERIC_COLUMNS)

@@ -22,15 +22,15 @@ from springmass.report.html import SHARED, report_script
 from springmass.terminal.progress import counting
 from storage.atomic import write_whole, writing
 
-GROWTH = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
+ROWS_RATIO = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
 REPORTS = "reports"
 _DIED = "its worker process died twice, for lack of memory perhaps; the next pass tries it again"
-Row = dict[str, Any]
+CourseRow = dict[str, Any]
 
 
 def run_course(
     course: Plan, store: Store, folder: Path, *, jobs: int | None, dask: str | None, reports: int
-) -> tuple[list[Row], int, list[str]]:
+) -> tuple[list[CourseRow], int, list[str]]:
     """Analyse the new and changed runs of a course, and write table, page and reports of all runs.
 
     Runs that fail are reported as they do. Return all rows, how many were made, and a line for each unwritten report.
@@ -49,7 +49,7 @@ def run_course(
             store.add((job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows)
             done |= {job.key for job, _ in rows}
             made += len(rows)
-            if len(done) >= GROWTH * written:
+            if len(done) >= ROWS_RATIO * written:
                 write_rows(folder, _table(course, store, done), course.tags)
                 written = len(done)
             for _, row in rows:
@@ -61,7 +61,7 @@ def run_course(
     return table, made, _write_pages(course, folder, table, reports, jobs)
 
 
-def _table(course: Plan, store: Store, done: set[str]) -> list[Row]:
+def _table(course: Plan, store: Store, done: set[str]) -> list[CourseRow]:
     """Return the rows of the runs that have one, in the order of the runs, with their names and tags."""
     named = [pair for pair in zip(course.jobs, names_of(course.jobs), strict=True) if pair[0].key in done]
     rows = store.rows([job.key for job, _ in named])
@@ -71,7 +71,7 @@ def _table(course: Plan, store: Store, done: set[str]) -> list[Row]:
     ]
 
 
-def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterator[list[tuple[Job, Row]]]:
+def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterator[list[tuple[Job, CourseRow]]]:
     """Yield jobs with their rows; a run during which worker processes die gets a row stating this."""
     if not todo:
         return
@@ -84,7 +84,7 @@ def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterat
             yield rows
 
 
-def _write_pages(course: Plan, folder: Path, table: Sequence[Row], reports: int, jobs: int | None) -> list[str]:
+def _write_pages(course: Plan, folder: Path, table: Sequence[CourseRow], reports: int, jobs: int | None) -> list[str]:
     """Write what to tell the groups, missing reports of the worst runs, and the page; return what cannot be written."""
     write_whole(folder / SHARED, report_script())
     lines = [line_of(row, course.tags) for row in table]

@@ -15,7 +15,7 @@ from pipeline.bench.scene import PLACES
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
-from springmass.charts.several import LARGEST, drag_points, outline
+from springmass.charts.several import LARGEST_DRAWN, drag_points, outline
 from springmass.course.plan import Job, code_sha256, digest_of
 from springmass.course.results_csv import ESTIMATES
 from springmass.errors import internal_error, quietly
@@ -149,7 +149,7 @@ def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, float | None]:
 
 
 def _number(x: Any) -> float | None:
-    return float(x) if math.isfinite(x) and abs(x) <= LARGEST else None
+    return float(x) if math.isfinite(x) and abs(x) <= LARGEST_DRAWN else None
 
 
 def _json(value: Any) -> str | None:

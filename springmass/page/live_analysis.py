@@ -29,7 +29,7 @@ from springmass.runs.run import Run, analyse_track
 LIVE_TIER: Accuracy = "fast"
 WHOLE_TIER: Accuracy = "standard"
 """Tiers of the analysis during a recording, and of a complete run; the latter is the default of every command."""
-SHARE, NOW_SHARE = 0.03, 0.02
+ANALYSIS_SHARE, NOW_SHARE = 0.03, 0.02
 """Maximum fraction of a core for analyses of all samples, and for those of the last seconds; together 5 %."""
 NOW_S, NOW_SWINGS = 10.0, 8.0
 """Duration of the samples for the current amplitude, in seconds and in swings; the longer duration counts."""
@@ -39,7 +39,7 @@ SHOWN_CHARTS = ("amplitude", "spectrum")
 FIT_BEFORE_S, FIT_AFTER_S, FIT_POINTS = 40.0, 60.0, 101
 """Time range of the latest fit before and after its last window in s, and its number of points."""
 LAST_WINDOWS = 4
-FARTHEST = 50.0
+LONGEST_FORECAST = 50.0
 """The longest forecast of when to stop, in multiples of the time recorded so far."""
 WANTED = 4e-5
 """Wanted u relative to the period: a little above the u of a 50 ppm crystal, so that it can be reached."""
@@ -145,7 +145,7 @@ def more_seconds(u: float, wanted_u: float, seconds: float, amplitude: Callable[
     """
     if u <= wanted_u:
         return 0.0
-    times = seconds * np.geomspace(1e-3, FARTHEST, 4000)
+    times = seconds * np.geomspace(1e-3, LONGEST_FORECAST, 4000)
     steps = np.diff(times, prepend=0.0)
     weight = amplitude(times) ** 2 * steps
     w, wt, wtt = np.cumsum(weight), np.cumsum(weight * times), np.cumsum(weight * times**2)
@@ -258,7 +258,7 @@ class Watcher:
                     self.text = json_of(message)
                     cost_s = time.thread_time() - start_s
                     # An analysis that first loads a library takes longer; the next one need not wait for that.
-                    due_s = time.monotonic() + min(cost_s, last_cost_s) / SHARE
+                    due_s = time.monotonic() + min(cost_s, last_cost_s) / ANALYSIS_SHARE
                     last_cost_s = cost_s
                 elif swing_s:
                     self.now_text = json_of(self._now(swing_s))

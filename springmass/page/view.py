@@ -19,7 +19,7 @@ from springmass.runs.json_results import plain
 from springmass.runs.loading import to_track
 from storage.wire_log.wire_samples import Origin
 
-VERSION = 2  # of the messages
+PROTOCOL_VERSION = 2  # of the messages
 MOST_PER_MESSAGE = 50_000
 SHOWN_NOTES = 20  # the latest
 _HEAD = struct.Struct("<4I")
@@ -112,7 +112,7 @@ class View:
         """Return the first message to a viewer."""
         names = ("session", "source", "name", "title", "rate_hz", "sensors", "quantity", "unit", "simulated", "clock")
         fields = {name: getattr(self, name) for name in (*names, "calibration")}
-        return {"type": "hello", "version": VERSION, **fields, "controls": controls}
+        return {"type": "hello", "version": PROTOCOL_VERSION, **fields, "controls": controls}
 
     def state(self) -> dict[str, Any]:
         """Return the state of the run according to its log."""

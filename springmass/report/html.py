@@ -44,7 +44,7 @@ BESIDE = 3  # columns of runs that fit on A4
 MOST_NOTES = 50  # of a recording that the page lists
 SHARED = "charts.js"
 """The name of the script's own file, where several reports share it."""
-SOURCES = ("uPlot.iife.min.js", "charts.js", "report.js")
+SCRIPTS = ("uPlot.iife.min.js", "charts.js", "report.js")
 """The sources of the script, in this order; a page that is opened from a disk cannot import modules."""
 
 
@@ -118,7 +118,7 @@ def drawn_by_script(charts: Sequence[Mapping[str, Any]], address: str = "") -> d
 @functools.cache
 def report_script() -> str:
     """Return the script of reports; its sources may hold neither </script nor <!--, which would end its element."""
-    script = "\n".join(static_file(name).read_text("utf-8") for name in SOURCES)
+    script = "\n".join(static_file(name).read_text("utf-8") for name in SCRIPTS)
     return f"\n{script}\n"
 
 

@@ -26,10 +26,10 @@ from springmass.runs.simulating.simulation import FINE, Prepared, Simulation, co
 if TYPE_CHECKING:
     from springmass.charts.draw import PictureFormat
 
-PAGE = "simulation.html"
+SIMULATION_PAGE = "simulation.html"
 FIGURES = ("position", "velocity", "energy", "phase", "error", "band", "against")
 FILES = frozenset(
-    {"run.h5", PAGE, "simulation.json", "band.csv", "against.csv"}
+    {"run.h5", SIMULATION_PAGE, "simulation.json", "band.csv", "against.csv"}
     | {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf", "png")}
 )
 
@@ -69,7 +69,7 @@ def write_folder(
         figures = Figures(save(charts, make_folder(folder / "figures"), kinds) if kinds else {})
         shown = [figures.add(chart) for chart in charts]
         page = template("charts.html.j2").render(title=title, figures=shown, **drawn_by_script(figures.charts))
-        write_whole(folder / PAGE, page)
+        write_whole(folder / SIMULATION_PAGE, page)
         for table_name, table in tables.items():
             write_whole(folder / f"{table_name}.csv", _table(table))
         write_whole(folder / "simulation.json", json.dumps(results, indent=2) + "\n")

@@ -26,7 +26,7 @@ from springmass.runs.rows import results_csv
 from springmass.runs.run import Run
 from storage.atomic import whole_folder, write_whole
 
-PAGE = "report.html"
+REPORT_PAGE = "report.html"
 LAB_REPORT = "lab-report.tex"
 TABLES = ("results.json", "results.csv", "table.tex", "budget.csv", "budget.tex")
 OF_LAB_REPORT = ("position", "amplitude", "frequency")
@@ -69,7 +69,7 @@ def write_report(
             several["masses"] = masses(compared.line)
         if compared.hooke is not None:
             several["hooke"] = static(compared.hooke)
-    with whole_folder(directory, _names(stems), PAGE) as folder:
+    with whole_folder(directory, _names(stems), REPORT_PAGE) as folder:
         pictures: dict[str, bytes] = {}
         if kinds:
             (folder / "figures").mkdir()
@@ -103,13 +103,13 @@ def write_report(
             provenance=(summary or results[0])["provenance"],
             script=script,
         )
-        write_whole(folder / PAGE, page)
+        write_whole(folder / REPORT_PAGE, page)
         if template is not None:
             captions = {name: charts[0][name].caption for name in OF_LAB_REPORT if name in charts[0]}
             sentences = [text for title, text in in_words(analyses[0]) if title != "What to do"]
             write_whole(folder / LAB_REPORT, lab_report_tex(runs[0], captions, sentences))
     detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
-    return directory / PAGE
+    return directory / REPORT_PAGE
 
 
 def _names(stems: Sequence[str]) -> set[str]:
@@ -121,7 +121,7 @@ def _names(stems: Sequence[str]) -> set[str]:
         for kind in get_args(PictureFormat)
     }
     tables = (f"{stem}{name}.csv" for stem in stems for name in ("motion", "amplitude"))
-    return {PAGE, LAB_REPORT, *TABLES, *figures, *tables}
+    return {REPORT_PAGE, LAB_REPORT, *TABLES, *figures, *tables}
 
 
 def _stems(names: Sequence[str]) -> list[str]:

@@ -19,7 +19,7 @@ from pipeline.results.derive import limited
 from pipeline.results.masses import Hooke, MassLine, mass_line
 from springmass.errors import ProgramError
 from springmass.runs.frames import comparison_frame
-from springmass.runs.json_results import SCHEMA, parameters_json, picked, plain
+from springmass.runs.json_results import RESULT_SCHEMA, parameters_json, picked, plain
 from springmass.runs.reported import Reported, judge, read_reported
 from springmass.runs.run import Run
 from springmass.runs.tables import read_hooke
@@ -147,7 +147,7 @@ def comparison_json(compared: SpringComparison, provenance: Mapping[str, Any]) -
     each = zip(found.names, derived, found.each, found.own_u, found.pulls, strict=True)
     numbers = ("chi2", "dof", "largest_deviation", "exchanged", "exchanged_chi2", "message")
     content: dict[str, Any] = {
-        "schema": SCHEMA,
+        "schema": RESULT_SCHEMA,
         "comparison": {
             "agree": found.agree,
             "spring_constant": found.spring_constant if found.agree else None,

@@ -51,7 +51,9 @@ _NAMES = {found: unit for unit in reversed(_WRITTEN) if (found := exponents_of(u
 _NAMES[(0.0,) * 5] = ""
 
 
-ROUNDING = 1e-13  # share of the value; a smaller u is left by correlations that cancel, as in period times frequency
+EXPONENT_ROUNDING = (
+    1e-13  # share of the value; a smaller u is left by correlations that cancel, as in period times frequency
+)
 
 
 class Value(UFloat):  # type: ignore[misc]
@@ -111,7 +113,7 @@ class Value(UFloat):  # type: ignore[misc]
         return self._shown[1] if self._shown else self._written(in_brackets)
 
     def _written(self, write: Callable[[float, float, str], str]) -> str:
-        exact = self.u <= ROUNDING * abs(self.value)
+        exact = self.u <= EXPONENT_ROUNDING * abs(self.value)
         return write(self.value, 0.0 if exact else self.u, self.unit or "")
 
     def __abs__(self) -> Value:

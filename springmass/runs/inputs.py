@@ -12,10 +12,10 @@ from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.recordings.identify import sniff
 from acquisition.regular_file import open_regular
 from springmass.errors import UNREADABLE, ProgramError
-from storage.run_file.layout import MAGIC
-from storage.wire_log.records import MAGIC as WIRE_MAGIC
+from storage.run_file.layout import HDF5_MAGIC
+from storage.wire_log.records import WIRE_MAGIC
 
-NAMED = 5  # maximum number of files that a message names
+FILES_NAMED = 5  # maximum number of files that a message names
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +58,8 @@ def files_of(
 def _named(others: Sequence[str]) -> str:
     if not others:
         return ""
-    more = f" and {len(others) - NAMED} more" if len(others) > NAMED else ""
-    return f": {', '.join(others[:NAMED])}{more}"
+    more = f" and {len(others) - FILES_NAMED} more" if len(others) > FILES_NAMED else ""
+    return f": {', '.join(others[:FILES_NAMED])}{more}"
 
 
 def _folders(top: Path, but: Collection[str]) -> Iterator[Path]:
@@ -110,10 +110,10 @@ def kind_of(path: str | os.PathLike[str]) -> Literal["run", "wire", "recording"]
     """Return whether a file is a run file, a wire log or a recording, by its first bytes."""
     try:
         with open_regular(path) as file:
-            head = file.read(len(MAGIC))
+            head = file.read(len(HDF5_MAGIC))
     except (OSError, ValueError):
         return "recording"  # the format registry reports the problem
-    if head == MAGIC:
+    if head == HDF5_MAGIC:
         return "run"
     return "wire" if head.startswith(WIRE_MAGIC) else "recording"
 

@@ -20,7 +20,7 @@ from pipeline.results.classic import Classic
 from springmass import __version__
 from springmass.runs.loading import Loaded
 
-SCHEMA = 3
+RESULT_SCHEMA = 3
 EXPANDED = ("dof", "coverage_factor", "expanded")  # of a budget, for its expanded uncertainty
 
 
@@ -44,7 +44,7 @@ def result_of(
     """
     estimates = classic.estimates if classic is not None else analysis.estimates
     content = {
-        "schema": SCHEMA,
+        "schema": RESULT_SCHEMA,
         "input": input_of(loaded),
         "recorded": _recorded(loaded),
         "quality": {**analysis.quality, "malformed_rows": loaded.malformed_rows},

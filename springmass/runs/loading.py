@@ -35,7 +35,7 @@ from storage.run_file.layout import CHECKED
 from storage.run_file.reading import open_run
 
 UNVERIFIED = "unverified"
-NAMED = 5  # maximum number of differences that a message names
+DIFFERENCES_NAMED = 5  # maximum number of differences that a message names
 _OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", "time_unit", "delimiter", "decimal"})
 
 
@@ -213,8 +213,8 @@ def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[FormatIssu
     """Return a trap that names the parts of a run file with a checksum mismatch."""
     if not differing:
         return ()
-    named = "; ".join(error.problem for error in differing[:NAMED])
-    more = f"; and {len(differing) - NAMED} more" if len(differing) > NAMED else ""
+    named = "; ".join(error.problem for error in differing[:DIFFERENCES_NAMED])
+    more = f"; and {len(differing) - DIFFERENCES_NAMED} more" if len(differing) > DIFFERENCES_NAMED else ""
     message = f"{path.name} was changed or damaged after it was written ({named}{more}); it was read, as you asked."
     return (FormatIssue(UNVERIFIED, message, len(differing)),)
 

@@ -21,8 +21,8 @@ from springmass.errors import ProgramError
 from springmass.runs.run import Run
 from springmass.runs.tables import Row, read_rows
 
-COLUMNS = ("run", "name", "value", "u", "unit")
-APART = 4.0  # differences beyond so many standard uncertainties are no chance
+REPORTED_COLUMNS = ("run", "name", "value", "u", "unit")
+DIFFERENT_U = 4.0  # differences beyond so many standard uncertainties are no chance
 TOO_SMALL = 3.0  # an uncertainty is too small if what is sure to be in it is so many times larger: one digit is printed
 POWERS = sorted(range(-6, 7), key=abs)[1:]
 ROUGHLY = 0.05  # of a value with a wrong power of ten, which may be off otherwise too
@@ -56,12 +56,12 @@ def read_reported(path: str | os.PathLike[str], runs: Sequence[Run]) -> list[Rep
     """Read a table with the columns run, name, value, u, unit; errors name the line and what to write."""
     head, rows = read_rows(path, "table")
     if not {"run", "name", "value"} <= set(head):
-        raise ProgramError(f"{path}: expected the columns {', '.join(COLUMNS)}, got {', '.join(head)}")
+        raise ProgramError(f"{path}: expected the columns {', '.join(REPORTED_COLUMNS)}, got {', '.join(head)}")
     return [_row(row, runs) for row in rows]
 
 
 def _row(row: Row, runs: Sequence[Run]) -> Reported:
-    where, text, numbers = row.where, dict.fromkeys(COLUMNS, "") | dict(row.cells), {}
+    where, text, numbers = row.where, dict.fromkeys(REPORTED_COLUMNS, "") | dict(row.cells), {}
     for column, empty in (("value", "nan"), ("u", "0")):
         try:
             number = Decimal(row.plain(column) or empty)
@@ -140,7 +140,7 @@ def _agrees(run: Run, row: Reported, expected: Estimate, scale: float = 1.0, rou
     by_eye = STATED_ERROR_M / math.sqrt(2.0) if row.name == "amplitude" and expected.unit == "m" else 0.0
     if row.name in PERIODIC:
         by_eye = abs(PERIODIC[row.name] * expected.value) * READING_S / CYCLES / run["period"].value
-    allowed = APART * math.hypot(max(row.u * scale, by_eye), expected.u) + row.rounding * scale
+    allowed = DIFFERENT_U * math.hypot(max(row.u * scale, by_eye), expected.u) + row.rounding * scale
     return abs(row.value * scale - expected.value) <= max(allowed, roughly * abs(expected.value))
 
 
@@ -189,7 +189,7 @@ def _echoes(row: Reported, run: Run, ours: Estimate) -> dict[str, float] | None:
     if row.name not in ("velocity_rms", "reynolds_number") or not echoes or ours.value <= 0.0:
         return None
     ratio = row.value / ours.value
-    if ratio < ECHOES or ratio - 1.0 < APART * ours.u / ours.value:
+    if ratio < ECHOES or ratio - 1.0 < DIFFERENT_U * ours.u / ours.value:
         return None
     if velocity is not None and np.isfinite(velocity).any():
         whole = float(np.sqrt(np.nanmean(np.square(velocity)))) / run["velocity_rms"].value
@@ -209,7 +209,7 @@ def _uncertainty(row: Reported, scale: float, run: Run, rows: Sequence[Reported]
     needed = [(ours.u, f"this analysis finds {ours}")]
     nearest = min(expected, key=lambda each: abs(row.value * scale - each.value))
     off = abs(row.value * scale - nearest.value) - row.rounding * scale
-    if off > APART * math.hypot(u, nearest.u) and _agrees(run, row, nearest, scale):
+    if off > DIFFERENT_U * math.hypot(u, nearest.u) and _agrees(run, row, nearest, scale):
         needed.append((off, f"this analysis finds {nearest}"))
     mass = run.scene.bob_mass_kg
     for other in rows if row.name in PERIODIC else ():

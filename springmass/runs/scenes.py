@@ -112,7 +112,7 @@ def ask_about(scene: Scene, where: str | Path) -> None:
         complain(f"{where}: {clause}; check value and unit")
 
 
-RUNS = (".h5", ".hdf5", ".nxs", ".wire")
+STEM_SUFFIXES = (".h5", ".hdf5", ".nxs", ".wire")
 """Suffixes of run files and logs: the stem names their recording."""
 
 
@@ -146,7 +146,7 @@ def about_path(recording: Path) -> Path:
     """
     by_stem = recording.with_name(f"{recording.stem}.about.toml")
     by_name = recording.with_name(f"{recording.name}.about.toml")
-    if recording.suffix.lower() in RUNS:
+    if recording.suffix.lower() in STEM_SUFFIXES:
         return by_stem
     others = recording.parent.glob(f"{glob.escape(recording.stem)}.*")
     namesakes = (each for each in others if each.stem == recording.stem and each.name != recording.name)

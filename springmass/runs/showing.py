@@ -21,10 +21,10 @@ from springmass.typeset import equation, law_status, pretty, pretty_number, type
 if TYPE_CHECKING:
     from springmass.runs.run import Run
 
-WIDTH = 79
-MOST_ROWS = 10
-# Quantities that the text summary may show, in this order; it shows at most MOST_ROWS of them.
-FIRST = (
+SUMMARY_WIDTH = 79
+SUMMARY_ROWS = 10
+# Quantities that the text summary may show, in this order; it shows at most SUMMARY_ROWS of them.
+SUMMARY_ORDER = (
     "period", "spring_constant", "amplitude", "damping_rate", "relaxation_rate", "relaxation_rate_slow",
     "relaxation_rate_fast", "gamma", "beta", "mu", "c", "n", "offset", "noise", "quality_factor", "drag_coefficient",
 )  # fmt: skip
@@ -33,7 +33,7 @@ FIRST = (
 def text_summary(run: Run) -> str:
     """Return a run in at most 15 lines of at most 79 characters."""
     rows = {row.name: row for row in run.rows}
-    shown = [name for name in FIRST if name in rows][:MOST_ROWS]
+    shown = [name for name in SUMMARY_ORDER if name in rows][:SUMMARY_ROWS]
     lines = [_cut(visible(_head(run)))]
     width = max((len(rows[name].quantity) for name in shown), default=0) + 2
     lines += [f"  {rows[name].quantity:{width}}{rows[name].symbol:8}{rows[name].estimates[0]!r}" for name in shown]
@@ -106,7 +106,7 @@ def _findings(run: Run) -> str:
 
 
 def _cut(line: str) -> str:
-    return textwrap.shorten(line, WIDTH, placeholder=" ...")
+    return textwrap.shorten(line, SUMMARY_WIDTH, placeholder=" ...")
 
 
 def _subscript(symbol: str) -> str:

@@ -17,7 +17,7 @@ from acquisition.regular_file import open_regular_text
 from pipeline.results.masses import Hooke, hooke
 from springmass.errors import ProgramError
 
-LARGEST = 64 << 20  # bytes
+LARGEST_TABLE_BYTES = 64 << 20  # bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,8 @@ def read_rows(path: str | os.PathLike[str], what: str) -> tuple[list[str], list[
     """Return the columns and the rows of a table; numbers may have a decimal comma unless commas separate the cells."""
     path = Path(path)
     try:
-        if path.stat().st_size > LARGEST:
-            raise ProgramError(f"{path}: a {what} must be at most {LARGEST >> 20} MB")
+        if path.stat().st_size > LARGEST_TABLE_BYTES:
+            raise ProgramError(f"{path}: a {what} must be at most {LARGEST_TABLE_BYTES >> 20} MB")
         with open_regular_text(path, "utf-8-sig") as file:
             text = file.read()
     except OSError as error:

@@ -12,7 +12,7 @@ from acquisition.live.serial_port import SerialPort, list_ports
 from springmass.errors import SENSOR, ProgramError, tell
 
 PROBE_S = 1.0
-BAUDS = (115200, 9600)
+PROBED_BAUDS = (115200, 9600)
 
 
 def name_sensors(
@@ -24,7 +24,7 @@ def name_sensors(
     addresses = ports or [port.device for port in list_ports()]
     descriptions, known = [], []
     for address in addresses:
-        heard, families, speed = listen(address, BAUDS if baud is None else (baud,))
+        heard, families, speed = listen(address, PROBED_BAUDS if baud is None else (baud,))
         wanted = [name for name in families if not sensors or name in sensors]
         descriptions.append(f"{address}: {heard}")
         if wanted:
@@ -42,7 +42,7 @@ def name_sensors(
     return tuple(each[0] for each in known), tuple(each[1] for each in known), baud or measured
 
 
-def listen(device: str, bauds: Sequence[int] = BAUDS) -> tuple[str, list[str], int]:
+def listen(device: str, bauds: Sequence[int] = PROBED_BAUDS) -> tuple[str, list[str], int]:
     """Return what a port sends at the usual speeds, which families recognise it, and at which speed."""
     heard = b""
     for baud in bauds:

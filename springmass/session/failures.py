@@ -14,7 +14,7 @@ from typing import Any
 
 from storage.errors import one_line
 
-PATIENCE_S = 1.0
+LAST_STEP_S = 1.0
 """Maximum time that the end of a recording waits for a worker's last step, s."""
 
 
@@ -84,7 +84,7 @@ class Worker:
         """Take no more steps, and wait for the last one; if it hangs, ``why`` is a failure."""
         if self._thread.ident is not None:
             self._steps.put(None)
-            self._thread.join(PATIENCE_S)
+            self._thread.join(LAST_STEP_S)
             if self._thread.is_alive():
                 self.failed(TimeoutError(why))
 

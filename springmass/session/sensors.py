@@ -11,7 +11,7 @@ from acquisition.decoders.registry import describe_bytes
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM
 from acquisition.live.decoding import SensorChain
-from acquisition.live.firmware import MODEL, VERSION
+from acquisition.live.firmware import FIRMWARE_VERSION, MODEL
 from acquisition.live.serial_port import SerialPort
 from acquisition.live.timebase import WRAP_US
 from acquisition.readings import Reading
@@ -93,7 +93,7 @@ def meeting(sensor: OpenSensor, identity: Identity) -> Iterator[str]:
     yield f"{port}: {identity}{settings_of(identity)}"
     if outdated(identity):
         yield (
-            f"{port}: its firmware {identity.version} is older than {VERSION}, which comes with this program; "
+            f"{port}: its firmware {identity.version} is older than {FIRMWARE_VERSION}, which comes with this program; "
             f"`springmass firmware --port {port}` shows how to update it"
         )
     if sensor.rate_hz is not None and rate_hz is not None and sensor.rate_hz != rate_hz:
@@ -105,7 +105,7 @@ def meeting(sensor: OpenSensor, identity: Identity) -> Iterator[str]:
 
 def outdated(identity: Identity) -> bool:
     """Return whether a sensor runs an older version of the firmware that comes with this program."""
-    return identity.model == MODEL and _numbers(identity.version) < _numbers(VERSION)
+    return identity.model == MODEL and _numbers(identity.version) < _numbers(FIRMWARE_VERSION)
 
 
 def settings_of(identity: Identity) -> str:

@@ -43,7 +43,7 @@ LOOK_FOR_MARKS_S, LOOK_FOR_TRIGGER_S = 0.2, 0.05
 HELD_BLOCKS = 1000  # maximum number of blocks kept for the display before the run begins
 BYTES_PER_READ = 64  # log bytes per reading, for the check of the disk space
 
-Samples = Sequence[tuple[int, Block]]
+PortBlocks = Sequence[tuple[int, Block]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,7 +321,7 @@ class Session:
         self.shown = shown = LiveState(self._chains[0].timebase.rate_hz)
         worker = Worker("display", lambda error: self.failures.note("display", error))
 
-        def show(take: Callable[[], Samples], *, tick: bool = True) -> None:
+        def show(take: Callable[[], PortBlocks], *, tick: bool = True) -> None:
             now_ns = self._clock.now_ns()
 
             def turn() -> None:

@@ -17,11 +17,11 @@ from springmass.runs.rows import table_rows
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
-NAMED = 5  # maximum number of runs that a line names
-FIRST = 3  # number of warnings shown without --full
+RUNS_NAMED = 5  # maximum number of runs that a line names
+WARNINGS_SHOWN = 3  # number of warnings shown without --full
 NARROW = 80  # maximum width of wrapped warnings, columns
 WARNING_LINES = 3
-INDENT = " " * 8
+FINDING_INDENT = " " * 8
 
 
 def findings_text(
@@ -36,16 +36,16 @@ def findings_text(
 
     ordered = by_harm(findings)
     errors, warnings, notes = ([f for f in ordered if f["severity"] == grade] for grade in _MARKS)
-    lines = [_finding_line(f, written) for f in (*errors, *(warnings if full else warnings[:FIRST]))]
+    lines = [_finding_line(f, written) for f in (*errors, *(warnings if full else warnings[:WARNINGS_SHOWN]))]
     if not full:
-        more = len(warnings) - FIRST
+        more = len(warnings) - WARNINGS_SHOWN
         if more > 0:
             lines.append(f"and {more} more {'warning' if more == 1 else 'warnings'}: --full")
         return "\n".join(lines or ["No warnings."])
     lines += [_finding_line(f, written) for f in notes if not is_standing(f)]
     if standing := [f["code"] for f in notes if is_standing(f)]:
         words = f"{_MARKS['info']} of every file of this format: {', '.join(standing)}"
-        lines.append(wrapped(words, INDENT, NARROW))
+        lines.append(wrapped(words, FINDING_INDENT, NARROW))
     if lines:
         lines.append("springmass explain CODE prints meaning, cause, advice and an example of each.")
     return "\n".join(lines or ["No warnings."])
@@ -57,7 +57,7 @@ def _finding_line(finding: Mapping[str, Any], written: Callable[[str], str]) -> 
     message = written(finding["message"])
     if advice and severity != "info":
         message += f"{'' if message[-1:] in '.!?' else '.'} {advice}"
-    lines = wrapped(f"{_MARKS[severity]} {finding['code']}: {message}", INDENT, NARROW).splitlines()
+    lines = wrapped(f"{_MARKS[severity]} {finding['code']}: {message}", FINDING_INDENT, NARROW).splitlines()
     if severity == "error" or len(lines) <= WARNING_LINES:
         return "\n".join(lines)
     last = lines[WARNING_LINES - 1]
@@ -77,9 +77,13 @@ def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], writte
     lines = []
     for code, by_run in sorted(grave.items(), key=lambda item: min(f["severity"] for f in item[1].values())):
         names, first = list(by_run), next(iter(by_run.values()))
-        listed = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+        listed = ", ".join(names[:RUNS_NAMED]) + (
+            f" and {len(names) - RUNS_NAMED} more" if len(names) > RUNS_NAMED else ""
+        )
         head = f"{_MARKS[first['severity']]} {code}, {len(names)} of {len(runs)} runs ({listed}): "
-        lines.append(wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{written(first['message'])}", INDENT))
+        lines.append(
+            wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{written(first['message'])}", FINDING_INDENT)
+        )
     lines.append(f"{notes} notes do not affect the results; --json lists them.")
     return "\n".join(lines)
 

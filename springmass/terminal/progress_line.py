@@ -9,7 +9,7 @@ from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 
 # Without a terminal, one of this many lines is printed: the motion for each would add a tenth to the recording's cost.
 UNWATCHED_LINES = 30
-PATIENCE_S = 0.5  # output not written within this time has no reader, which is noted in the run
+READER_WAIT_S = 0.5  # output not written within this time has no reader, which is noted in the run
 FIRST_MOTION_S = 1.5
 SILENT_S = 1.5  # silence of a sensor that the progress line reports
 GOOD, FAIR = (1.0, 0.05), (10.0, 1 / 3)
@@ -33,12 +33,12 @@ class ProgressLine:
         self._turns += progress.tick
         if self._style.terminal:
             self._console.draw(self._lines(progress))
-            self._console.wait(PATIENCE_S)
+            self._console.wait(READER_WAIT_S)
             return
         trouble = progress.trouble
         if progress.tick and (self._turns == 1 or self._turns % UNWATCHED_LINES == 10):
             self._console.line(" | ".join([*_parts(progress, self._style), *_troubles(progress)]))
-            self._console.wait(PATIENCE_S)
+            self._console.wait(READER_WAIT_S)
         elif trouble is not None and trouble.kind is not self._trouble:
             self._console.line(trouble.text)
         self._trouble = None if trouble is None else trouble.kind

@@ -17,9 +17,9 @@ from acquisition.recordings.tables.text import HEAD_BYTES
 from pipeline.track import F8
 from springmass.testing.demands import demand
 
-RATE_HZ = 100.0
-T = np.arange(300) / RATE_HZ
-DISTANCE = np.round(0.20 + 0.05 * np.sin(7.9 * T), 5)
+EXAMPLE_RATE_HZ = 100.0
+EXAMPLE_TIMES_S = np.arange(300) / EXAMPLE_RATE_HZ
+DISTANCE = np.round(0.20 + 0.05 * np.sin(7.9 * EXAMPLE_TIMES_S), 5)
 _NOISE = (b"", b"\0", b"\xff\xfe", bytes(range(256)) * 8, b"hello\nworld\n", b"\n" * 99)
 
 
@@ -59,14 +59,14 @@ class Case:
         """Read bytes, with the answers of the file."""
         return self.format.read("run.dat", data, **{**self.file.answers, **answers})
 
-    def written(self, t: F8 = T, x: F8 = DISTANCE) -> Recording:
+    def written(self, t: F8 = EXAMPLE_TIMES_S, x: F8 = DISTANCE) -> Recording:
         """Read a file of these times and distances."""
         return self.read(self.file.write(t, x))
 
     @property
     def whole(self) -> bytes:
         """The bytes of a sound file."""
-        return self.file.write(T, DISTANCE)
+        return self.file.write(EXAMPLE_TIMES_S, DISTANCE)
 
     def demand_distances(self, recording: Recording, x: F8 = DISTANCE) -> None:
         """Demand the distances where no flag is set, up to a constant if the file does not know it."""
@@ -100,10 +100,16 @@ def written_is_read(case: Case) -> None:
     data = case.whole
     recording = case.read(data)
     samples, info, quantum_m = recording.samples, recording.info, case.file.quantum_m
-    demand(np.array_equal(samples.t, T), "return the times of the file in s; row numbers over a rate are exact")
+    demand(
+        np.array_equal(samples.t, EXAMPLE_TIMES_S),
+        "return the times of the file in s; row numbers over a rate are exact",
+    )
     demand(not samples.flags.any(), "set no flag in a sound file")
     case.demand_distances(recording)
-    facts, expected = (info.rate_hz, info.kind, info.clock, info.name), (RATE_HZ, "replay", "nominal", "run.dat")
+    facts, expected = (
+        (info.rate_hz, info.kind, info.clock, info.name),
+        (EXAMPLE_RATE_HZ, "replay", "nominal", "run.dat"),
+    )
     demand(facts == expected, f"record rate_hz, kind, clock and name as {expected}, got {facts}")
     same = quantum_m is None or (info.quantum_m is not None and np.isclose(info.quantum_m, quantum_m, rtol=1e-4))
     demand(same, f"report the step of the distances, {quantum_m} m, as quantum_m, got {info.quantum_m}")
@@ -138,19 +144,22 @@ def faults_of_text(case: Case) -> None:
         recording = case.read(faulty.encode("utf-16" if wide else "utf-8"))
         demand(recording.malformed_rows == 1, f"count one malformed row, got {recording.malformed_rows}")
         _demand_trap(recording, code)
-        demand(np.count_nonzero(recording.samples.flags == 0) >= T.size - 2, "keep the rows around a faulty one")
+        demand(
+            np.count_nonzero(recording.samples.flags == 0) >= EXAMPLE_TIMES_S.size - 2,
+            "keep the rows around a faulty one",
+        )
         if code == "truncated_row":
-            _demand_trap(recording, code, Flag.MISSING, T.size - 1, T.size)
+            _demand_trap(recording, code, Flag.MISSING, EXAMPLE_TIMES_S.size - 1, EXAMPLE_TIMES_S.size)
             case.demand_distances(recording)
     recording = case.read(case.whole + bytes(4096))
-    demand(len(recording.samples) == T.size, "leave out the zero bytes of an interrupted writer")
+    demand(len(recording.samples) == EXAMPLE_TIMES_S.size, "leave out the zero bytes of an interrupted writer")
     _demand_trap(recording, "zero_filled_tail")
 
 
 def rate_must_not_contradict(case: Case) -> None:
     """The user cannot overrule what the times say; the rate that they have changes nothing."""
-    same = np.array_equal(case.read(case.whole, rate_hz=RATE_HZ).samples.t, T)
-    demand(same, f"accept rate_hz={RATE_HZ:g}, which the file has")
+    same = np.array_equal(case.read(case.whole, rate_hz=EXAMPLE_RATE_HZ).samples.t, EXAMPLE_TIMES_S)
+    demand(same, f"accept rate_hz={EXAMPLE_RATE_HZ:g}, which the file has")
     try:
         case.read(case.whole, rate_hz=37.0)
     except FormatError:
@@ -160,16 +169,16 @@ def rate_must_not_contradict(case: Case) -> None:
 
 def odd_times(case: Case) -> None:
     """Times that repeat, run back or leave a gap are flagged, nothing is dropped, and uneven times stand."""
-    if case.file.write(np.append(T[:-1], 5.0), DISTANCE) == case.whole:
+    if case.file.write(np.append(EXAMPLE_TIMES_S[:-1], 5.0), DISTANCE) == case.whole:
         return  # the rows have no times
-    t, kept = T.copy(), np.delete(np.arange(T.size), np.s_[140:150])
+    t, kept = EXAMPLE_TIMES_S.copy(), np.delete(np.arange(EXAMPLE_TIMES_S.size), np.s_[140:150])
     t[50], t[120] = t[49], t[100]
     recording = case.written(t)
-    demand(len(recording.samples) == T.size, "drop no row whose time is odd")
+    demand(len(recording.samples) == EXAMPLE_TIMES_S.size, "drop no row whose time is odd")
     _demand_trap(recording, "duplicate_time", Flag.DUPLICATE_TIME, 50, 51)
     _demand_trap(recording, "non_monotonic_time", Flag.NON_MONOTONIC_TIME, 120, 121)
-    _demand_trap(case.written(T[kept], DISTANCE[kept]), "missing_samples", Flag.GAP_BEFORE, 140, 141)
-    uneven: F8 = np.cumsum(np.random.default_rng(5).integers(5, 9, T.size)) / RATE_HZ
+    _demand_trap(case.written(EXAMPLE_TIMES_S[kept], DISTANCE[kept]), "missing_samples", Flag.GAP_BEFORE, 140, 141)
+    uneven: F8 = np.cumsum(np.random.default_rng(5).integers(5, 9, EXAMPLE_TIMES_S.size)) / EXAMPLE_RATE_HZ
     same = np.allclose(np.diff(case.written(uneven).samples.t), np.diff(uneven), rtol=0, atol=6e-7)
     demand(same, "keep measured times as they are")
 
@@ -183,7 +192,7 @@ def odd_distances(case: Case) -> None:
     if not known:
         return
     case.demand_distances(recording, x)
-    x = np.where(np.arange(T.size) < 280, DISTANCE, 0.0)  # no rangefinder reads exactly 0 m twenty times
+    x = np.where(np.arange(EXAMPLE_TIMES_S.size) < 280, DISTANCE, 0.0)  # no rangefinder reads exactly 0 m twenty times
     _demand_trap(case.written(x=x), "zero_filled_tail", Flag.MISSING, 280, 300)
     x = DISTANCE.copy()
     x[200:230] = np.concatenate((np.linspace(3.6, 8.1, 10), np.full(20, 8.1)))

@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 from acquisition.block import UNITS, ClockKind, SourceKind
 from storage.schema import Count, ValueRefused, decoded, json_text, parsed, plain, shown
 
-SCHEMA = 1
+RUN_SCHEMA = 1
 
 _Text = Annotated[str, Meta(max_length=1 << 20)]
 _Sha256 = Annotated[str, Meta(pattern=r"^[0-9a-f]{64}\Z")]
@@ -71,7 +71,7 @@ class RunHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def encode(self) -> bytes:
         """Return the canonical JSON text; raise TypeError or ValueError if :meth:`decode` would refuse it."""
-        text = json_text({"schema": SCHEMA, **plain(self)}).encode("ascii")
+        text = json_text({"schema": RUN_SCHEMA, **plain(self)}).encode("ascii")
         self.decode(text)
         return text
 
@@ -83,8 +83,8 @@ class RunHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """
         content = parsed(text, "header")
         schema = content.pop("schema", None) if isinstance(content, dict) else None
-        if schema != SCHEMA:
-            raise ValueError(f"expected schema {SCHEMA}, got {shown(schema)}")
+        if schema != RUN_SCHEMA:
+            raise ValueError(f"expected schema {RUN_SCHEMA}, got {shown(schema)}")
         content.pop("implied", None)  # formulas of columns, which some older files have
         header = decoded(content, cls, "header")
         if missing := [name for name in ("time", "distance", "quality") if name not in header.columns]:

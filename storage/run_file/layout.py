@@ -22,7 +22,7 @@ from acquisition.block import Block, Flag
 from storage.run_file.header import RunHeader
 from storage.schema import json_text, plain
 
-MAGIC = b"\x89HDF\r\n\x1a\n"
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 CHUNK = 65536
 HEADER = "/entry/provenance/header"
 SIGNAL = "/entry/signal"
@@ -60,7 +60,7 @@ _QUALITY = {
 }
 _VELOCITY = {"units": "m/s", "long_name": "velocity as the recording states it", **_NAN}
 _HOST = {"units": "ns", "long_name": "host's monotonic clock at arrival; -1 where no host was there"}
-COLUMNS = (
+STORED_COLUMNS = (
     StoredColumn(f"{SIGNAL}/time", "<f8", {"units": "s", "long_name": "time since the start of the run"}, "t"),
     StoredColumn(
         f"{SIGNAL}/distance", "<f8", {"units": "m", "long_name": "distance from the sensor", **_NAN}, "distance"
@@ -70,9 +70,9 @@ COLUMNS = (
     StoredColumn(f"{SIGNAL}/velocity", "<f8", _VELOCITY, "velocity", float("nan")),
     StoredColumn("/raw/host_mono_ns", "<i8", _HOST, "host_ns", NO_HOST_NS),
 )
-BY_NAME = {column.name: column for column in (*COLUMNS, StoredColumn("/raw/sequence", "<u4", {}))}
+BY_NAME = {column.name: column for column in (*STORED_COLUMNS, StoredColumn("/raw/sequence", "<u4", {}))}
 """The columns of files of all versions."""
-CHECKED = tuple(column.name for column in COLUMNS if column.field)
+CHECKED = tuple(column.name for column in STORED_COLUMNS if column.field)
 """The columns of a block, whose digests are checked when all blocks are read."""
 
 _NOISY = frozenset({"distance", "velocity"})

@@ -225,8 +225,8 @@ def _demand_hdf5(path: Path) -> None:
     remedy = "name a run file; springmass formats FILE shows what a file is"
     try:
         with open_regular(path) as stream:
-            head = stream.read(len(layout.MAGIC))
+            head = stream.read(len(layout.HDF5_MAGIC))
     except OSError as error:
         raise NotARun(path, f"the run file cannot be opened ({error.strerror or error})", remedy) from error
-    if head != layout.MAGIC:
+    if head != layout.HDF5_MAGIC:
         raise NotARun(path, f"expected a run file (HDF5), got a file that begins with {head!r}", remedy)

@@ -145,7 +145,7 @@ class RunWriter:
 
     def _write(self, block: Block, *, growing: bool) -> None:
         values = layout.arrays(block, self._sigma_m)
-        for column in layout.COLUMNS:
+        for column in layout.STORED_COLUMNS:
             array = values.get(column.name)
             if array is None and column.name not in self._digests:
                 continue

@@ -41,13 +41,13 @@ HIGHEST_CHANNEL = 255
 LATEST_NS = 1 << 62
 """Maximum time of a clock, ns: 146 years after the start of the host, or the year 2116 in UTC."""
 LOG_VERSION = 1
-MAGIC = b"\xf5\xa9"
+WIRE_MAGIC = b"\xf5\xa9"
 MAX_PAYLOAD = 65535
 _HEAD = struct.Struct("<2sHIqIBBH")
 _CRC = struct.Struct("<I")
 _HEAD_AND_CRC = struct.Struct(_HEAD.format + "I")
-HEAD_BYTES = _HEAD_AND_CRC.size
-LONGEST_RECORD = HEAD_BYTES + MAX_PAYLOAD
+RECORD_HEAD_BYTES = _HEAD_AND_CRC.size
+LONGEST_RECORD = RECORD_HEAD_BYTES + MAX_PAYLOAD
 """Maximum size of a record, bytes."""
 WRAP = 1 << 32
 """Sequence numbers count modulo this."""
@@ -88,7 +88,7 @@ def frame(kind: RecordKind, payload: bytes, sequence: int, mono_ns: int, log: in
     >>> frame(RecordKind.DATA, b"R0500", sequence=7, mono_ns=1, log=2, channel=3).hex(" ", -4)
     'f5a90500 07000000 01000000 00000000 02000000 02030000 034438e3 52303530 30'
     """
-    head = _HEAD.pack(MAGIC, len(payload), sequence % WRAP, mono_ns, log, kind, channel, 0)
+    head = _HEAD.pack(WIRE_MAGIC, len(payload), sequence % WRAP, mono_ns, log, kind, channel, 0)
     return head + _CRC.pack(zlib.crc32(payload, zlib.crc32(head))) + payload
 
 
@@ -97,13 +97,13 @@ def unframe(data: bytes, at: int, log: int | None) -> tuple[int, int, int, Recor
 
     Return None if there is none, or if it belongs to another log than number ``log``.
     """
-    start = at + HEAD_BYTES
+    start = at + RECORD_HEAD_BYTES
     if start > len(data):
         return None
     magic, length, sequence, mono_ns, number, code, channel, _, crc = _HEAD_AND_CRC.unpack_from(data, at)
     end = start + length
     # Cheap checks first, because a search through damaged bytes calls this for every accidental magic.
-    if magic != MAGIC or end > len(data) or (number != log and log is not None) or code not in _KINDS:
+    if magic != WIRE_MAGIC or end > len(data) or (number != log and log is not None) or code not in _KINDS:
         return None
     payload = data[start:end]
     if not 0 <= mono_ns <= LATEST_NS or crc != zlib.crc32(payload, zlib.crc32(data[at : at + _HEAD.size])):

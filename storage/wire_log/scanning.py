@@ -17,10 +17,19 @@ from pathlib import Path
 from acquisition.regular_file import open_regular
 from storage.errors import NotALog, one_line
 from storage.schema import ValueRefused
-from storage.wire_log.records import HEAD_BYTES, LONGEST_RECORD, MAGIC, WRAP, LogHeader, Record, RecordKind, unframe
+from storage.wire_log.records import (
+    LONGEST_RECORD,
+    RECORD_HEAD_BYTES,
+    WIRE_MAGIC,
+    WRAP,
+    LogHeader,
+    Record,
+    RecordKind,
+    unframe,
+)
 
 FOREIGN = "springmass does not write such logs; ask where it comes from"
-STRETCH = 1 << 20
+PIECE_BYTES = 1 << 20
 """Number of bytes that are read at a time."""
 
 
@@ -82,14 +91,14 @@ class Scan:
         damage, data, base, at = self.damage, b"", self._end, 0
         while True:
             while len(data) - at < LONGEST_RECORD and base + len(data) < size:
-                more = self._read(base + len(data), min(STRETCH, size - base - len(data)))
+                more = self._read(base + len(data), min(PIECE_BYTES, size - base - len(data)))
                 size = size if more else base + len(data)  # somebody has cut the file meanwhile
                 data, base, at = data[at:] + more, base + at, 0
             record = unframe(data, at, self._log)
             if record is None:
                 if at >= len(data):
                     break
-                following = data.find(MAGIC, at + 1)
+                following = data.find(WIRE_MAGIC, at + 1)
                 at = following if following >= 0 else max(at + 1, len(data) - 1)  # the last byte may begin a magic
                 continue
             sequence, mono_ns, self._log, kind, channel, payload = record
@@ -97,7 +106,7 @@ class Scan:
             if skipped := offset - self._end:
                 damage.skipped_at = damage.skipped_at if damage.skipped_bytes else self._end
                 damage.skipped_bytes += skipped
-            at += HEAD_BYTES + len(payload)
+            at += RECORD_HEAD_BYTES + len(payload)
             self._end = base + at
             missing = (sequence - self._expected) % WRAP
             if missing >= WRAP // 2:
@@ -160,7 +169,7 @@ class LogContents:
     def pieces(self) -> Iterator[bytes]:
         """Yield all bytes of the log."""
         at = 0
-        while piece := self._read(at, min(STRETCH, self.size - at)):
+        while piece := self._read(at, min(PIECE_BYTES, self.size - at)):
             yield piece
             at += len(piece)
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.live.firmware import HEX, VERSION
+from acquisition.live.firmware import FIRMWARE_VERSION, HEX
 from tests.cli.conftest import Cli
 
 PERIOD_S = 0.01
@@ -34,7 +34,7 @@ class Board:
     Every reading has the status ``letter``.
     """
 
-    def __init__(self, version: str = VERSION, letter: str = "E") -> None:
+    def __init__(self, version: str = FIRMWARE_VERSION, letter: str = "E") -> None:
         self.heard: list[str] = []
         self._version, self._letter = version, letter
         self._settings = {"R": "100", "G": "116,25000", "J": "0", "N": ""}
@@ -125,7 +125,7 @@ def test_a_fault_that_the_sensor_knows_is_said_in_its_words(
     cli: Cli, board: Callable[..., Board], tmp_path: Path, letter: str, words: str
 ) -> None:
     """Once a second has passed without a distance; as none comes, the recording ends with 4."""
-    done = recorded(cli, board(VERSION, letter).port, tmp_path / "run.h5", 2.5)
+    done = recorded(cli, board(FIRMWARE_VERSION, letter).port, tmp_path / "run.h5", 2.5)
     assert words in done.err
     assert done.code == 4
 
@@ -136,7 +136,7 @@ def test_firmware_sets_a_board_and_shows_what_it_then_is(cli: Cli, board: Callab
     settings = ("--rate", "50", "--gate", "600,4000", "--spread", "1000", "--name", "bench-3")
     done = cli("firmware", "--port", here.port, *settings)
     assert done.code == 0, done.err
-    assert all(words in done.out for words in (VERSION, "bench-3", "50 Hz", "600 to 4000 us"))
+    assert all(words in done.out for words in (FIRMWARE_VERSION, "bench-3", "50 Hz", "600 to 4000 us"))
     assert [word for word in here.heard if word != "?"] == ["R50", "G600,4000", "J1000", "Nbench-3"]
     refused = cli("firmware", "--port", here.port, "--rate", "13")
     assert refused.code == 4

@@ -20,7 +20,7 @@ from acquisition.clock import VirtualClock
 from springmass.cli import main
 from storage.recorder import QUEUE_BYTES, Recorder
 from storage.run_file.reading import open_run
-from storage.wire_log.records import HEAD_BYTES, LogHeader, Record, RecordKind, SensorEntry
+from storage.wire_log.records import RECORD_HEAD_BYTES, LogHeader, Record, RecordKind, SensorEntry
 from tests.faults.conftest import frame_of
 from tests.sampling import sampled
 from tests.wire import WAIT_S, Disk, json_of, parse_log
@@ -88,7 +88,7 @@ def test_a_hanging_disk_loses_what_does_not_fit_and_nothing_else(seed: int, tmp_
         recorder.drain()
         send(recorder, 1.0 + hang_s, 2.0 + hang_s)
     # What was put while the disk hung, but for the read that hung with it and those that went along.
-    sizes = [HEAD_BYTES + len(data) for each in put.values() for stamp_ns, data in each if hung(stamp_ns)]
+    sizes = [RECORD_HEAD_BYTES + len(data) for each in put.values() for stamp_ns, data in each if hung(stamp_ns)]
     if status.dropped_records:
         assert QUEUE_BYTES - max(sizes) < status.queued_bytes <= QUEUE_BYTES
         assert sum(sizes) > status.queued_bytes
@@ -131,7 +131,7 @@ def test_what_did_not_fit_is_a_gap_with_its_time_and_length(tmp_path: Path, caps
     """Ten seconds beyond a small queue: the run has the event, the gap where they are missing, and says so."""
     disk = Disk()
     header = LogHeader(sensors=(SensorEntry(0, "ffhls"),), mono_ns=0, unix_ns=0)
-    room = 50 * (HEAD_BYTES + 4)
+    room = 50 * (RECORD_HEAD_BYTES + 4)
     with Recorder(tmp_path / "run.wire", header, VirtualClock(), queue_bytes=room, open_file=disk) as recorder:
         for number in range(400):
             if number == 100:

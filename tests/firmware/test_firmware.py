@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from acquisition.decoders.family import Identity
-from acquisition.decoders.line_protocol import LONGEST, LineProtocolDecoder
-from acquisition.live.firmware import HEX, MODEL, VERSION
+from acquisition.decoders.line_protocol import LONGEST_LINE, LineProtocolDecoder
+from acquisition.live.firmware import FIRMWARE_VERSION, HEX, MODEL
 
 from .conftest import ELF, Emulate, Emulated
 
@@ -121,11 +121,11 @@ def test_commands_set_rate_gate_spread_and_name_and_are_answered(emulate: Emulat
         if decoder.status.identity:
             identities.append(decoder.status.identity)
     settings = {"rate_hz": 100, "near_us": 116, "far_us": 25_000, "spread_us": 0, "thermometer": 0}
-    expected = [Identity(MODEL, VERSION, "", dict(settings))] * 2
+    expected = [Identity(MODEL, FIRMWARE_VERSION, "", dict(settings))] * 2
     for change in ({"rate_hz": 125}, {"near_us": 200, "far_us": 2100}, {"spread_us": 500}):
         settings |= change
-        expected.append(Identity(MODEL, VERSION, "", dict(settings)))
-    expected.append(Identity(MODEL, VERSION, "bench-3", settings))
+        expected.append(Identity(MODEL, FIRMWARE_VERSION, "", dict(settings)))
+    expected.append(Identity(MODEL, FIRMWARE_VERSION, "bench-3", settings))
     assert identities == expected
     assert dict(decoder.faults) == {
         **dict.fromkeys(decoder.faults, 0),
@@ -187,7 +187,7 @@ def test_every_line_is_as_long_as_any_other_of_its_kind(emulate: Emulate) -> Non
     """Up to the digits of echo and temperature: a host that compares clocks would take growth for a rate."""
     lines = [line for _, line in emulate(12.0, amplitude=0.0).lines if line.startswith(b"$R1,")]
     assert len({len(line) for line in lines}) == 1
-    assert len(lines[0]) < LONGEST
+    assert len(lines[0]) < LONGEST_LINE
 
 
 def test_the_firmware_is_small_and_leaves_the_watchdog_alone(built: Path, emulate: Emulate) -> None:

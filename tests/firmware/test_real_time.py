@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.live.firmware import VERSION
+from acquisition.live.firmware import FIRMWARE_VERSION
 from storage.run_file.reading import open_run
 from storage.wire_log.records import RecordKind
 from tests.wire import parse_log
@@ -73,5 +73,5 @@ def test_record_reads_the_firmware_in_real_time(running: tuple[Path, subprocess.
     assert np.isnan(samples.distance).any()
     assert set(decoding["conditions"]) <= {"no_echo", "busy"}
     if "identity" in decoding:  # said every five seconds of the emulator's time
-        assert decoding["identity"]["version"] == VERSION
+        assert decoding["identity"]["version"] == FIRMWARE_VERSION
     assert "Traceback" not in done.stderr

@@ -8,9 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 
 MODEL = "springmass-rangefinder"
-VERSION = "2.0.0"
+FIRMWARE_VERSION = "2.0.0"
 HEX = Path(__file__).with_name("springmass_rangefinder.hex")
-BAUDS = (115200, 57600)
+BOOTLOADER_BAUDS = (115200, 57600)
 """Baud rates of the bootloaders: first for the Uno and Nanos since 2018, then for older Nanos and most clones."""
 
 WIRING = """\

@@ -21,7 +21,7 @@ from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.table import Table
 from acquisition.recordings.tables.text import HEAD_BYTES
 
-MOST_BYTES = 1 << 28
+MOST_UNPACKED_BYTES = 1 << 28
 """Maximum unpacked size of all parts of a file, bytes; one hour of a phone's sensor data takes a tenth of it."""
 _MAGIC = b"PK\x03\x04"
 NOT_INSIDE = ("motion-sensor", "workbook", "zip")  # the first sums velocities only in a file of its own
@@ -83,8 +83,8 @@ def members(path: str, data: bytes) -> Iterator[tuple[str, bytes]]:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             listed = list(filter(_is_wanted, archive.infolist()))
             total = sum(each.file_size for each in listed)
-            if len(listed) > _MOST_MEMBERS or total > MOST_BYTES:
-                limits = f"at most {_MOST_MEMBERS} files of {MOST_BYTES} bytes"
+            if len(listed) > _MOST_MEMBERS or total > MOST_UNPACKED_BYTES:
+                limits = f"at most {_MOST_MEMBERS} files of {MOST_UNPACKED_BYTES} bytes"
                 problem = f"expected {limits}, got {len(listed)} of {total} bytes"
                 raise FormatError(path, problem, "unpack it, and name a file inside")
             for each in listed:

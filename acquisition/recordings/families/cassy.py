@@ -16,7 +16,7 @@ from acquisition.errors import FormatError
 from acquisition.recordings.families.markup import begins, numbers_of, read_markup, tables_of
 from acquisition.recordings.tables.cells import parse_number
 from acquisition.recordings.tables.format import ColumnFormat
-from acquisition.recordings.tables.headings import Heading, Role, is_time
+from acquisition.recordings.tables.headings import ColumnRole, Heading, is_time
 from acquisition.recordings.tables.rows import read_rows
 from acquisition.recordings.tables.table import Table, side_by_side
 from acquisition.recordings.tables.text import HEAD_BYTES, Text, head_lines, text_of
@@ -54,7 +54,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
 
 
 def _heading(name: str, symbol: str, unit: str) -> Heading:
-    role: Role = "time" if is_time(name) else "aside" if name == "Index" else "channel"
+    role: ColumnRole = "time" if is_time(name) else "aside" if name == "Index" else "channel"
     return Heading(f"{name} {symbol}".strip(), unit, role=role)
 
 

@@ -24,7 +24,7 @@ from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.recording import FormatIssue, Original, Recording, Survey
 from acquisition.recordings.sampling.flags import IRREGULAR, UNREAD_FLAGS, time_flags
 from acquisition.recordings.sampling.timing import median
-from acquisition.recordings.tables.cells import EMPTY, UNREAD, scaled
+from acquisition.recordings.tables.cells import EMPTY_CELL, UNREAD_CELL, scaled
 from acquisition.recordings.tables.channel import check_values, read_channel
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.format import ColumnFormat, text_format
@@ -32,10 +32,10 @@ from acquisition.recordings.tables.headings import Heading
 from acquisition.recordings.tables.layout import columns_of, find_table, runs_forward
 from acquisition.recordings.tables.samples import Samples
 from acquisition.recordings.tables.table import Header, Table
-from acquisition.units import LENGTHS
+from acquisition.units import LENGTH_POWERS
 
 _TITLE = "motion sensor data file"
-_UNIT = rf"\(({'|'.join(LENGTHS)})"
+_UNIT = rf"\(({'|'.join(LENGTH_POWERS)})"
 _COLUMNS = re.compile(
     rf"time \(s\)\t(?:(?P<distance>distance) {_UNIT}\)(?P<error>\tdist(?:ance)? error \(\2\))?|velocity {_UNIT}/s\))"
 )
@@ -95,9 +95,9 @@ def _tables(path: str, data: bytes) -> list[Table]:
     if table.lines is None:
         return [table]
     *cells, beyond = (column.of_size(table.lines.rows).forms for column in table.beside)
-    damaged = (np.array(cells) <= EMPTY).any(axis=0) | (beyond != EMPTY)
+    damaged = (np.array(cells) <= EMPTY_CELL).any(axis=0) | (beyond != EMPTY_CELL)
     value = table.columns[0].of_size(damaged.size)
-    value = replace(value, decimals=np.where(damaged, UNREAD, value.forms))
+    value = replace(value, decimals=np.where(damaged, UNREAD_CELL, value.forms))
     lines = table.lines._replace(cut=not table.lines.ended and bool(damaged[-1:].any()))
     return [replace(table, columns=(value,), lines=lines)]
 

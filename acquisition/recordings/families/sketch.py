@@ -13,8 +13,8 @@ from collections import Counter
 import numpy as np
 
 from acquisition.errors import FormatError
-from acquisition.line_numbers import UNITS, Number, find_distance, has_decimal_comma, numbers
-from acquisition.recordings.tables.cells import CLOCK, UNREAD, clock_times
+from acquisition.line_numbers import UNIT_OF_WORD, Number, find_distance, has_decimal_comma, numbers
+from acquisition.recordings.tables.cells import CLOCK, UNREAD_CELL, clock_times
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.headings import Heading, is_time
 from acquisition.recordings.tables.layout import runs_forward
@@ -77,7 +77,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
     headings, columns = [], []
     for at, (words, unit) in enumerate(kind):
         printed = re.findall(r"[^\W\d_]+", rows[0][1][at].before)
-        name = " ".join(printed[:-1] if len(words) > 1 and words[-1] in UNITS else printed)
+        name = " ".join(printed[:-1] if len(words) > 1 and words[-1] in UNIT_OF_WORD else printed)
         is_other = distance is not None and rows[0][1][at].start != distance.start
         headings.append(
             Heading(
@@ -85,7 +85,7 @@ def _tables(path: str, data: bytes) -> list[Table]:
             )
         )
         values = np.array([found[at].value if found else np.nan for _, found in rows])
-        forms = [max(0, round(-np.log10(found[at].step))) if found else UNREAD for _, found in rows]
+        forms = [max(0, round(-np.log10(found[at].step))) if found else UNREAD_CELL for _, found in rows]
         columns.append(Column("", "", values, np.array(forms, np.int8)))
     stamps = [match[0].strip(" [").encode() if (match := _CLOCK.match(line)) else b"" for line, _ in rows]
     if all(stamp or not found for stamp, (_, found) in zip(stamps, rows, strict=True)):

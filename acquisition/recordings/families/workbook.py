@@ -19,7 +19,7 @@ from acquisition.recordings.identify import foreign_format
 from acquisition.recordings.tables.format import ColumnFormat
 from acquisition.recordings.tables.table import Table
 
-MOST_BYTES = 1 << 27
+MOST_WORKBOOK_BYTES = 1 << 27
 """Maximum size of a workbook, bytes."""
 MOST_LETTERS = 1 << 27
 """Maximum number of characters of all cells."""
@@ -41,8 +41,8 @@ def _evidence(head: bytes) -> str:
 
 
 def _tables(path: str, data: bytes) -> list[Table]:
-    if len(data) > MOST_BYTES:
-        raise FormatError(path, f"expected a workbook of at most {MOST_BYTES} bytes, got {len(data)}", _REMEDY)
+    if len(data) > MOST_WORKBOOK_BYTES:
+        raise FormatError(path, f"expected a workbook of at most {MOST_WORKBOOK_BYTES} bytes, got {len(data)}", _REMEDY)
     return tables_inside(path, _sheets(path, data), "sheet", (*NOT_INSIDE, "sketch"))
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquisition.block import B1, F8
 
 I1 = NDArray[np.int8]
-NAN, EMPTY, UNREAD = -1, -2, -3
+NAN_CELL, EMPTY_CELL, UNREAD_CELL = -1, -2, -3
 """In place of a number of decimals: the word NaN, an empty cell, a cell that is not a number."""
 EXPONENT = 64
 """Added to the number of decimals of the mantissa if a number has an exponent."""
@@ -42,13 +42,13 @@ def cell(text: str) -> tuple[float, int]:
     This is stricter than ``float()``: it rejects ``1_000``, ``inf``, digits of other scripts, and overflow.
     """
     if not text:
-        return math.nan, EMPTY
+        return math.nan, EMPTY_CELL
     match = _CELL.fullmatch(text)
     if match is None:
-        return math.nan, NAN if text.lower() in ("nan", "-nan", "+nan") else UNREAD
+        return math.nan, NAN_CELL if text.lower() in ("nan", "-nan", "+nan") else UNREAD_CELL
     value = float(text.replace(",", "."))
     if not math.isfinite(value):
-        return math.nan, UNREAD
+        return math.nan, UNREAD_CELL
     decimals = min(len(match[2] or match[3] or ""), EXPONENT - 1)
     return value, decimals + (EXPONENT if match[4] else 0)
 
@@ -69,7 +69,7 @@ def clock_s(cell: str) -> tuple[str, float, int] | None:
 
 def clock_times(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
     """Return times of day in seconds, the decimals of each, and a mask without commas, as :func:`read_cells` does."""
-    values, decimals = np.full(len(cells), np.nan), np.full(len(cells), UNREAD, np.int8)
+    values, decimals = np.full(len(cells), np.nan), np.full(len(cells), UNREAD_CELL, np.int8)
     for row, each in enumerate(cells):
         if (time := clock_s(each.strip(b'"').decode("latin-1"))) is not None:
             _, values[row], decimals[row] = time
@@ -79,7 +79,7 @@ def clock_times(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
 def parse_number(text: str) -> float | None:
     """Return the number in a cell, which may be NaN; None for any other text."""
     value, decimals = cell(text)
-    return None if decimals in (EMPTY, UNREAD) else value
+    return None if decimals in (EMPTY_CELL, UNREAD_CELL) else value
 
 
 def split_page(page: bytes, delimiter: str) -> list[list[bytes]]:
@@ -125,7 +125,7 @@ def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
     fixed &= lengths <= _LONGEST
     values = np.full(text.size, np.nan)
     places = np.where(marked == 1, lengths - 1 - marks.argmax(axis=1), 0)
-    decimals = np.where(lengths == 0, EMPTY, np.minimum(places, EXPONENT - 1)).astype(np.int8)
+    decimals = np.where(lengths == 0, EMPTY_CELL, np.minimum(places, EXPONENT - 1)).astype(np.int8)
     comma = raw == ord(",")
     raw[comma] = ord(".")
     values[fixed] = text[fixed].astype(np.float64)

@@ -21,7 +21,7 @@ from acquisition.recordings.sampling.flags import (
     value_traps,
 )
 from acquisition.recordings.sampling.timing import ChannelRows, find_timing
-from acquisition.recordings.tables.cells import EMPTY, I1, UNREAD, scaled, usual_decimals
+from acquisition.recordings.tables.cells import EMPTY_CELL, I1, UNREAD_CELL, scaled, usual_decimals
 from acquisition.recordings.tables.choose import Answers, choose_channel, measure
 from acquisition.recordings.tables.samples import Samples
 from acquisition.recordings.tables.table import Column, Lines, Table, names_apart
@@ -132,15 +132,15 @@ def _text_rows(
     own, time = column.of_size(lines.rows), table.times and table.times.of_size(lines.rows)
     form = own.forms
     # A row of words without a value is a remark between rows; a row of a longer channel is none of this channel's.
-    remark, present, unread = lines.words & (form == EMPTY), np.ones(form.size, bool), form == UNREAD
+    remark, present, unread = lines.words & (form == EMPTY_CELL), np.ones(form.size, bool), form == UNREAD_CELL
     if time is not None:
-        remark &= (time.forms == EMPTY) | (time.forms == UNREAD)
-        present = (form != EMPTY) | (time.forms != EMPTY)
-        if lines.cut and time.forms[-1] == UNREAD:
+        remark &= (time.forms == EMPTY_CELL) | (time.forms == UNREAD_CELL)
+        present = (form != EMPTY_CELL) | (time.forms != EMPTY_CELL)
+        if lines.cut and time.forms[-1] == UNREAD_CELL:
             unread[-1] = True  # its time is incomplete
     if table.ragged or time is None:
         # Empty cells at the end follow the channel's last sample; an empty cell before it is a lost sample.
-        filled = np.flatnonzero(form != EMPTY)
+        filled = np.flatnonzero(form != EMPTY_CELL)
         present[int(filled[-1]) + 1 if filled.size else 0 :] = False
     keep = present | remark
     if not (keep & ~remark).any():

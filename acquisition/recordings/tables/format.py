@@ -13,7 +13,7 @@ from acquisition.recordings.recording import FormatIssue, Recording, Survey
 from acquisition.recordings.tables.channel import check_values, read_channel, read_samples, rows_of
 from acquisition.recordings.tables.choose import Answers
 from acquisition.recordings.tables.rows import read_rows
-from acquisition.recordings.tables.table import Column, Header, Stated, Table, names_apart, set_back, side_by_side
+from acquisition.recordings.tables.table import Column, Header, Table, TableFacts, names_apart, set_back, side_by_side
 from acquisition.recordings.tables.text import Text, head_lines, text_of
 from acquisition.units import NUMBER
 
@@ -142,7 +142,7 @@ def text_format(
 def _tables(path: str, text: Text, begin: int, header: Header, stop: int) -> list[Table]:
     """Read the rows below a header that begins at a line."""
     read = read_rows(path, text, begin + header.lines, stop, header.delimiter, header.clock)
-    stated = {each.name: getattr(header, each.name) for each in fields(Stated)}
+    stated = {each.name: getattr(header, each.name) for each in fields(TableFacts)}
     common = replace(read, **{**stated, "traps": (*header.traps, *read.traps)})
     tables = side_by_side(common, header.headings, header.run)
     if not tables:

@@ -39,7 +39,7 @@ _IN = re.compile(r"(?P<name>.*?\S)\s+in\s+(?P<unit>\S+)")
 _NO_TAIL = frozenset(("1", "in", "g", "mg"))
 """Units that often end a name without being its unit: ``V_in``, ``x_1``."""
 
-Role = Literal["", "channel", "time", "aside", "ignored"]
+ColumnRole = Literal["", "channel", "time", "aside", "ignored"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +59,10 @@ class Heading:
     name: str
     unit: str = ""
     run: str = ""
-    role: Role = ""
+    role: ColumnRole = ""
 
 
-def role_of(heading: Heading) -> Role:
+def role_of(heading: Heading) -> ColumnRole:
     """Return the role of a column, from its name if the heading does not state it."""
     if heading.role:
         return heading.role

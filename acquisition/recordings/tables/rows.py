@@ -12,10 +12,10 @@ from acquisition.block import B1, F8
 from acquisition.errors import FormatError
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.cells import (
-    EMPTY,
+    EMPTY_CELL,
     EXPONENT,
     I1,
-    UNREAD,
+    UNREAD_CELL,
     clock_times,
     is_cut,
     read_cells,
@@ -55,11 +55,11 @@ def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: in
                 pieces.append([])
                 sizes.append(0)
             if missing := count - sizes[at]:
-                empty = np.full(missing, np.nan), np.full(missing, EMPTY, np.int8), np.zeros(missing, bool)
+                empty = np.full(missing, np.nan), np.full(missing, EMPTY_CELL, np.int8), np.zeros(missing, bool)
                 pieces[at].append(empty)
             pieces[at].append(read_cells(cells) if at != clock else clock_times(cells))
             sizes[at] = count + len(rows)
-            for row in np.flatnonzero(pieces[at][-1][1] == UNREAD).tolist() if mark else ():
+            for row in np.flatnonzero(pieces[at][-1][1] == UNREAD_CELL).tolist() if mark else ():
                 if _THOUSANDS.fullmatch(cells[row]):
                     shown = cells[row].decode("utf-8", "replace")
                     problem = f'expected plain numbers, got a thousands separator in "{shown}"'
@@ -77,11 +77,11 @@ def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: in
     if count and not ended:
         own_values, own_decimals = columns[len(last) - 1].values, columns[len(last) - 1].forms
         if is_cut(own_values, own_decimals):
-            own_values[-1], own_decimals[-1] = np.nan, UNREAD
-        cut = any(column.values.size == count and column.forms[-1] == UNREAD for column in columns)
+            own_values[-1], own_decimals[-1] = np.nan, UNREAD_CELL
+        cut = any(column.values.size == count and column.forms[-1] == UNREAD_CELL for column in columns)
     if clock is not None and clock < len(columns):
         count_from_first(columns[clock])
-    words = columns[0].of_size(count).forms == UNREAD if columns else np.zeros(0, bool)
+    words = columns[0].of_size(count).forms == UNREAD_CELL if columns else np.zeros(0, bool)
     where = Lines(np.concatenate(numbers), words, ended, cut, text.zeros)
     return Table(tuple(columns), lines=where, traps=traps)
 

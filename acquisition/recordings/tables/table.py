@@ -13,7 +13,7 @@ import numpy as np
 from acquisition.block import B1, F8, I8
 from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.sampling.timing import Formula, median
-from acquisition.recordings.tables.cells import EMPTY, I1
+from acquisition.recordings.tables.cells import EMPTY_CELL, I1
 from acquisition.recordings.tables.headings import Heading, role_of, unique
 from acquisition.units import Measure, measure_of
 
@@ -84,7 +84,9 @@ class Column:
         more = size - self.values.size
         if more <= 0:
             return self
-        decimals = None if self.decimals is None else np.concatenate((self.decimals, np.full(more, EMPTY, np.int8)))
+        decimals = (
+            None if self.decimals is None else np.concatenate((self.decimals, np.full(more, EMPTY_CELL, np.int8)))
+        )
         return replace(self, values=np.concatenate((self.values, np.full(more, np.nan))), decimals=decimals)
 
 
@@ -109,7 +111,7 @@ class Lines(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Stated:
+class TableFacts:
     """What the lines above the rows may say of all channels, and a :class:`Header` and a :class:`Table` share.
 
     Parameters
@@ -133,8 +135,8 @@ class Stated:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Header(Stated):
-    """What the lines above the rows of a text say; further keywords are those of :class:`Stated`.
+class Header(TableFacts):
+    """What the lines above the rows of a text say; further keywords are those of :class:`TableFacts`.
 
     Parameters
     ----------
@@ -161,8 +163,8 @@ class Header(Stated):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table(Stated):
-    """Columns of one run that share their times; further keywords are those of :class:`Stated`.
+class Table(TableFacts):
+    """Columns of one run that share their times; further keywords are those of :class:`TableFacts`.
 
     Parameters
     ----------

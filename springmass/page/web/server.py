@@ -30,7 +30,7 @@ LOG = logging.getLogger("page")  # not below "springmass", whose messages are al
 STATIC = Path(__file__).parents[1] / "static"
 TURN_S = 0.0225
 """Time between two reads of the log: little longer than a screen frame; samples reach the screen within 40 ms."""
-MANY, EVERY = 4, 4
+MANY_VIEWERS, EVERY = 4, 4
 """With more viewers than MANY, samples are sent after every fourth read of the log, eleven times a second."""
 STATE_S = 0.5
 LAST_S = 1.5
@@ -124,7 +124,7 @@ class Server:
             self._texts["state"] = json_of(page.state())
         self._frames.clear()
         self._turn += 1
-        if self._viewers <= MANY or self._turn % EVERY == 0:
+        if self._viewers <= MANY_VIEWERS or self._turn % EVERY == 0:
             turned, self._turned = self._turned, asyncio.Event()
             turned.set()
 

@@ -22,8 +22,8 @@ from springmass.runs.simulating.simulation import FINE, count_of, solve
 WIDER = 1.96  # standard deviations of the noise by which the band is widened, for 95 %
 HALF = 0.5
 FURTHEST_U = 20.0  # maximum change of an input, in standard uncertainties
-FARTHEST = 1e300  # m; residual assigned to a change that gives no finite residual
-COEFFICIENTS = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
+LARGEST_RESIDUAL_M = 1e300  # m; residual assigned to a change that gives no finite residual
+SCENE_KEYS = {"gamma": "gamma_per_s", "beta": "beta_per_m_s", "mu": "mu_m_per_s"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +102,8 @@ def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) ->
     if scene.spring_constant_n_per_m is None and "spring_constant" in scale:
         slopes[len(taken), 0] = 2.0 * scale["spring_constant"].value / omega
         taken["spring_constant_n_per_m"] = scale["spring_constant"]
-    if damping and all(getattr(scene, name) is None for name in COEFFICIENTS.values()):
-        for name, attribute in COEFFICIENTS.items():
+    if damping and all(getattr(scene, name) is None for name in SCENE_KEYS.values()):
+        for name, attribute in SCENE_KEYS.items():
             if name in law.names:
                 slopes[len(taken), 2 + law.names.index(name)] = 1.0
                 taken[attribute] = replace(law[name], value=max(law[name].value, 0.0))
@@ -184,7 +184,7 @@ def _shifts(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> 
             with np.errstate(over="ignore", invalid="ignore"):
                 moved = (middle * np.expm1(shift * of)).real
                 size = float(np.sqrt(np.mean((at - moved) ** 2)))
-            return size if math.isfinite(size) else FARTHEST
+            return size if math.isfinite(size) else LARGEST_RESIDUAL_M
 
         grid = np.linspace(-FURTHEST_U, FURTHEST_U, 401)
         best = float(grid[int(np.argmin([rms(each) for each in grid]))])

@@ -16,7 +16,7 @@ from springmass.runs.simulating.simulation import prepare
 
 REST_M = 0.25  # height of the bob's rest position above the sensor, m
 STEPS_A_RADIAN = 24  # steps per radian; interpolation between them has an error of 1e-8 of the amplitude
-STRETCH = 2000  # number of steps solved at a time, when the recording needs them
+STRETCH_STEPS = 2000  # number of steps solved at a time, when the recording needs them
 EXAMPLE = Scene.from_mapping(
     {
         "bob": {"mass_kg": 0.2},
@@ -66,10 +66,10 @@ def bench_position(
         free_s = t if release is None else t - release.at_s
         if release is not None and free_s < 0.0:
             return REST_M
-        stretch, since = divmod(max(free_s, 0.0), STRETCH * step_s)
+        stretch, since = divmod(max(free_s, 0.0), STRETCH_STEPS * step_s)
         while len(solved) <= stretch:
             start = Problem(problem.equation, solved[-1].y[-1], solved[-1].v[-1]) if solved else problem
-            solved.append(STRANG.run(start, step_s, STRETCH))
+            solved.append(STRANG.run(start, step_s, STRETCH_STEPS))
         return REST_M + float(solved[int(stretch)].at(np.array([since]))[0])
 
     return position

@@ -15,8 +15,8 @@ from springmass.charts.chart import Chart, Panel, Series, band_of, line_of
 from springmass.runs.simulating.against import Against
 from springmass.runs.simulating.simulation import EULERS, Eulers, Simulation, beside_exact, growths
 
-PERIODS, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
-POINTS = 1500
+PERIODS_DRAWN, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
+POINTS_DRAWN = 1500
 GROWN = 1e6  # multiple of the starting amplitude above which curves are cut off
 
 
@@ -26,7 +26,7 @@ def simulation(found: Simulation, mass_kg: float | None, over: Against | None = 
     exact = runs.exact
     period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
     turns = max(2, int(TURNS * period / exact.spacing_s) + 1)
-    end = PERIODS * period if exact.t[-1] > 2 * PERIODS * period else None
+    end = PERIODS_DRAWN * period if exact.t[-1] > 2 * PERIODS_DRAWN * period else None
     label, kg = ("E per mass / (mJ/kg)", 1.0) if mass_kg is None else ("E / mJ", mass_kg)
     beside_run = _measured(found, kg, over, exact.t[-1], TURNS * period)
     of_position = _both(runs, "y / mm", lambda of, n: (of.t[:n], of.y[:n] * 1e3), beside_run[:1])
@@ -84,7 +84,7 @@ def _energy(of: Trajectory, count: int, mass_kg: float) -> tuple[F8, F8]:
     relative = of.relative_energy()[:count]
     grown = np.flatnonzero(relative > GROWN**2)
     end = max(2, int(grown[0])) if grown.size else count
-    rows = np.unique(np.linspace(0, end - 1, min(end, POINTS)).astype(np.intp))
+    rows = np.unique(np.linspace(0, end - 1, min(end, POINTS_DRAWN)).astype(np.intp))
     start = of.problem.amplitude_m() * of.problem.equation.angular_frequency_per_s
     return of.t[rows], 0.5e3 * mass_kg * start * start * relative[rows]
 
@@ -114,7 +114,7 @@ def _error(found: Simulation, runs: Eulers) -> tuple[Panel, ...]:
     for run, words in curves:
         error = np.maximum.accumulate(np.abs(run.y - runs.exact.y[: len(run.y)])) / start
         drawn = np.flatnonzero((error > 0) & (error < GROWN))
-        rows = drawn[np.unique(np.linspace(0, drawn.size - 1, min(drawn.size, POINTS)).astype(np.intp))]
+        rows = drawn[np.unique(np.linspace(0, drawn.size - 1, min(drawn.size, POINTS_DRAWN)).astype(np.intp))]
         series.append(line_of(words, run.t[rows], error[rows], "other"))
     predicted = found.solution.error
     if predicted is not None and 0.0 < predicted < GROWN:
@@ -142,7 +142,7 @@ def band(found: Simulation, spread: Band) -> Chart:
     end = float(found.trajectory.t[-1])
     # The motion is drawn for the last periods, where the grid is fine enough; amplitude and band for the whole run.
     period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
-    last: F8 = np.linspace(max(0.0, end - PERIODS * period), end, POINTS)
+    last: F8 = np.linspace(max(0.0, end - PERIODS_DRAWN * period), end, POINTS_DRAWN)
     whole = spread.t[spread.t <= end]
     amplitude, of_amplitude = spread.amplitude_at(whole)
     middle = found.trajectory.at(last)

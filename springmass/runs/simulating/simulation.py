@@ -31,7 +31,7 @@ BAND_SHARE, LARGEST_DEFAULT = 0.01, 1e-3
 MOST_SAMPLES = 20_000_000
 REFERENCE_RTOL = 1e-13
 EULERS = (("forward-euler", "forward Euler"), ("symplectic-euler", "symplectic Euler"))
-ROUGH, EXACT = 1e-3, 1e-9  # errors over the amplitude: one that is visible, and one that is called exact
+VISIBLE_ERROR, EXACT_ERROR = 1e-3, 1e-9  # errors over the amplitude: one that is visible, and one that is called exact
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -247,10 +247,10 @@ def beside_exact(found: Simulation) -> Eulers:
     if found.check is not None:
         run = found.check.reference
     else:
-        if error is None or not error <= ROUGH:
-            better = auto(found.problem, run.spacing_s, len(run.y) - 1, ROUGH)
+        if error is None or not error <= VISIBLE_ERROR:
+            better = auto(found.problem, run.spacing_s, len(run.y) - 1, VISIBLE_ERROR)
             run, error = better.trajectory, better.error
-        if error is None or error >= EXACT:
+        if error is None or error >= EXACT_ERROR:
             words = f"solved to {error:.0e}"
     return Eulers(run, words, tuple(_euler(found.problem, run, name) for name, _ in EULERS))
 
@@ -332,7 +332,7 @@ def _measured_growth(problem: Problem, integrator: Integrator, step_s: float, st
     if steps < 2 * period or problem.amplitude_m() == 0.0:
         return None
     try:
-        both = [integrator.run(problem, step_s, steps), auto(problem, step_s, steps, ROUGH).trajectory]
+        both = [integrator.run(problem, step_s, steps), auto(problem, step_s, steps, VISIBLE_ERROR).trajectory]
     except DynamicsError:
         return None  # a step that is far too large, or a bob that comes to rest
     with np.errstate(divide="ignore"):

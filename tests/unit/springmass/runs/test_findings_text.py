@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from springmass.terminal.printing import FIRST, findings_text
+from springmass.terminal.printing import WARNINGS_SHOWN, findings_text
 
 WARNINGS = ("rest_drift", "unit_assumed", "clipped", "spring_mass_missing", "quantised")
 
@@ -14,9 +14,9 @@ def _one(code: str, severity: str, message: str = "", advice: str = "Do it.") ->
 def test_the_three_most_harmful_warnings_are_shown() -> None:
     """A wrong scale comes before a lost part, and that before a larger uncertainty; the others are counted."""
     lines = findings_text([_one(code, "warning") for code in WARNINGS]).splitlines()
-    assert [line.split()[1].rstrip(":") for line in lines[:FIRST]] == ["unit_assumed", "clipped", "rest_drift"]
+    assert [line.split()[1].rstrip(":") for line in lines[:WARNINGS_SHOWN]] == ["unit_assumed", "clipped", "rest_drift"]
     assert "Do it." in lines[0]
-    assert "2 more" in lines[FIRST]
+    assert "2 more" in lines[WARNINGS_SHOWN]
 
 
 def test_errors_are_never_left_out_or_cut() -> None:

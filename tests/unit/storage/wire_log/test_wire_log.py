@@ -14,7 +14,7 @@ import pytest
 from storage.errors import WriteFailed
 from storage.schema import ValueRefused
 from storage.wire_log.appending import WireLogWriter
-from storage.wire_log.records import HEAD_BYTES, LogHeader, Record, RecordKind, SensorEntry, event_payload, frame
+from storage.wire_log.records import RECORD_HEAD_BYTES, LogHeader, Record, RecordKind, SensorEntry, event_payload, frame
 from storage.wire_log.scanning import Scan, read_log
 from tests.sampling import sampled
 from tests.wire import Disk, append, json_of, parse_log
@@ -67,7 +67,7 @@ def test_a_record_lies_in_the_file_as_documented() -> None:
     record = frame(RecordKind.DATA, b"R0500\r", sequence=2**32 + 7, mono_ns=123, log=0xCAFE, channel=3)
     head = struct.pack("<2sHIqIBBH", b"\xf5\xa9", 6, 7, 123, 0xCAFE, 2, 3, 0)
     assert record == head + struct.pack("<I", zlib.crc32(head + b"R0500\r")) + b"R0500\r"
-    assert len(record) == HEAD_BYTES + 6 == 34
+    assert len(record) == RECORD_HEAD_BYTES + 6 == 34
 
 
 def test_a_log_that_cannot_be_made_says_why(tmp_path: Path) -> None:
