@@ -28,7 +28,7 @@ OPEN = (
     "import acquisition.recordings.families.motion_sensor"
 )
 LOAD = (
-    "from springmass.runs.loading import load as f; "
+    "from springmass.loading.load import load as f; "
     "import storage.run_file.reading, acquisition.recordings.families.motion_sensor"
 )
 AGAIN = f"; g = f; f = lambda p: [g(p) for _ in range({TIMES})]"  # a short file is read repeatedly, warm
@@ -127,7 +127,7 @@ def cold(setup: str, path: Path) -> Callable[[], float]:
 
 def ratios(folder: Path, cold_rows: int, long_rows: int, lvm_rows: int) -> Iterator[Ratio]:
     """Yield every ratio, to be measured on files written into a folder."""
-    from springmass.runs.loading import load
+    from springmass.loading.load import load
     from storage.run_file.writing import write_run
 
     short = write_motion_sensor(folder / "short.txt", cold_rows)

@@ -27,7 +27,7 @@ from pipeline.bench.scene import Scene
 from pipeline.options import options_for
 from pipeline.track import Track
 from springmass import load, sample_data
-from springmass.runs.scenes import read_scene
+from springmass.loading.scenes import read_scene
 
 RECORDINGS = Path(__file__).resolve().parents[2] / "shared" / "recordings"
 REAL = {

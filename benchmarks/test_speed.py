@@ -7,7 +7,7 @@ import pytest
 from benchmarks import ratios
 from pipeline.analyse import analyse
 from springmass import load, sample_data
-from springmass.runs.scenes import read_scene
+from springmass.loading.scenes import read_scene
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from springmass.api.simulation import simulate
     from springmass.api.stream import Stream
     from springmass.errors import Error
-    from springmass.runs.loading import sample_data
+    from springmass.loading.load import sample_data
     from springmass.runs.run import Run
 else:
     # Imported on first use, so that `springmass --help` need not wait for numpy; a type checker sees the imports above.
@@ -45,7 +45,7 @@ else:
         "load": "springmass.api.analysing",
         "make_law": "pipeline.damping.laws.of_function",
         "results": "springmass.api.courses",
-        "sample_data": "springmass.runs.loading",
+        "sample_data": "springmass.loading.load",
         "simulate": "springmass.api.simulation",
         "source": "springmass.api.blocks",
     }

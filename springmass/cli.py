@@ -79,7 +79,7 @@ def _call(words: Sequence[str]) -> int:
 
         if not isinstance(error, NeedsAnswer):
             raise
-        from springmass.runs.questions import for_command
+        from springmass.commands.questions import for_command
 
         raise error.with_remedy(for_command(error.question, ["springmass", *words])) from None
 

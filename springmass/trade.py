@@ -24,7 +24,7 @@ from pipeline.dynamics.methods import SolveIvp
 from pipeline.errors import DynamicsError, PipelineError
 from pipeline.options import TIERS, options_for
 from pipeline.track import F8, Track
-from springmass.runs.simulating.simulation import reference
+from springmass.simulations.simulation import reference
 
 SCORED_QUANTITIES = ("frequency", "amplitude", "damping_rate")
 SCENE_DRAGS = {

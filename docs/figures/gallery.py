@@ -16,10 +16,10 @@ from springmass import Run, sample_data
 from springmass.charts.chart import Chart, Panel
 from springmass.charts.draw import draw, style
 from springmass.charts.run import charts_of
-from springmass.runs.options import AnalysisOptions
-from springmass.runs.simulating import charts
-from springmass.runs.simulating.against import compare_with_run, duration_s
-from springmass.runs.simulating.simulation import count_of, prepare, simulated
+from springmass.loading.options import AnalysisOptions
+from springmass.simulations import charts
+from springmass.simulations.against import compare_with_run, duration_s
+from springmass.simulations.simulation import count_of, prepare, simulated
 
 HERE = Path(__file__).resolve().parent
 STEP_S = 0.01

@@ -30,7 +30,7 @@ WHAT = {
     "springmass.runs": "Run: a recording and its analysis",
     "springmass.charts": "every chart as data",
     "springmass.typeset": "numbers and units as text",
-    "springmass.parameters": "options and their ranges",
+    "springmass.commands.parameters": "options and their ranges",
     "springmass.stops": "Ctrl-C and other ends",
     "springmass.errors": "exit codes",
     "springmass.layout": "where the parts are",

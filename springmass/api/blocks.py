@@ -20,15 +20,15 @@ from acquisition.replay import Replay
 from pipeline.bench.scene import Scene
 from springmass.api.analysing import AnyScene, ReadKeywords
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.runs.loading import Loaded, load, to_track
-from springmass.runs.options import ReadOptions
-from springmass.runs.outputs import made_now, save_run
-from springmass.runs.scenes import scene_from
-from springmass.runs.simulating.bench import bench_position
+from springmass.loading.load import Loaded, load, to_track
+from springmass.loading.options import ReadOptions
+from springmass.loading.scenes import scene_from
+from springmass.result.outputs import made_now, save_run
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import demand_new
 from springmass.session.sensors import OpenSensor
 from springmass.session.session import Session
+from springmass.simulations.bench import bench_position
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
 

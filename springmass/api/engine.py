@@ -10,7 +10,7 @@ import xarray as xr
 from xarray.backends import BackendEntrypoint
 
 from springmass.api.analysing import load
-from springmass.runs.inputs import kind_of
+from springmass.loading.inputs import kind_of
 
 
 class Engine(BackendEntrypoint):

@@ -12,8 +12,8 @@ from pipeline.dynamics.integrator import Integrator
 from pipeline.dynamics.methods import OneStep, acceleration
 from pipeline.errors import DynamicsError
 from springmass.api.analysing import AnyScene
-from springmass.runs.scenes import scene_from
-from springmass.runs.simulating.simulation import band_of, default_tolerance, instability, prepare, solve
+from springmass.loading.scenes import scene_from
+from springmass.simulations.simulation import band_of, default_tolerance, instability, prepare, solve
 
 if TYPE_CHECKING:
     import xarray as xr

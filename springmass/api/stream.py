@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from pipeline.errors import AnalysisError
 from springmass.api.analysing import AnyScene
-from springmass.runs.options import AnalysisOptions
+from springmass.loading.options import AnalysisOptions
+from springmass.loading.scenes import scene_from
 from springmass.runs.run import Run
-from springmass.runs.scenes import scene_from
 
 FEWEST = 32  # samples before the first analysis
 SAMPLES_RATIO = (

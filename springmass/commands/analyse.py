@@ -17,6 +17,8 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from springmass.commands.options import FURTHER_OPTIONS, BenchOptions, FiguresOption, FileArgument, Json, Scenes, Strict
+from springmass.commands.parameters import argument, flag, option, output
+from springmass.commands.questions import for_command, option_words
 from springmass.errors import (
     OK,
     REJECTED,
@@ -30,14 +32,12 @@ from springmass.errors import (
     tell,
 )
 from springmass.layout import STDIN
-from springmass.parameters import argument, flag, option, output
-from springmass.runs.inputs import files_of
-from springmass.runs.json_results import rejected
-from springmass.runs.options import AnalysisOptions
-from springmass.runs.outputs import distinct_names, in_a_name, make_folder, safe_name
-from springmass.runs.questions import for_command, option_words
+from springmass.loading.inputs import files_of
+from springmass.loading.options import AnalysisOptions
+from springmass.loading.scenes import read_scenes
+from springmass.result.outputs import distinct_names, in_a_name, make_folder, safe_name
+from springmass.result.run_json import rejected
 from springmass.runs.run import Failed, Run, Task, analyse_all, law_lines
-from springmass.runs.scenes import read_scenes
 from storage.errors import WriteFailed
 
 TOGETHER = "together.results"
@@ -170,9 +170,9 @@ def _judged(run: Run, options: AnalyseOptions) -> int:
 
 def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
-    from springmass.report.advice import trust_text
-    from springmass.report.budgets import budget_text
     from springmass.report.words import damping_sentence
+    from springmass.result.advice import trust_text
+    from springmass.result.budgets import budget_text
     from springmass.terminal.printing import classic_text, findings_text, fitted, text_table, wrapped
     from springmass.terminal.style import style_of
     from springmass.typeset import typeset

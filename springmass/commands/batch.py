@@ -10,15 +10,15 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from springmass.commands.options import FileArgument, refuse
+from springmass.commands.parameters import PositiveCount, WholeNumber, argument, flag, option, output
 from springmass.course.page import COURSE_PAGE, GROUPS_FILE
 from springmass.course.plan import plan, template
 from springmass.course.results_csv import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
-from springmass.parameters import PositiveCount, WholeNumber, argument, flag, option, output
-from springmass.runs.options import AnalysisOptions
-from springmass.runs.outputs import make_folder
+from springmass.loading.options import AnalysisOptions
+from springmass.result.outputs import make_folder
 from springmass.terminal.printing import visible_lines
 
 

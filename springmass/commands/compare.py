@@ -15,15 +15,15 @@ from cyclopts import Parameter
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
 from springmass.commands.options import FiguresOption, FileArgument, Json, Scenes, Strict, refuse
+from springmass.commands.parameters import Share, argument, option, output
+from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
 from springmass.course.results_csv import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
-from springmass.parameters import Share, argument, option, output
-from springmass.runs.comparing import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
-from springmass.runs.json_results import RESULT_SCHEMA, plain, provenance_of, rejected
-from springmass.runs.options import AnalysisOptions
-from springmass.runs.outputs import distinct_names, make_folder, now_utc
+from springmass.loading.options import AnalysisOptions
+from springmass.loading.scenes import read_scenes
+from springmass.result.outputs import distinct_names, make_folder, now_utc
+from springmass.result.run_json import RESULT_SCHEMA, plain, provenance_of, rejected
 from springmass.runs.run import Run, Task, analysed, law_lines
-from springmass.runs.scenes import read_scenes
 
 if TYPE_CHECKING:
     from springmass.course.benches import CourseComparison

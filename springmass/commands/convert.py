@@ -9,12 +9,12 @@ from typing import Annotated
 
 from acquisition.recordings.writers import WRITERS
 from springmass.commands.options import PART, FileArgument, Overwrite, refuse
+from springmass.commands.parameters import argument, option, output
 from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
-from springmass.parameters import argument, option, output
-from springmass.runs.loading import Loaded, load
-from springmass.runs.options import ReadOptions
-from springmass.runs.outputs import numbered, save_run
-from springmass.runs.scenes import read_scene
+from springmass.loading.load import Loaded, load
+from springmass.loading.options import ReadOptions
+from springmass.loading.scenes import read_scene
+from springmass.result.outputs import numbered, save_run
 from storage.atomic import write_whole
 
 RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")

@@ -9,15 +9,15 @@ from typing import Annotated
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.options import FileArgument
+from springmass.commands.parameters import output
+from springmass.comparing.comparison import compare_runs
 from springmass.errors import OK, suggest
-from springmass.parameters import output
+from springmass.loading.load import load, sample_data
+from springmass.loading.options import ReadOptions
+from springmass.loading.scenes import read_scene
 from springmass.report.write import write_report
-from springmass.runs.comparing import compare_runs
-from springmass.runs.loading import load, sample_data
-from springmass.runs.options import ReadOptions
-from springmass.runs.outputs import make_folder, save_run
+from springmass.result.outputs import make_folder, save_run
 from springmass.runs.run import Run, Task, analysed
-from springmass.runs.scenes import read_scene
 from springmass.terminal.printing import findings_text, text_table
 from springmass.terminal.style import style_of
 

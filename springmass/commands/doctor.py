@@ -70,7 +70,7 @@ def _libraries() -> Iterator[InstallationCheck]:
 
 
 def _bundled() -> InstallationCheck:
-    from springmass.runs.loading import sample_data
+    from springmass.loading.load import sample_data
 
     try:
         return "bundled recordings", True, str(sample_data()), ""

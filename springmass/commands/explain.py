@@ -10,8 +10,8 @@ from typing import Annotated
 from pipeline.findings.finding import Kind, kinds, usual_advice, word
 from pipeline.registry.found import Found
 from springmass.commands.options import Json
+from springmass.commands.parameters import argument
 from springmass.errors import OK, ProgramError
-from springmass.parameters import argument
 from springmass.terminal.printing import wrapped
 
 PAGE_WIDTH = 80

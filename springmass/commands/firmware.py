@@ -15,8 +15,8 @@ from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.errors import visible
 from acquisition.live.firmware import BOOTLOADER_BAUDS, FIRMWARE_VERSION, HEX, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
+from springmass.commands.parameters import Whole, option
 from springmass.errors import OK, SENSOR, ProgramError, suggest
-from springmass.parameters import Whole, option
 from springmass.session.sensors import outdated, settings_of
 
 ANSWER_S = 5.0

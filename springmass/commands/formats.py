@@ -15,13 +15,13 @@ from acquisition.recordings.identify import Inspection, inspect
 from acquisition.recordings.identify import formats as every_format
 from acquisition.recordings.recording import Survey
 from springmass.commands.options import PART, FileArgument, Json, refuse
+from springmass.commands.parameters import argument
+from springmass.commands.questions import for_command, option_words
 from springmass.errors import OK, suggest
-from springmass.parameters import argument
-from springmass.runs.inputs import kind_of
-from springmass.runs.json_results import picked, plain
-from springmass.runs.loading import Loaded, load
-from springmass.runs.options import ReadOptions
-from springmass.runs.questions import for_command, option_words
+from springmass.loading.inputs import kind_of
+from springmass.loading.load import Loaded, load
+from springmass.loading.options import ReadOptions
+from springmass.result.run_json import picked, plain
 
 OURS = {
     "run": "springmass run file (HDF5, opens in xarray, h5py and NeXus tools)",

@@ -10,10 +10,10 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
+from springmass.commands.parameters import LawName, Positive, TcpPort, argument, flag, option
+from springmass.commands.questions import option_of
 from springmass.errors import ProgramError
-from springmass.parameters import LawName, Positive, TcpPort, argument, flag, option
-from springmass.runs.options import ReadOptions
-from springmass.runs.questions import option_of
+from springmass.loading.options import ReadOptions
 
 FileArgument = str | Path
 """The name of a file; a shell completes it."""

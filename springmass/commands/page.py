@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from springmass.commands.options import PART, PageOptions, RecordingArgument, refuse
+from springmass.commands.parameters import flag
 from springmass.errors import OK, ProgramError, manner, tell
+from springmass.loading.inputs import kind_of
+from springmass.loading.load import load
+from springmass.loading.options import ReadOptions
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
 from springmass.page.web.server import address_in_network, code_for_terminal, serve
-from springmass.parameters import flag
-from springmass.runs.inputs import kind_of
-from springmass.runs.loading import load
-from springmass.runs.options import ReadOptions
 from springmass.stops import STOPS
 
 

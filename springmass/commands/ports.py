@@ -10,8 +10,8 @@ from acquisition.decoders.registry import families
 from acquisition.errors import visible
 from acquisition.live.serial_port import list_ports
 from springmass.commands.options import Json
+from springmass.commands.parameters import flag, option
 from springmass.errors import OK, suggest
-from springmass.parameters import flag, option
 from springmass.session.detect import listen
 from springmass.terminal.printing import wrapped
 

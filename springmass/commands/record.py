@@ -27,9 +27,7 @@ from pipeline.bench.disc import scene_air
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import format_value
 from springmass.commands.options import FileArgument, PageOptions, converted
-from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
-from springmass.page.recorder_side import PageProcess
-from springmass.parameters import (
+from springmass.commands.parameters import (
     PartsPerMillion,
     Positive,
     ReadingsPerSecond,
@@ -39,16 +37,18 @@ from springmass.parameters import (
     option,
     output,
 )
-from springmass.runs.outputs import made_now
-from springmass.runs.questions import option_words
-from springmass.runs.scenes import ask_about, read_scene
-from springmass.runs.simulating.bench import EXAMPLE, REST_M, Release, bench_position
+from springmass.commands.questions import option_words
+from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
+from springmass.loading.scenes import ask_about, read_scene
+from springmass.page.recorder_side import PageProcess
+from springmass.result.outputs import made_now
 from springmass.session.bench_requests import Closed, Operator
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import default_name, demand_new
 from springmass.session.sensors import OpenSensor
 from springmass.session.session import BYTES_PER_READ, Ended, RunLimits, RunListeners, Session
 from springmass.session.trigger import Disarmed, Trigger
+from springmass.simulations.bench import EXAMPLE, REST_M, Release, bench_position
 from springmass.stops import STOPS, EndReason
 from springmass.terminal.console import Console
 from springmass.terminal.keys import marks_by_keys

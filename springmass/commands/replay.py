@@ -13,10 +13,10 @@ from cyclopts import Parameter, Token
 from acquisition.clock import SystemClock, VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.options import PART, RecordingArgument, refuse
+from springmass.commands.parameters import Finite, flag, option
 from springmass.errors import OK
-from springmass.parameters import Finite, flag, option
-from springmass.runs.loading import load
-from springmass.runs.options import ReadOptions
+from springmass.loading.load import load
+from springmass.loading.options import ReadOptions
 
 
 def _speed(_: Any, tokens: Sequence[Token]) -> float:

@@ -8,8 +8,8 @@ from typing import Annotated
 
 from acquisition.errors import visible
 from springmass.commands.options import FileArgument, converted
+from springmass.commands.parameters import argument, option
 from springmass.errors import OK, ProgramError, suggest, tell
-from springmass.parameters import argument, option
 
 SCENE_TEMPLATE = """\
 # What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
@@ -77,7 +77,7 @@ def scene(
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from pipeline.bench.scene import Scene
-    from springmass.runs.scenes import about_of, ask_about, read_scene, stated_keys, write_about
+    from springmass.loading.scenes import about_of, ask_about, read_scene, stated_keys, write_about
 
     noted = scene is not None or note or mark
     if check is not None:

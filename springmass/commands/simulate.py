@@ -16,13 +16,13 @@ from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite
+from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.errors import OK, ProgramError, suggest, tell
-from springmass.parameters import Finite, Positive, Whole, flag, option, output
-from springmass.runs.json_results import picked
-from springmass.runs.options import AnalysisOptions, ReadOptions
+from springmass.loading.options import AnalysisOptions, ReadOptions
+from springmass.loading.scenes import ask_about, read_scene
+from springmass.result.run_json import picked
 from springmass.runs.run import Run
-from springmass.runs.scenes import ask_about, read_scene
-from springmass.runs.simulating.simulation import (
+from springmass.simulations.simulation import (
     Growth,
     Simulation,
     band_of,
@@ -79,7 +79,7 @@ def simulate(
     if scene is not None and stated is not None:
         ask_about(stated, scene)
     if against is not None:
-        from springmass.runs.simulating.against import duration_s
+        from springmass.simulations.against import duration_s
 
         run = Run.of(against, stated, AnalysisOptions.of(read.given()))
         stated, analysis = run.scene, run.analysis
@@ -113,7 +113,7 @@ def simulate(
         None,
     )
     if analysis is not None:
-        from springmass.runs.simulating.against import compare_with_run, deviation_text
+        from springmass.simulations.against import compare_with_run, deviation_text
 
         over = compare_with_run(analysis, ready.problem, method, dt, wanted, band, ready.values())
         left = f"rms {over.rms_m * 1e3:.3g} mm, noise of a sample {over.noise_m * 1e3:.3g} mm"

@@ -9,11 +9,11 @@ from typing import Annotated, Any
 from pipeline.analysis import Oscillation
 from springmass import __version__
 from springmass.commands.options import FileArgument, Json
+from springmass.commands.parameters import Positive, PositiveCount, argument, option
 from springmass.errors import OK, UNREADABLE, ProgramError, manner
-from springmass.parameters import Positive, PositiveCount, argument, option
-from springmass.runs.options import AnalysisOptions
+from springmass.loading.options import AnalysisOptions
+from springmass.loading.scenes import read_scene
 from springmass.runs.run import Run
-from springmass.runs.scenes import read_scene
 from springmass.terminal.progress import counted
 from springmass.trade import (
     RECORD_DEFECTS,
@@ -46,7 +46,7 @@ def trade(
             raise ProgramError(f"{recording}: {analysis.motion.why}; name a run that oscillates", UNREADABLE)
         motion = motion_of(analysis, analysis.motion)
     elif stated is not None:
-        from springmass.runs.simulating.simulation import prepare
+        from springmass.simulations.simulation import prepare
 
         ready = prepare(stated, seconds, where=str(scene))
         sigma = ready.stated.sensor_sigma_m

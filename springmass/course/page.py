@@ -17,7 +17,7 @@ from springmass.charts.chart import Chart
 from springmass.charts.several import course, drag_map
 from springmass.course.benches import BENCHES, CourseComparison
 from springmass.course.results_csv import COURSE, FAILED
-from springmass.report.advice import sentence
+from springmass.result.advice import sentence
 from springmass.terminal.printing import visible_lines
 from storage.atomic import write_whole
 

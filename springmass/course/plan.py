@@ -22,15 +22,15 @@ from acquisition.recordings.identify import dialect_folder
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.registry.laws import ANY_LAW, law_names
+from springmass.comparing.user_table import Row, read_rows
 from springmass.course.results_csv import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
-from springmass.runs.inputs import InputFile, files_of
-from springmass.runs.options import ANALYSIS_DEFAULTS, AnalysisOptions
-from springmass.runs.outputs import numbered
+from springmass.loading.inputs import InputFile, files_of
+from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
+from springmass.loading.scenes import about_path, read_scene
+from springmass.result.outputs import numbered
 from springmass.runs.run import Task
-from springmass.runs.scenes import about_path, read_scene
-from springmass.runs.tables import Row, read_rows
 
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
 _CODE = (".py", ".toml", ".j2", ".css", ".js")

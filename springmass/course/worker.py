@@ -16,12 +16,12 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
 from springmass.charts.several import LARGEST_DRAWN, drag_points, outline
+from springmass.commands.questions import for_course
 from springmass.course.plan import Job, code_sha256, digest_of
 from springmass.course.results_csv import ESTIMATES
 from springmass.errors import internal_error, quietly
-from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.html import SHARED
-from springmass.runs.questions import for_course
+from springmass.result.advice import Harm, harm_of, sentence
 from springmass.runs.run import Failed, Run, analyse_all
 from storage.errors import WriteFailed
 

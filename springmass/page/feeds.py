@@ -11,9 +11,9 @@ from typing import Any
 
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
+from springmass.loading.load import Loaded
 from springmass.page.view import SampleBuffer, View
 from springmass.report.recorded import event_words
-from springmass.runs.loading import Loaded
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
 from storage.wire_log.records import Record, RecordKind, event_content

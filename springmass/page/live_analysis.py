@@ -20,10 +20,10 @@ from pipeline.track import F8, Track
 from springmass.charts.chart import to_json
 from springmass.charts.run import CHARTS
 from springmass.errors import Error
+from springmass.loading.load import between
+from springmass.loading.options import Accuracy, AnalysisOptions
 from springmass.page.view import View, json_of
-from springmass.runs.json_results import picked
-from springmass.runs.loading import between
-from springmass.runs.options import Accuracy, AnalysisOptions
+from springmass.result.run_json import picked
 from springmass.runs.run import Run, analyse_track
 
 LIVE_TIER: Accuracy = "fast"

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from acquisition.block import Block, ClockKind, SourceInfo
 from acquisition.recordings.recording import FormatIssue
 from pipeline.track import Track
-from springmass.runs.json_results import plain
-from springmass.runs.loading import to_track
+from springmass.loading.load import to_track
+from springmass.result.run_json import plain
 from storage.wire_log.wire_samples import Origin
 
 PROTOCOL_VERSION = 2  # of the messages

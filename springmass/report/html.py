@@ -16,15 +16,15 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
 from springmass.charts.chart import Chart, to_json
+from springmass.comparing.comparison import SpringComparison, line_and_hooke_words
 from springmass.layout import static_file
-from springmass.report.advice import notices_of, trust_of
-from springmass.report.budgets import budgets_of
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
-from springmass.runs.comparing import SpringComparison, line_and_hooke_words
-from springmass.runs.rows import table_rows
+from springmass.result.advice import notices_of, trust_of
+from springmass.result.budgets import budgets_of
+from springmass.result.summary import laws_across, laws_of
+from springmass.result.table1 import table_rows
 from springmass.runs.run import Run
-from springmass.runs.showing import laws_across, laws_of
 from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from acquisition.errors import visible
 from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, in_brackets
 from pipeline.registry.quantities import INPUTS
-from springmass.report.advice import by_harm, lab_report_line
-from springmass.report.budgets import budgets_of
-from springmass.runs.rows import table_rows
+from springmass.result.advice import by_harm, lab_report_line
+from springmass.result.budgets import budgets_of
+from springmass.result.table1 import table_rows
 from springmass.runs.run import Run
 
 if TYPE_CHECKING:

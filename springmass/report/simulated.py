@@ -18,10 +18,10 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory, effective_mass_kg
 from pipeline.dynamics.band import LEVELS, Band
 from pipeline.track import F8
-from springmass.runs.outputs import in_a_name, made_now, make_folder
-from springmass.runs.simulating.against import Against
-from springmass.runs.simulating.bench import REST_M
-from springmass.runs.simulating.simulation import FINE, Prepared, Simulation, count_of, solve
+from springmass.result.outputs import in_a_name, made_now, make_folder
+from springmass.simulations.against import Against
+from springmass.simulations.bench import REST_M
+from springmass.simulations.simulation import FINE, Prepared, Simulation, count_of, solve
 
 if TYPE_CHECKING:
     from springmass.charts.draw import PictureFormat
@@ -47,7 +47,7 @@ def write_folder(
     """Write run file, page of charts, tables, JSON and the kinds of figures into NAME.simulated; return the folder."""
     from springmass.charts.draw import save
     from springmass.report.html import Figures, drawn_by_script, template
-    from springmass.runs.simulating import charts as charted
+    from springmass.simulations import charts as charted
     from storage.atomic import whole_folder, write_whole
 
     name = Path(where).name.removesuffix(".toml").removesuffix(".scene")

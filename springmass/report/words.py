@@ -10,9 +10,9 @@ from pipeline.numerics.quantity import noun
 from pipeline.registry.quantities import INPUTS
 from pipeline.results.budget import Contribution
 from pipeline.track import UNUSABLE
-from springmass.report.advice import harm_of, sentence, trust_of, trust_text
-from springmass.report.budgets import budgets_of
-from springmass.runs.rows import is_about
+from springmass.result.advice import harm_of, sentence, trust_of, trust_text
+from springmass.result.budgets import budgets_of
+from springmass.result.table1 import is_about
 from springmass.typeset import prefixed, pretty, pretty_number, typeset, unbroken
 
 

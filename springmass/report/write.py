@@ -11,18 +11,18 @@ from springmass.charts.chart import Chart
 from springmass.charts.draw import PictureFormat, save
 from springmass.charts.run import CHARTS, charts_of
 from springmass.charts.several import comparison, masses, overlay, static
+from springmass.comparing.comparison import SpringComparison
 from springmass.errors import detail
-from springmass.report.budgets import budget_csv
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import amplitude_csv, motion_csv
 from springmass.report.recorded import notes_of
 from springmass.report.words import summary as in_words
-from springmass.runs.comparing import SpringComparison
-from springmass.runs.frames import smoothed_or_why
-from springmass.runs.json_results import plain
-from springmass.runs.outputs import safe_name
-from springmass.runs.rows import results_csv
+from springmass.result.budgets import budget_csv
+from springmass.result.frames import smoothed_or_why
+from springmass.result.outputs import safe_name
+from springmass.result.run_json import plain
+from springmass.result.table1 import results_csv
 from springmass.runs.run import Run
 from storage.atomic import whole_folder, write_whole
 

@@ -19,16 +19,16 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic, classic
 from pipeline.track import Track
 from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, ProgramError, detail, internal_error
-from springmass.runs.arrays import loaded_of, refuse_reading
-from springmass.runs.estimates import Value
-from springmass.runs.frames import estimates_frame, run_dataset, samples_dataset
-from springmass.runs.json_results import result_of, with_traps
-from springmass.runs.loading import Loaded, load, within
-from springmass.runs.options import ANALYSIS_DEFAULTS, AnalysisOptions
-from springmass.runs.outputs import now_utc, save_run
-from springmass.runs.rows import TableRow, table_rows
-from springmass.runs.scenes import Amendments, amended, scene_from, stated_keys
-from springmass.runs.showing import html_summary, text_summary
+from springmass.loading.arrays import loaded_of, refuse_reading
+from springmass.loading.load import Loaded, load, within
+from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
+from springmass.loading.scenes import Amendments, amended, scene_from, stated_keys
+from springmass.result.frames import estimates_frame, run_dataset, samples_dataset
+from springmass.result.outputs import now_utc, save_run
+from springmass.result.run_json import result_of, with_traps
+from springmass.result.summary import html_summary, text_summary
+from springmass.result.table1 import TableRow, table_rows
+from springmass.result.values import Value
 from storage.errors import StorageError
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from pipeline.analyse import Analysis, Oscillation
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic
 from pipeline.results.compare import Comparison
-from springmass.runs.reported import Reported
-from springmass.runs.rows import table_rows
+from springmass.comparing.reported import Reported
+from springmass.result.table1 import table_rows
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
@@ -32,7 +32,7 @@ def findings_text(
     Without ``full``, notes and all but the first three warnings are left out. ``written`` converts a message to the
     characters of this terminal.
     """
-    from springmass.report.advice import by_harm, is_standing
+    from springmass.result.advice import by_harm, is_standing
 
     ordered = by_harm(findings)
     errors, warnings, notes = ([f for f in ordered if f["severity"] == grade] for grade in _MARKS)

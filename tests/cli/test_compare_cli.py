@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springmass.runs.loading import sample_data
+from springmass.loading.load import sample_data
 from tests.cli.conftest import Cli
 
 DATA = sample_data()

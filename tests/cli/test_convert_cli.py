@@ -11,7 +11,7 @@ import pytest
 import springmass
 from acquisition.block import Block
 from acquisition.recordings.recording import Original
-from springmass.runs.scenes import read_scene
+from springmass.loading.scenes import read_scene
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
 from tests.cli.conftest import Cli

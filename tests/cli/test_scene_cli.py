@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.bench.scene import Scene
-from springmass.runs.scenes import read_scene, stated_keys
+from springmass.loading.scenes import read_scene, stated_keys
 from tests.cli.conftest import Cli
 
 

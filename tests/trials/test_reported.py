@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import springmass as sm
-from springmass.runs.rows import results_csv
+from springmass.result.table1 import results_csv
 from tests.reported import FLOW, Recorded, Row, periodic_rows, record, write_table
 from tests.synthetic import Truth
 

@@ -16,7 +16,7 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError
 from pipeline.options import options_for
 from pipeline.track import Track
-from springmass.runs.options import AnalysisOptions
+from springmass.loading.options import AnalysisOptions
 from springmass.runs.run import Run
 from tests.trials.troubles.record import Kind, Record
 

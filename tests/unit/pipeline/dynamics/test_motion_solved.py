@@ -12,7 +12,7 @@ from pipeline.bench.scene import Scene
 from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator
 from pipeline.errors import SceneError
-from springmass.runs.simulating.bench import REST_M, bench_position
+from springmass.simulations.bench import REST_M, bench_position
 
 BENCH = {
     "bob": {"mass_kg": 0.2176},

@@ -16,7 +16,7 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.registry import get_family
 from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor
 from springmass.cli import main
-from springmass.runs.simulating.bench import bench_position
+from springmass.simulations.bench import bench_position
 
 DATA = sm.sample_data()
 BENCH = {

@@ -11,7 +11,7 @@ import pytest
 
 from acquisition.block import Block, SourceInfo
 from acquisition.recordings.recording import Original
-from springmass.runs.loading import load
+from springmass.loading.load import load
 from storage.errors import RunDamaged
 from storage.run_file.layout import CHUNK
 from storage.run_file.writing import write_run

@@ -6,8 +6,8 @@ import numpy as np
 
 from pipeline.bench.scene import Scene
 from pipeline.dynamics.strang import STRANG
-from springmass.runs.simulating.bench import REST_M, bench_position
-from springmass.runs.simulating.simulation import prepare
+from springmass.simulations.bench import REST_M, bench_position
+from springmass.simulations.simulation import prepare
 
 
 def test_drag_that_disc_and_air_imply_damps_the_simulated_bench() -> None:

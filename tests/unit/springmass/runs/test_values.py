@@ -11,7 +11,7 @@ import uncertainties
 from uncertainties import UFloat, umath, unumpy
 
 from pipeline.numerics.estimate import Estimate
-from springmass.runs.estimates import Value
+from springmass.result.values import Value
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from typing import Any
 from acquisition.block import Block
 from springmass import __version__
 from springmass.errors import ProgramError
-from springmass.runs.loading import Loaded
+from springmass.loading.load import Loaded
 from storage.run_file.writing import write_run
 
 LONGEST_NAME = 255

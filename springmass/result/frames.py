@@ -17,10 +17,10 @@ from pipeline.numerics.quantity import Unit
 from pipeline.results.compare import Comparison
 from pipeline.results.curves import Smoothed
 from pipeline.track import Quality
-from springmass.runs.arrays import ABOUT, about_json
-from springmass.runs.estimates import Value
-from springmass.runs.json_results import EXPANDED, picked
-from springmass.runs.loading import Loaded
+from springmass.loading.arrays import ABOUT, about_json
+from springmass.loading.load import Loaded
+from springmass.result.run_json import EXPANDED, picked
+from springmass.result.values import Value
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,8 +12,8 @@ from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.numerics.quantity import Unit
 from pipeline.registry.quantities import INPUTS, QUANTITIES
-from springmass.runs.estimates import exponents_of
-from springmass.runs.rows import table_estimates, table_rows
+from springmass.result.table1 import table_estimates, table_rows
+from springmass.result.values import exponents_of
 from springmass.typeset import typeset
 
 _WORDS = {"error": "Error", "warning": "Warning", "info": "Note"}

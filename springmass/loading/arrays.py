@@ -16,9 +16,9 @@ from acquisition.recordings.recording import FormatIssue
 from acquisition.recordings.tables.headings import heading_of, is_time
 from pipeline.errors import TrackError
 from pipeline.track import F8, Track
-from springmass.runs.inputs import kind_of
-from springmass.runs.loading import Loaded, load, to_track
-from springmass.runs.options import ReadOptions
+from springmass.loading.inputs import kind_of
+from springmass.loading.load import Loaded, load, to_track
+from springmass.loading.options import ReadOptions
 
 EXPECTED = "a path, a run, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
 ABOUT = "springmass"

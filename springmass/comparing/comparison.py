@@ -17,12 +17,12 @@ from pipeline.registry.found import Found
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
 from pipeline.results.derive import limited
 from pipeline.results.masses import Hooke, MassLine, mass_line
+from springmass.comparing.reported import Reported, judge, read_reported
+from springmass.comparing.user_table import read_hooke
 from springmass.errors import ProgramError
-from springmass.runs.frames import comparison_frame
-from springmass.runs.json_results import RESULT_SCHEMA, parameters_json, picked, plain
-from springmass.runs.reported import Reported, judge, read_reported
+from springmass.result.frames import comparison_frame
+from springmass.result.run_json import RESULT_SCHEMA, parameters_json, picked, plain
 from springmass.runs.run import Run
-from springmass.runs.tables import read_hooke
 
 if TYPE_CHECKING:
     import pandas as pd

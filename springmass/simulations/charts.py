@@ -12,8 +12,8 @@ from pipeline.dynamics import Trajectory
 from pipeline.dynamics.band import Band
 from pipeline.track import F8
 from springmass.charts.chart import Chart, Panel, Series, band_of, line_of
-from springmass.runs.simulating.against import Against
-from springmass.runs.simulating.simulation import EULERS, Eulers, Simulation, beside_exact, growths
+from springmass.simulations.against import Against
+from springmass.simulations.simulation import EULERS, Eulers, Simulation, beside_exact, growths
 
 PERIODS_DRAWN, TURNS = 14, 6  # periods in the detail of a long run; turns in a phase plot
 POINTS_DRAWN = 1500

@@ -17,7 +17,7 @@ from pipeline.dynamics.band import C16, Band
 from pipeline.numerics.estimate import Estimate, Joint
 from pipeline.track import F8, UNUSABLE
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.runs.simulating.simulation import FINE, count_of, solve
+from springmass.simulations.simulation import FINE, count_of, solve
 
 WIDER = 1.96  # standard deviations of the noise by which the band is widened, for 95 %
 HALF = 0.5

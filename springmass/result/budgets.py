@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.registry.quantities import INPUTS, QUANTITIES
 from pipeline.results.budget import Budget, Contribution
-from springmass.runs.rows import table_estimates
+from springmass.result.table1 import table_estimates
 from springmass.typeset import cell
 
 SAME = ("frequency", "angular_frequency")  # determined by the period alone

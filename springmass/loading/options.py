@@ -14,7 +14,7 @@ from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
 from pipeline.options import Options, options_for
 from pipeline.registry.laws import ANY_LAW
-from springmass.parameters import Finite, LawName, PartsPerMillion, Positive, flag, option
+from springmass.commands.parameters import Finite, LawName, PartsPerMillion, Positive, flag, option
 
 HOW_READ = Group("How the recording is read", sort_key=2)
 

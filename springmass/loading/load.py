@@ -26,9 +26,9 @@ from acquisition.regular_file import open_regular
 from pipeline.track import Track
 from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
 from springmass.layout import STDIN, part
-from springmass.runs.inputs import kind_of
-from springmass.runs.options import READ_DEFAULTS, ReadOptions
-from springmass.runs.scenes import about_of
+from springmass.loading.inputs import kind_of
+from springmass.loading.options import READ_DEFAULTS, ReadOptions
+from springmass.loading.scenes import about_of
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
 from storage.run_file.layout import CHECKED

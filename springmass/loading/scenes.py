@@ -23,7 +23,7 @@ from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import ProgramError, complain
-from springmass.runs.inputs import is_recording
+from springmass.loading.inputs import is_recording
 from storage.atomic import write_whole
 
 Amendments = Mapping[tuple[str, str], Any]

@@ -17,9 +17,9 @@ from pipeline.numerics.estimate import Estimate
 from pipeline.registry.found import Found
 from pipeline.registry.quantities import QUANTITIES
 from pipeline.results.classic import CYCLES, READING_S, STATED_ERROR_M
+from springmass.comparing.user_table import Row, read_rows
 from springmass.errors import ProgramError
 from springmass.runs.run import Run
-from springmass.runs.tables import Row, read_rows
 
 REPORTED_COLUMNS = ("run", "name", "value", "u", "unit")
 DIFFERENT_U = 4.0  # differences beyond so many standard uncertainties are no chance
