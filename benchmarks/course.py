@@ -51,12 +51,13 @@ HEAD = "Motion Sensor Data File Mar 12, 2024 2:05 PM\r\nTime (s)\tDistance (cm)\
 WORKER = """
 import json, sys
 from springmass.course.plan import plan
+from springmass.commands.questions import for_course
 from springmass.course.worker import analyse_one
 jobs = plan([sys.argv[1]]).jobs
 peaks = []
 for part in (jobs[: len(jobs) // 2], jobs[len(jobs) // 2 :]):
     for job in part:
-        analyse_one(job)
+        analyse_one(job, for_course)
     # getrusage would give the memory of the parent process where that is larger.
     line = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
     peaks.append(int(line.split()[1]) / 1024)

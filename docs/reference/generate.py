@@ -14,8 +14,7 @@ from cyclopts.argument import Argument
 
 from pipeline.findings.finding import RANK, Kind, kinds, usual_advice
 from springmass.commands import COMMANDS, app
-from springmass.commands.options import THE_PAGE
-from springmass.loading.options import HOW_READ
+from springmass.commands.options import HOW_READ, THE_PAGE
 
 PAGE = Path(__file__).with_name("command-line.md")
 FINDINGS_PAGE = Path(__file__).with_name("findings.md")

@@ -13,10 +13,10 @@ from acquisition.errors import NeedsAnswer
 from pipeline.bench.scene import Scene
 from pipeline.damping.laws import Law
 from pipeline.errors import AnalysisError
-from springmass.commands.questions import for_python
+from springmass.api.questions import for_python
 from springmass.comparing.comparison import SpringComparison, compare_runs
 from springmass.loading.options import Accuracy, AnalysisOptions
-from springmass.result.outputs import distinct_names
+from springmass.result.output_names import distinct_names
 from springmass.runs.run import Run
 
 AnyScene: TypeAlias = Scene | str | os.PathLike[str] | Mapping[str, Any]

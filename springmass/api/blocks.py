@@ -20,10 +20,12 @@ from acquisition.replay import Replay
 from pipeline.bench.scene import Scene
 from springmass.api.analysing import AnyScene, ReadKeywords
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.loading.load import Loaded, load, to_track
+from springmass.loading.load import load
+from springmass.loading.loaded import Loaded
 from springmass.loading.options import ReadOptions
+from springmass.loading.save import made_now, save_run
 from springmass.loading.scenes import scene_from
-from springmass.result.outputs import made_now, save_run
+from springmass.loading.track import to_track
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import demand_new
 from springmass.session.sensors import OpenSensor

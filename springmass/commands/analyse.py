@@ -16,7 +16,16 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from springmass.commands.options import FURTHER_OPTIONS, BenchOptions, FiguresOption, FileArgument, Json, Scenes, Strict
+from springmass.commands.options import (
+    FURTHER_OPTIONS,
+    AnalysisArguments,
+    BenchOptions,
+    FiguresOption,
+    FileArgument,
+    Json,
+    Scenes,
+    Strict,
+)
 from springmass.commands.parameters import argument, flag, option, output
 from springmass.commands.questions import for_command, option_words
 from springmass.errors import (
@@ -33,11 +42,11 @@ from springmass.errors import (
 )
 from springmass.layout import STDIN
 from springmass.loading.inputs import files_of
-from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import read_scenes
-from springmass.result.outputs import distinct_names, in_a_name, make_folder, safe_name
+from springmass.result.output_names import distinct_names, in_a_name, make_folder, safe_name
 from springmass.result.run_json import rejected
-from springmass.runs.run import Failed, Run, Task, analyse_all, law_lines
+from springmass.runs.run import Run
+from springmass.runs.tasks import Failed, Task, analyse_all, law_lines
 from storage.errors import WriteFailed
 
 TOGETHER = "together.results"
@@ -73,7 +82,7 @@ def analyse(
         argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True),
     ],
     options: AnalyseOptions = AnalyseOptions(),
-    how: AnalysisOptions = AnalysisOptions(),
+    how: AnalysisArguments = AnalysisArguments(),
     bench: BenchOptions = BenchOptions(),
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""

@@ -9,16 +9,16 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from springmass.commands.options import FileArgument, refuse
+from springmass.commands.options import AnalysisArguments, FileArgument, refuse
 from springmass.commands.parameters import PositiveCount, WholeNumber, argument, flag, option, output
+from springmass.commands.questions import for_course
 from springmass.course.page import COURSE_PAGE, GROUPS_FILE
 from springmass.course.plan import plan, template
 from springmass.course.results_csv import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
 from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
-from springmass.loading.options import AnalysisOptions
-from springmass.result.outputs import make_folder
+from springmass.result.output_names import make_folder
 from springmass.terminal.printing import visible_lines
 
 
@@ -45,7 +45,7 @@ class BatchOptions:
 def batch(
     *recordings: Annotated[FileArgument, argument("INPUT", "recordings, folders (with subfolders), or patterns")],
     options: BatchOptions = BatchOptions(),
-    how: AnalysisOptions = AnalysisOptions(),
+    how: AnalysisArguments = AnalysisArguments(),
 ) -> int:
     """Analyse new and changed runs, and write the table and the page of all runs."""
     refuse("batch", how, "velocity")
@@ -74,7 +74,7 @@ def batch(
         for line in course.notes:
             tell(line)
         rows, made, unwritten = run_course(
-            course, store, folder, jobs=options.jobs, dask=options.dask, reports=options.reports
+            course, store, folder, jobs=options.jobs, dask=options.dask, reports=options.reports, remedy=for_course
         )
     for line in unwritten:
         complain(line)

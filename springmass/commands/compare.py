@@ -14,16 +14,17 @@ from cyclopts import Parameter
 
 from acquisition.errors import visible
 from pipeline.findings.finding import kinds
-from springmass.commands.options import FiguresOption, FileArgument, Json, Scenes, Strict, refuse
+from springmass.commands.options import AnalysisArguments, FiguresOption, FileArgument, Json, Scenes, Strict, refuse
 from springmass.commands.parameters import Share, argument, option, output
 from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
 from springmass.course.results_csv import COURSE, is_course, read_rows
 from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
-from springmass.loading.options import AnalysisOptions
+from springmass.loading.save import now_utc
 from springmass.loading.scenes import read_scenes
-from springmass.result.outputs import distinct_names, make_folder, now_utc
+from springmass.result.output_names import distinct_names, make_folder
 from springmass.result.run_json import RESULT_SCHEMA, plain, provenance_of, rejected
-from springmass.runs.run import Run, Task, analysed, law_lines
+from springmass.runs.run import Run
+from springmass.runs.tasks import Task, analysed, law_lines
 
 if TYPE_CHECKING:
     from springmass.course.benches import CourseComparison
@@ -56,7 +57,7 @@ def compare(
         FileArgument, argument("RUN", "two or more runs of one spring, or folders from batch", required=True)
     ],
     options: CompareOptions = CompareOptions(),
-    how: AnalysisOptions = AnalysisOptions(),
+    how: AnalysisArguments = AnalysisArguments(),
 ) -> int:
     """Analyse every run, compare them, and print or write the result; for courses use the existing results."""
     refuse("compare", how, "velocity")

@@ -8,13 +8,14 @@ from pathlib import Path, PurePath
 from typing import Annotated
 
 from acquisition.recordings.writers import WRITERS
-from springmass.commands.options import PART, FileArgument, Overwrite, refuse
+from springmass.commands.options import PART, FileArgument, Overwrite, ReadArguments, refuse
 from springmass.commands.parameters import argument, option, output
 from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
-from springmass.loading.load import Loaded, load
-from springmass.loading.options import ReadOptions
+from springmass.loading.load import load
+from springmass.loading.loaded import Loaded
+from springmass.loading.save import save_run
 from springmass.loading.scenes import read_scene
-from springmass.result.outputs import numbered, save_run
+from springmass.result.output_names import numbered
 from storage.atomic import write_whole
 
 RUN_SUFFIXES = (".h5", ".hdf5", ".nxs")
@@ -30,7 +31,7 @@ def convert(
     output: Annotated[FileArgument | None, output("OUT", "the output, instead of a second argument")] = None,
     scene: Annotated[FileArgument | None, option("FILE", "scene file to store in the run file")] = None,
     overwrite: Overwrite = False,
-    read: ReadOptions = ReadOptions(),
+    read: ReadArguments = ReadArguments(),
 ) -> int:
     """Convert one input."""
     refuse("convert", read, *PART)

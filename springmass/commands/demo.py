@@ -14,10 +14,12 @@ from springmass.comparing.comparison import compare_runs
 from springmass.errors import OK, suggest
 from springmass.loading.load import load, sample_data
 from springmass.loading.options import ReadOptions
+from springmass.loading.save import save_run
 from springmass.loading.scenes import read_scene
 from springmass.report.write import write_report
-from springmass.result.outputs import make_folder, save_run
-from springmass.runs.run import Run, Task, analysed
+from springmass.result.output_names import make_folder
+from springmass.runs.run import Run
+from springmass.runs.tasks import Task, analysed
 from springmass.terminal.printing import findings_text, text_table
 from springmass.terminal.style import style_of
 

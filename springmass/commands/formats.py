@@ -14,12 +14,13 @@ from acquisition.errors import NeedsAnswer, visible
 from acquisition.recordings.identify import Inspection, inspect
 from acquisition.recordings.identify import formats as every_format
 from acquisition.recordings.recording import Survey
-from springmass.commands.options import PART, FileArgument, Json, refuse
+from springmass.commands.options import PART, FileArgument, Json, ReadArguments, refuse
 from springmass.commands.parameters import argument
 from springmass.commands.questions import for_command, option_words
 from springmass.errors import OK, suggest
 from springmass.loading.inputs import kind_of
-from springmass.loading.load import Loaded, load
+from springmass.loading.load import load
+from springmass.loading.loaded import Loaded
 from springmass.loading.options import ReadOptions
 from springmass.result.run_json import picked, plain
 
@@ -35,7 +36,7 @@ def formats(
     /,
     *,
     as_json: Json = False,
-    read: ReadOptions = ReadOptions(),
+    read: ReadArguments = ReadArguments(),
 ) -> int:
     """List the formats, or describe a file."""
     refuse("formats", read, *PART)

@@ -6,17 +6,21 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import EllipsisType
 from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
-from springmass.commands.parameters import LawName, Positive, TcpPort, argument, flag, option
+from pipeline.damping.laws import Law
+from springmass.commands.parameters import Finite, LawName, PartsPerMillion, Positive, TcpPort, argument, flag, option
 from springmass.commands.questions import option_of
 from springmass.errors import ProgramError
-from springmass.loading.options import ReadOptions
+from springmass.loading.options import Accuracy, AnalysisOptions, ReadOptions
 
 FileArgument = str | Path
 """The name of a file; a shell completes it."""
+HOW_READ = Group("How the recording is read", sort_key=2)
+_HOW_ANALYSED = Parameter(group=Group("Options", sort_key=1))
 THE_PAGE = Group("The page", sort_key=4)
 FURTHER_OPTIONS = Parameter(group=Group("Further options", sort_key=4))
 """Marks an option that few people use, which the help shows below the others."""
@@ -129,6 +133,49 @@ class PageOptions:
     ] = None
     lan: Annotated[bool, flag("let other devices on the local network view the page")] = False
     law: LawName = None
+
+
+@Parameter(name="*", group=HOW_READ)
+@dataclass(frozen=True, kw_only=True)
+class ReadArguments(ReadOptions):
+    """The options of reading as the command line has them, each with its words."""
+
+    velocity: Annotated[str | Path | None, option("FILE", "velocity file that belongs to the position file")] = None
+    channel: Annotated[
+        str | None, option("NAME", "channel to use if there are several; for a wire log, the sensor")
+    ] = None
+    run: Annotated[str | None, option("NAME", "run to use if there are several: name or number")] = None
+    rate_hz: Annotated[Positive | None, option("R", "samples per second if the file does not state them")] = None
+    unit: Annotated[str | None, option("U", "unit of the channel if the file does not state it: m, cm, rad, V ...")] = (
+        None
+    )
+    time: Annotated[str | None, option("NAME", "column with the times if the file does not state it")] = None
+    time_unit: Annotated[
+        str | None, option("U", "unit of the times if the file does not state it: s, ms, us, min, h, d")
+    ] = None
+    delimiter: Annotated[
+        str | None, option("C", "separator of a text's cells, else found out: comma, tab, space, ';' ...")
+    ] = None
+    decimal: Annotated[str | None, option("C", "decimal mark of a text, else found out: . or ,")] = None
+    unverified: Annotated[bool, flag("read a run file despite a checksum mismatch")] = False
+    from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
+    to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
+    clock_ppm: Annotated[
+        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
+    ] = None
+
+
+@Parameter(name="*", group=HOW_READ)
+@dataclass(frozen=True, kw_only=True)
+class AnalysisArguments(ReadArguments, AnalysisOptions):
+    """The options of reading and of the analysis as the command line has them, each with its words."""
+
+    accuracy: Annotated[
+        Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)"), _HOW_ANALYSED
+    ] = "standard"
+    law: Annotated[LawName, _HOW_ANALYSED] = None
+    laws: Annotated[Sequence[str | Law | EllipsisType] | None, Parameter(parse=False)] = None
+    method: Annotated[Literal["classic"] | None, Parameter(parse=False)] = None
 
 
 PART = ("from_s", "to_s", "clock_ppm")

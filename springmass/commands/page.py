@@ -10,12 +10,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from springmass.commands.options import PART, PageOptions, RecordingArgument, refuse
+from springmass.commands.options import PART, PageOptions, ReadArguments, RecordingArgument, refuse
 from springmass.commands.parameters import flag
 from springmass.errors import OK, ProgramError, manner, tell
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
-from springmass.loading.options import ReadOptions
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
 from springmass.page.web.server import address_in_network, code_for_terminal, serve
@@ -27,7 +26,7 @@ def page(
     /,
     *,
     page: PageOptions = PageOptions(),
-    read: ReadOptions = ReadOptions(),
+    read: ReadArguments = ReadArguments(),
     recorder: Annotated[bool, flag("used internally by `record --page`")] = False,
 ) -> int:
     """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""

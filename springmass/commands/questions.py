@@ -1,4 +1,4 @@
-"""Word the answer to a reader's question: as options of the typed command, or as keyword arguments in Python."""
+"""Word the answer to a reader's question as options of the command line, quoted for a shell."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 
 from acquisition.recordings.questions import Question
+from springmass.api.questions import is_given
 
 
 def option_of(name: str) -> str:
@@ -31,7 +32,7 @@ def option_words(answers: Mapping[str, object]) -> list[str]:
     for name, value in answers.items():
         if value is True:
             words.append(option_of(name))
-        elif _is_given(value):
+        elif is_given(value):
             text = f"{value:.15g}" if isinstance(value, float) else str(value)
             # A value may begin with a minus sign only if it is joined to its option by an equals sign.
             words += [f"{option_of(name)}={text}"] if text.startswith("-") else [option_of(name), text]
@@ -41,11 +42,6 @@ def option_words(answers: Mapping[str, object]) -> list[str]:
 def as_options(answers: Mapping[str, object]) -> str:
     """Return keyword arguments of :func:`springmass.load` as command-line options."""
     return " ".join(map(quoted, option_words(answers)))
-
-
-def as_arguments(answers: Mapping[str, object]) -> str:
-    """Return keyword arguments of :func:`springmass.load` as Python source text."""
-    return ", ".join(f"{name}={_literal(value)}" for name, value in answers.items() if _is_given(value))
 
 
 def for_command(question: Question, words: Sequence[str]) -> str:
@@ -62,21 +58,3 @@ def for_course(question: Question) -> str:
     """Return how to answer a question about one recording of a course: in the table of runs, or for all recordings."""
     columns = ", ".join(question.missing)
     return f"fill in {columns} in the table of runs, or give batch {as_options(question.examples)} for all recordings"
-
-
-def for_python(question: Question, function: str, given: Mapping[str, object]) -> str:
-    """Return the Python call that answers a question."""
-    kept = {name: value for name, value in given.items() if name not in question.missing}
-    words = (_literal(question.path), as_arguments(kept), as_arguments(question.examples))
-    return f"{function}({', '.join(filter(None, words))})"
-
-
-def _is_given(value: object) -> bool:
-    return value is not None and value is not False
-
-
-def _literal(value: object) -> str:
-    if isinstance(value, bool | int | float):
-        return repr(value)
-    text = str(value)
-    return repr(text) if '"' in text or "\\" in text or not text.isprintable() else f'"{text}"'

@@ -39,9 +39,9 @@ from springmass.commands.parameters import (
 )
 from springmass.commands.questions import option_words
 from springmass.errors import INTERNAL, INTERRUPTED, OK, SENSOR, UNREADABLE, ProgramError
+from springmass.loading.save import made_now
 from springmass.loading.scenes import ask_about, read_scene
 from springmass.page.recorder_side import PageProcess
-from springmass.result.outputs import made_now
 from springmass.session.bench_requests import Closed, Operator
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import default_name, demand_new

@@ -9,7 +9,7 @@ from typing import Annotated
 from springmass.commands.options import FileArgument, Overwrite
 from springmass.commands.parameters import SpeedOfSound, argument, option, output
 from springmass.errors import OK, suggest, tell
-from springmass.result.outputs import made_now
+from springmass.loading.save import made_now
 from springmass.stops import STOPS
 from storage.recovery.recover import recover as build
 

@@ -12,11 +12,10 @@ from cyclopts import Parameter, Token
 
 from acquisition.clock import SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import PART, RecordingArgument, refuse
+from springmass.commands.options import PART, ReadArguments, RecordingArgument, refuse
 from springmass.commands.parameters import Finite, flag, option
 from springmass.errors import OK
 from springmass.loading.load import load
-from springmass.loading.options import ReadOptions
 
 
 def _speed(_: Any, tokens: Sequence[Token]) -> float:
@@ -39,7 +38,7 @@ def replay(
     ] = 1.0,
     seek: Annotated[Finite | None, option("S", "start at this second of the recording")] = None,
     loop: Annotated[bool, flag("start again at the end, until Ctrl-C")] = False,
-    read: ReadOptions = ReadOptions(),
+    read: ReadArguments = ReadArguments(),
 ) -> int:
     """Play the input to stdout, one line per sample."""
     refuse("replay", read, *PART)

@@ -77,7 +77,8 @@ def scene(
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from pipeline.bench.scene import Scene
-    from springmass.loading.scenes import about_of, ask_about, read_scene, stated_keys, write_about
+    from springmass.loading.notes import about_of, write_about
+    from springmass.loading.scenes import ask_about, read_scene, stated_keys
 
     noted = scene is not None or note or mark
     if check is not None:

@@ -15,10 +15,10 @@ from pipeline.dynamics.band import Band
 from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
-from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite
+from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadArguments
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.errors import OK, ProgramError, suggest, tell
-from springmass.loading.options import AnalysisOptions, ReadOptions
+from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import ask_about, read_scene
 from springmass.result.run_json import picked
 from springmass.runs.run import Run
@@ -67,7 +67,7 @@ def simulate(
     ] = None,
     figures: FiguresOption = (),
     as_json: Json = False,
-    read: ReadOptions = ReadOptions(),
+    read: ReadArguments = ReadArguments(),
 ) -> int:
     """Print what the scene implies, its uncertainty and the cost; solve the equation and write the output."""
     if scene is None and against is None:

@@ -8,10 +8,9 @@ from typing import Annotated, Any
 
 from pipeline.analysis import Oscillation
 from springmass import __version__
-from springmass.commands.options import FileArgument, Json
+from springmass.commands.options import AnalysisArguments, FileArgument, Json
 from springmass.commands.parameters import Positive, PositiveCount, argument, option
 from springmass.errors import OK, UNREADABLE, ProgramError, manner
-from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import read_scene
 from springmass.runs.run import Run
 from springmass.terminal.progress import counted
@@ -34,7 +33,7 @@ def trade(
     seeds: Annotated[PositiveCount, option("N", "simulated records of each kind (default: 20)")] = 20,
     seconds: Annotated[Positive, option("S", "length of the records without a recording, s (default: 60)")] = 60.0,
     as_json: Json = False,
-    how: AnalysisOptions = AnalysisOptions(),
+    how: AnalysisArguments = AnalysisArguments(),
 ) -> int:
     """Simulate records of one motion, evaluate them with every tier, and solve the motion with every integrator."""
     motion = TrueMotion(seconds=seconds)

@@ -27,10 +27,11 @@ from springmass.course.results_csv import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.layout import PACKAGES, part
 from springmass.loading.inputs import InputFile, files_of
+from springmass.loading.notes import about_path
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
-from springmass.loading.scenes import about_path, read_scene
-from springmass.result.outputs import numbered
-from springmass.runs.run import Task
+from springmass.loading.scenes import read_scene
+from springmass.result.output_names import numbered
+from springmass.runs.tasks import Task
 
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
 _CODE = (".py", ".toml", ".j2", ".css", ".js")

@@ -7,6 +7,7 @@ import heapq
 import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from springmass.course.page import line_of, mark, write_groups, write_page
 from springmass.course.plan import Job, Plan, code_sha256, names_of
 from springmass.course.results_csv import COURSE, FAILED, write_rows
 from springmass.course.store import Store
-from springmass.course.worker import analyse_one, blank_row, write_report_of
+from springmass.course.worker import Remedy, analyse_one, blank_row, write_report_of
 from springmass.errors import ProgramError, complain, manner
 from springmass.report.html import SHARED, report_script
 from springmass.terminal.progress import counting
@@ -29,11 +30,12 @@ CourseRow = dict[str, Any]
 
 
 def run_course(
-    course: Plan, store: Store, folder: Path, *, jobs: int | None, dask: str | None, reports: int
+    course: Plan, store: Store, folder: Path, *, jobs: int | None, dask: str | None, reports: int, remedy: Remedy
 ) -> tuple[list[CourseRow], int, list[str]]:
     """Analyse the new and changed runs of a course, and write table, page and reports of all runs.
 
-    Runs that fail are reported as they do. Return all rows, how many were made, and a line for each unwritten report.
+    ``remedy`` words how to answer what a recording leaves open. Runs that fail are reported as they do. Return all rows,
+    how many were made, and a line for each unwritten report.
     """
     made_of = {job.key: job.made_of() for job in course.jobs}
     stored = store.made_of()
@@ -44,7 +46,7 @@ def run_course(
     done = made_of.keys() - {job.key for job in todo}
     made, written = 0, len(done)
     with counting("runs", len(todo), lines=True, quiet=manner()[0]) as show:
-        for rows in _analysed(todo, jobs, dask):
+        for rows in _analysed(todo, jobs, dask, remedy):
             # A run during which a worker died is tried again by the next pass.
             store.add((job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows)
             done |= {job.key for job, _ in rows}
@@ -58,7 +60,7 @@ def run_course(
             show(made)
     table = _table(course, store, done)
     write_rows(folder, table, course.tags)
-    return table, made, _write_pages(course, folder, table, reports, jobs)
+    return table, made, _write_pages(course, folder, table, reports, jobs, remedy)
 
 
 def _table(course: Plan, store: Store, done: set[str]) -> list[CourseRow]:
@@ -71,12 +73,14 @@ def _table(course: Plan, store: Store, done: set[str]) -> list[CourseRow]:
     ]
 
 
-def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterator[list[tuple[Job, CourseRow]]]:
+def _analysed(
+    todo: Sequence[Job], jobs: int | None, dask: str | None, remedy: Remedy
+) -> Iterator[list[tuple[Job, CourseRow]]]:
     """Yield jobs with their rows; a run during which worker processes die gets a row stating this."""
     if not todo:
         return
     with workers(len(todo), jobs, dask) as by:
-        for done in outcomes(analyse_one, todo, by):
+        for done in outcomes(partial(analyse_one, remedy=remedy), todo, by):
             rows = [(job, row or blank_row(job, "ended", f"{job.path}: {_DIED}")) for job, row in done]
             if any(row["code_sha256"] != code_sha256() for _, row in rows):
                 wrong = "a worker has another version of springmass or of its libraries; install the same everywhere"
@@ -84,7 +88,9 @@ def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterat
             yield rows
 
 
-def _write_pages(course: Plan, folder: Path, table: Sequence[CourseRow], reports: int, jobs: int | None) -> list[str]:
+def _write_pages(
+    course: Plan, folder: Path, table: Sequence[CourseRow], reports: int, jobs: int | None, remedy: Remedy
+) -> list[str]:
     """Write what to tell the groups, missing reports of the worst runs, and the page; return what cannot be written."""
     write_whole(folder / SHARED, report_script())
     lines = [line_of(row, course.tags) for row in table]
@@ -101,7 +107,7 @@ def _write_pages(course: Plan, folder: Path, table: Sequence[CourseRow], reports
     finished = 0
     progress = counting("reports", len(tasks), lines=True, quiet=manner()[0])
     with workers(len(tasks), jobs) as by, progress as show:
-        for written in outcomes(write_report_of, tasks, by):
+        for written in outcomes(partial(write_report_of, remedy=remedy), tasks, by):
             unwritten += [f"{job.path}: {_DIED}" if why is None else why for (_, job, _), why in written if why != ""]
             finished += len(written)
             show(finished)

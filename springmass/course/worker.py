@@ -4,32 +4,35 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from acquisition.errors import visible
+from acquisition.recordings.questions import Question
 from pipeline.analyse import Analysis, Oscillation
 from pipeline.bench.scene import PLACES
 from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
 from springmass.charts.several import LARGEST_DRAWN, drag_points, outline
-from springmass.commands.questions import for_course
 from springmass.course.plan import Job, code_sha256, digest_of
 from springmass.course.results_csv import ESTIMATES
 from springmass.errors import internal_error, quietly
 from springmass.report.html import SHARED
 from springmass.result.advice import Harm, harm_of, sentence
-from springmass.runs.run import Failed, Run, analyse_all
+from springmass.runs.run import Run
+from springmass.runs.tasks import Failed, analyse_all
 from storage.errors import WriteFailed
 
+Remedy = Callable[[Question], str]
+"""Words how the user answers a question that a recording leaves open; a process of another machine imports it."""
 DIGITS = 6  # decimal places of a correlation
 TIME = "by springmass batch"  # in place of a time, so that a pass at any time gives the same bytes
 
 
-def write_report_of(task: tuple[str, Job, Path]) -> str:
+def write_report_of(task: tuple[str, Job, Path], remedy: Remedy) -> str:
     """Write the report of a run, given by name, job and folder; return why it cannot be written, or nothing."""
     from springmass.report.write import write_report
 
@@ -37,7 +40,7 @@ def write_report_of(task: tuple[str, Job, Path]) -> str:
     with quietly():
         (run,) = analyse_all([job.task()])
         if isinstance(run, Failed):
-            return _line(job, run)
+            return _line(job, run, remedy)
         try:
             run = run.named(name, loaded=replace(run.loaded, path=Path(job.path)), time_utc=TIME)
             write_report(folder, [run], script=f"../../{SHARED}")
@@ -48,14 +51,14 @@ def write_report_of(task: tuple[str, Job, Path]) -> str:
     return ""
 
 
-def analyse_one(job: Job) -> dict[str, Any]:
+def analyse_one(job: Job, remedy: Remedy) -> dict[str, Any]:
     """Return the row of a run, identical on every machine and at every time; a run that fails has one as well."""
     row = blank_row(job)
     row["input_sha256"] = digest_of(job.whole(job.path)) or None
     with quietly():  # messages about a recording go into its row
         (run,) = analyse_all([job.task()])
     if isinstance(run, Failed):
-        return row | {"error": _line(job, run)}
+        return row | {"error": _line(job, run, remedy)}
     try:
         return row | row_of(run, job.path)
     except Exception as error:  # a defect in the program must not stop the other runs
@@ -77,10 +80,10 @@ def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, An
     }
 
 
-def _line(job: Job, failed: Failed) -> str:
+def _line(job: Job, failed: Failed, remedy: Remedy) -> str:
     """Return why there is no run, in one line that names it as the inputs do."""
     asked = failed.question
-    message = failed.message if asked is None else str(asked.with_remedy(for_course(asked.question)))
+    message = failed.message if asked is None else str(asked.with_remedy(remedy(asked.question)))
     line = " ".join(message.replace(job.whole(job.path), job.path).split())
     return line if job.path in line else f"{job.path}: {line}"
 

@@ -17,8 +17,10 @@ from acquisition.recordings.tables.headings import heading_of, is_time
 from pipeline.errors import TrackError
 from pipeline.track import F8, Track
 from springmass.loading.inputs import kind_of
-from springmass.loading.load import Loaded, load, to_track
+from springmass.loading.load import load
+from springmass.loading.loaded import Loaded
 from springmass.loading.options import ReadOptions
+from springmass.loading.track import to_track
 
 EXPECTED = "a path, a run, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
 ABOUT = "springmass"

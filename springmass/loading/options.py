@@ -1,4 +1,4 @@
-"""How a recording is read and analysed, declared once for the command line, courses, the page and Python."""
+"""The options of reading and of analysing a recording, for the command line, courses, the page and Python alike."""
 
 from __future__ import annotations
 
@@ -6,47 +6,36 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import EllipsisType
-from typing import Annotated, Any, Literal, Self
-
-from cyclopts import Group, Parameter
+from typing import Any, Literal, Self
 
 from pipeline.damping.laws import LAWS, Law, find_law
 from pipeline.errors import AnalysisError
 from pipeline.options import Options, options_for
 from pipeline.registry.laws import ANY_LAW
-from springmass.commands.parameters import Finite, LawName, PartsPerMillion, Positive, flag, option
 
-HOW_READ = Group("How the recording is read", sort_key=2)
+Accuracy = Literal["fast", "standard", "best"]
 
 
-@Parameter(name="*", group=HOW_READ)
 @dataclass(frozen=True, kw_only=True)
 class ReadOptions:
-    """What the user states about a recording beyond its name: what the file leaves out or open, and the part to use."""
+    """What the user states about a recording beyond its name: what the file leaves out or open, and the part to use.
 
-    velocity: Annotated[str | Path | None, option("FILE", "velocity file that belongs to the position file")] = None
-    channel: Annotated[
-        str | None, option("NAME", "channel to use if there are several; for a wire log, the sensor")
-    ] = None
-    run: Annotated[str | None, option("NAME", "run to use if there are several: name or number")] = None
-    rate_hz: Annotated[Positive | None, option("R", "samples per second if the file does not state them")] = None
-    unit: Annotated[str | None, option("U", "unit of the channel if the file does not state it: m, cm, rad, V ...")] = (
-        None
-    )
-    time: Annotated[str | None, option("NAME", "column with the times if the file does not state it")] = None
-    time_unit: Annotated[
-        str | None, option("U", "unit of the times if the file does not state it: s, ms, us, min, h, d")
-    ] = None
-    delimiter: Annotated[
-        str | None, option("C", "separator of a text's cells, else found out: comma, tab, space, ';' ...")
-    ] = None
-    decimal: Annotated[str | None, option("C", "decimal mark of a text, else found out: . or ,")] = None
-    unverified: Annotated[bool, flag("read a run file despite a checksum mismatch")] = False
-    from_s: Annotated[Finite | None, option("S", "use samples from this time on, s", "--from")] = None
-    to_s: Annotated[Finite | None, option("S", "use samples up to this time, s", "--to")] = None
-    clock_ppm: Annotated[
-        PartsPerMillion | None, option("PPM", "largest rate error of the sensor's clock (default: that of its family)")
-    ] = None
+    ``springmass.commands.options`` says for each of them what the command line calls it and what its help says.
+    """
+
+    velocity: str | Path | None = None
+    channel: str | None = None
+    run: str | None = None
+    rate_hz: float | None = None
+    unit: str | None = None
+    time: str | None = None
+    time_unit: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    unverified: bool = False
+    from_s: float | None = None
+    to_s: float | None = None
+    clock_ppm: float | None = None
 
     def given(self) -> dict[str, Any]:
         """Return the values of all options that are not the default, by name."""
@@ -64,11 +53,7 @@ class ReadOptions:
 READ_DEFAULTS = ReadOptions()
 """No option given: only the file's own statements are used."""
 
-Accuracy = Literal["fast", "standard", "best"]
-_OPTIONS = Parameter(group=Group("Options", sort_key=1))
 
-
-@Parameter(name="*", group=HOW_READ)
 @dataclass(frozen=True, kw_only=True)
 class AnalysisOptions(ReadOptions):
     """The options of reading, and those of the analysis: its accuracy, and what is known about the damping law.
@@ -77,12 +62,10 @@ class AnalysisOptions(ReadOptions):
     are those to try. With ``method`` "classic" the lab report's own method is applied as well.
     """
 
-    accuracy: Annotated[
-        Accuracy, option("TIER", "how much time to spend on accuracy (default: standard)"), _OPTIONS
-    ] = "standard"
-    law: Annotated[LawName, _OPTIONS] = None
-    laws: Annotated[Sequence[str | Law | EllipsisType] | None, Parameter(parse=False)] = None
-    method: Annotated[Literal["classic"] | None, Parameter(parse=False)] = None
+    accuracy: Accuracy = "standard"
+    law: str | None = None
+    laws: Sequence[str | Law | EllipsisType] | None = None
+    method: Literal["classic"] | None = None
 
     @property
     def options(self) -> Options:

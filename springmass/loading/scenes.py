@@ -1,30 +1,20 @@
-"""Scenes from files, and notes made on a recording afterwards: scene, remarks and marks.
-
-Recordings and run files are never changed; the notes, in ``bob.about.toml`` or ``bob.txt.about.toml``, may be. Every
-command that reads the recording uses them and reports that it does.
-"""
+"""Scenes from files or given in Python: masses, disc, air and sensor of the bench; and values that replace some."""
 
 from __future__ import annotations
 
 import codecs
-import glob
 import os
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import tomli_w
 
 from acquisition.errors import visible
 from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import ProgramError, complain
-from springmass.loading.inputs import is_recording
-from storage.atomic import write_whole
 
 Amendments = Mapping[tuple[str, str], Any]
 """Mapping of a scene's (table, key) to a value as a scene file states it."""
@@ -110,76 +100,3 @@ def ask_about(scene: Scene, where: str | Path) -> None:
     """
     for clause in scene.unusual():
         complain(f"{where}: {clause}; check value and unit")
-
-
-STEM_SUFFIXES = (".h5", ".hdf5", ".nxs", ".wire")
-"""Suffixes of run files and logs: the stem names their recording."""
-
-
-@dataclass(frozen=True, slots=True)
-class About:
-    """The notes next to a recording, whose file may not exist; marks are times in the record, s, with their texts."""
-
-    path: Path
-    scene: Scene | None = None
-    notes: tuple[str, ...] = ()
-    marks: tuple[tuple[float, str], ...] = ()
-
-    def with_more(self, scene: Scene | None, notes: Sequence[str], marks: Sequence[tuple[float, str]]) -> About:
-        """Return the notes with the given scene, if any, and with additional notes and marks."""
-        together = tuple(sorted({*self.marks, *marks}))
-        return replace(self, scene=scene or self.scene, notes=(*self.notes, *notes), marks=together)
-
-    def described(self, *, scene: bool = True) -> str:
-        """Return a summary of the notes in words, with or without their scene; empty if there are none."""
-        parts = ["its scene"] if scene and self.scene is not None else []
-        parts += [f"{len(self.notes)} notes"] if self.notes else []
-        parts += [f"{len(self.marks)} marks"] if self.marks else []
-        return ", ".join(parts)
-
-
-def about_path(recording: Path) -> Path:
-    """Return the path of the notes on a recording, whether the file exists or not.
-
-    A text has them under its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings. Notes under the stem,
-    as earlier versions wrote them, are those of a text if no other recording has that stem.
-    """
-    by_stem = recording.with_name(f"{recording.stem}.about.toml")
-    by_name = recording.with_name(f"{recording.name}.about.toml")
-    if recording.suffix.lower() in STEM_SUFFIXES:
-        return by_stem
-    others = recording.parent.glob(f"{glob.escape(recording.stem)}.*")
-    namesakes = (each for each in others if each.stem == recording.stem and each.name != recording.name)
-    # Path.exists would raise for a name that is too long.
-    alone = os.path.exists(by_stem) and not any(each.is_file() and is_recording(each) for each in namesakes)
-    return by_stem if alone and not os.path.exists(by_name) else by_name
-
-
-def about_of(recording: Path) -> About:
-    """Read the notes next to a recording; they are empty if there is no such file."""
-    path = about_path(recording)
-    if not os.path.exists(path):
-        return About(path)
-    tables = read_tables(path)
-    if unknown := sorted(set(tables) - {"scene", "notes", "marks"}):
-        raise ProgramError(f"{path}: unknown key {unknown[0]!r}; allowed are scene, notes, marks")
-    try:
-        scene = Scene.from_mapping(tables["scene"], where=f"{path} [scene]") if "scene" in tables else None
-        marks = tuple((float(mark["t_s"]), str(mark["text"])) for mark in tables.get("marks", ()))
-        notes = tuple(str(note) for note in tables.get("notes", ()))
-    except SceneError as error:
-        raise ProgramError(str(error)) from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        demand = "notes are a list of texts, marks are [[marks]] with t_s and text"
-        raise ProgramError(f"{path}: {demand}; mend or remove the file") from error
-    return About(path, scene, notes, marks)
-
-
-def write_about(about: About) -> Path:
-    """Write the notes atomically, replacing any earlier file, and return their path."""
-    tables: dict[str, Any] = {"notes": list(about.notes)} if about.notes else {}
-    if about.scene is not None and (scene := about.scene.to_mapping()):
-        tables["scene"] = scene
-    if about.marks:
-        tables["marks"] = [{"t_s": t_s, "text": text} for t_s, text in about.marks]
-    return write_whole(about.path, tomli_w.dumps(tables), overwrite=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from springmass.loading.load import Loaded
+from springmass.loading.loaded import Loaded
 from springmass.page.view import SampleBuffer, View
 from springmass.report.recorded import event_words
 from storage.errors import NotALog, StorageError

@@ -20,8 +20,8 @@ from pipeline.track import F8, Track
 from springmass.charts.chart import to_json
 from springmass.charts.run import CHARTS
 from springmass.errors import Error
-from springmass.loading.load import between
 from springmass.loading.options import Accuracy, AnalysisOptions
+from springmass.loading.time_range import between
 from springmass.page.view import View, json_of
 from springmass.result.run_json import picked
 from springmass.runs.run import Run, analyse_track

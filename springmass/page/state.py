@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from springmass.loading.scenes import about_of, write_about
+from springmass.loading.notes import about_of, write_about
 from springmass.page.feeds import LogFeed
 from springmass.page.live_analysis import Watcher
 from springmass.page.view import View

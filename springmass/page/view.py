@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquisition.block import Block, ClockKind, SourceInfo
 from acquisition.recordings.recording import FormatIssue
 from pipeline.track import Track
-from springmass.loading.load import to_track
+from springmass.loading.track import to_track
 from springmass.result.run_json import plain
 from storage.wire_log.wire_samples import Origin
 

@@ -22,7 +22,7 @@ from springmass.report.recorded import bench_words, calibration_of, date_words, 
 from springmass.report.words import method, summary
 from springmass.result.advice import notices_of, trust_of
 from springmass.result.budgets import budgets_of
-from springmass.result.summary import laws_across, laws_of
+from springmass.result.law_rows import laws_across, laws_of
 from springmass.result.table1 import table_rows
 from springmass.runs.run import Run
 from springmass.typeset import cells, page_unit, prefixed, pretty, pretty_number, typeset

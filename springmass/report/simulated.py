@@ -18,7 +18,8 @@ from pipeline.bench.scene import Scene
 from pipeline.dynamics import Trajectory, effective_mass_kg
 from pipeline.dynamics.band import LEVELS, Band
 from pipeline.track import F8
-from springmass.result.outputs import in_a_name, made_now, make_folder
+from springmass.loading.save import made_now
+from springmass.result.output_names import in_a_name, make_folder
 from springmass.simulations.against import Against
 from springmass.simulations.bench import REST_M
 from springmass.simulations.simulation import FINE, Prepared, Simulation, count_of, solve

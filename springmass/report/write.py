@@ -20,7 +20,7 @@ from springmass.report.recorded import notes_of
 from springmass.report.words import summary as in_words
 from springmass.result.budgets import budget_csv
 from springmass.result.frames import smoothed_or_why
-from springmass.result.outputs import safe_name
+from springmass.result.output_names import safe_name
 from springmass.result.run_json import plain
 from springmass.result.table1 import results_csv
 from springmass.runs.run import Run

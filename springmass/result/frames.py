@@ -18,33 +18,32 @@ from pipeline.results.compare import Comparison
 from pipeline.results.curves import Smoothed
 from pipeline.track import Quality
 from springmass.loading.arrays import ABOUT, about_json
-from springmass.loading.load import Loaded
+from springmass.loading.loaded import Loaded
 from springmass.result.run_json import EXPANDED, picked
+from springmass.result.table1 import numbers_of, table_rows
 from springmass.result.values import Value
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from springmass.runs.run import Run
 
-
-def estimates_frame(run: Run, *, correlations: bool = False) -> pd.DataFrame:
+def estimates_frame(analysis: Analysis, *, correlations: bool = False) -> pd.DataFrame:
     """Return one row per estimate; see :meth:`springmass.Run.to_dataframe`."""
     import pandas as pd
 
-    motion = run.analysis.motion
+    motion, values = analysis.motion, {name: Value.of(x) for name, x in numbers_of(analysis).items()}
     derived = motion.derived if isinstance(motion, Oscillation) else None
-    by_name = {row.name: row for row in run.rows}
+    by_name = {row.name: row for row in table_rows([analysis])}
     rows: list[dict[str, Any]] = []
-    for name, x in run.items():
+    for name, x in values.items():
         row = by_name.get(name)
         words = {"quantity": row.quantity, "symbol": row.symbol} if row else {"quantity": name.replace("_", " ")}
         budget = None if derived is None else derived.budgets.get(name)
         expanded = {} if budget is None else picked(budget, EXPANDED)
         rows.append({"symbol": "", **words, "value": x.value, "u": x.u, "unit": x.unit, **expanded})
     columns = ["quantity", "symbol", "value", "u", "unit", *EXPANDED]
-    frame = pd.DataFrame(rows, index=pd.Index(list(run), name="name"), columns=columns)
+    frame = pd.DataFrame(rows, index=pd.Index(list(values), name="name"), columns=columns)
     if correlations and derived is not None:
         names, matrix = derived.joint.names, derived.joint.correlation
         beside = pd.DataFrame(matrix, index=names, columns=[f"r({name})" for name in names])
@@ -88,14 +87,14 @@ def samples_dataset(loaded: Loaded, scene: Scene) -> xr.Dataset:
     return xr.Dataset(variables, {"time": ("time", samples.t, time)}, attributes)
 
 
-def run_dataset(run: Run) -> xr.Dataset:
+def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
     """Return samples, windows and estimates; see :meth:`springmass.Run.to_dataset`."""
-    found, analysis, track, motion = run.dataset(), run.analysis, run.analysis.track, run.analysis.motion
+    found, track, motion = samples_dataset(loaded, analysis.scene), analysis.track, analysis.motion
     of_value, of_first, of_second = (Unit(1, -order).of(track.unit) for order in range(3))
     meanings = " ".join(str(flag.name).lower() for flag in Quality)
     masks = np.array([flag.value for flag in Quality], np.uint8)
-    if len(track) < len(run.loaded.samples):
-        times = run.loaded.samples.t
+    if len(track) < len(loaded.samples):
+        times = loaded.samples.t
         found = found.isel(time=(times >= np.nanmin(track.t)) & (times <= np.nanmax(track.t)))
     left_out = {"flag_masks": masks, "flag_meanings": meanings, "long_name": "why the analysis left a sample out"}
     variables: dict[str, Any] = {"left_out": ("time", analysis.flags, left_out)}
@@ -120,9 +119,9 @@ def run_dataset(run: Run) -> xr.Dataset:
             "law_amplitude": (("law", "window"), np.array(curves), {"units": of_value}),
         }
         found.attrs["damping_law"] = damping.selected
-    for name, value in run.items():
-        variables[name] = ((), value.value, {"u": value.u, "units": value.unit or "1"})
-    return found.assign_coords(coordinates).assign(variables).assign_attrs(name=run.name)
+    for quantity, value in ((quantity, Value.of(x)) for quantity, x in numbers_of(analysis).items()):
+        variables[quantity] = ((), value.value, {"u": value.u, "units": value.unit or "1"})
+    return found.assign_coords(coordinates).assign(variables).assign_attrs(name=name)
 
 
 def smoothed_or_why(analysis: Analysis) -> Smoothed | str:

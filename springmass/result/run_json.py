@@ -18,7 +18,7 @@ from pipeline.registry.found import Found
 from pipeline.results.budget import Contribution
 from pipeline.results.classic import Classic
 from springmass import __version__
-from springmass.loading.load import Loaded
+from springmass.loading.loaded import Loaded
 
 RESULT_SCHEMA = 3
 EXPANDED = ("dof", "coverage_factor", "expanded")  # of a budget, for its expanded uncertainty

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections import Counter
-from collections.abc import Callable, Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from acquisition.errors import visible
-from pipeline.analyse import Oscillation
-from pipeline.damping.joint import JointDamping
-from pipeline.damping.select import Damping
-from pipeline.numerics.estimate import Estimate
-from springmass.typeset import equation, law_status, pretty, pretty_number, typeset
-
-if TYPE_CHECKING:
-    from springmass.runs.run import Run
+from pipeline.analyse import Analysis, Oscillation, Still
+from springmass.result.law_rows import laws_of
+from springmass.result.table1 import table_rows
+from springmass.typeset import law_status, pretty, pretty_number
 
 SUMMARY_WIDTH = 79
 SUMMARY_ROWS = 10
@@ -30,31 +23,31 @@ SUMMARY_ORDER = (
 )  # fmt: skip
 
 
-def text_summary(run: Run) -> str:
+def text_summary(analysis: Analysis, name: str) -> str:
     """Return a run in at most 15 lines of at most 79 characters."""
-    rows = {row.name: row for row in run.rows}
-    shown = [name for name in SUMMARY_ORDER if name in rows][:SUMMARY_ROWS]
-    lines = [_cut(visible(_head(run)))]
-    width = max((len(rows[name].quantity) for name in shown), default=0) + 2
-    lines += [f"  {rows[name].quantity:{width}}{rows[name].symbol:8}{rows[name].estimates[0]!r}" for name in shown]
-    if isinstance(run.analysis.motion, Oscillation):
-        lines.append(_cut(f"damping: {_law(run.analysis.motion)}"))
-    lines.append(_cut(_findings(run)))
+    rows = {row.name: row for row in table_rows([analysis])}
+    shown = [rows[quantity] for quantity in SUMMARY_ORDER if quantity in rows][:SUMMARY_ROWS]
+    lines = [_cut(visible(_head(analysis, name)))]
+    width = max((len(row.quantity) for row in shown), default=0) + 2
+    lines += [f"  {row.quantity:{width}}{row.symbol:8}{row.estimates[0]!r}" for row in shown]
+    if isinstance(analysis.motion, Oscillation):
+        lines.append(_cut(f"damping: {_law(analysis.motion)}"))
+    lines.append(_cut(_findings(analysis)))
     hidden = len(rows) - len(shown)
     lines.append("to_dataframe() has all estimates" + (f" ({hidden} more)" if hidden else "") + ", plot() the run")
     return "\n".join(lines)
 
 
-def html_summary(run: Run) -> str:
+def html_summary(analysis: Analysis, name: str) -> str:
     """Return a run as an HTML fragment without scripts: estimates, laws and findings."""
-    motion = run.analysis.motion
+    motion = analysis.motion
     rows = [
         f"<tr><td>{escape(row.quantity)}</td><td><i>{_subscript(row.page_symbol)}</i></td>"
         f"<td>{escape(pretty(row.estimates[0]))}</td></tr>"
-        for row in run.rows
+        for row in table_rows([analysis])
     ]
     parts = [
-        f"<p><b>{escape(visible(_head(run)))}</b></p>",
+        f"<p><b>{escape(visible(_head(analysis, name)))}</b></p>",
         "<table><thead><tr><th>quantity</th><th>symbol</th><th>estimate</th></tr></thead>"
         f"<tbody>{''.join(rows)}</tbody></table>",
     ]
@@ -72,19 +65,19 @@ def html_summary(run: Run) -> str:
         )
     items = "".join(
         f"<li><b>{escape(f.severity)}</b> <code>{escape(f.code)}</code>: {escape(visible(f.message))}</li>"
-        for f in run.findings
+        for f in analysis.findings
     )
-    opened = " open" if any(f.severity != "info" for f in run.findings) else ""
-    parts.append(f"<details{opened}><summary>{escape(_findings(run))}</summary><ul>{items}</ul></details>")
+    opened = " open" if any(f.severity != "info" for f in analysis.findings) else ""
+    parts.append(f"<details{opened}><summary>{escape(_findings(analysis))}</summary><ul>{items}</ul></details>")
     return f'<div class="springmass-analysis">{"".join(parts)}</div>'
 
 
-def _head(run: Run) -> str:
-    track = run.analysis.track
+def _head(analysis: Analysis, name: str) -> str:
+    track = analysis.track
     span = float(np.nanmax(track.t) - np.nanmin(track.t))
-    words = f"{run.name or 'run'}: {track.kind}, {len(track)} samples in {span:.4g} s, "
-    words += f"{run.analysis.quality['used']} used"
-    return f"{words}; {run.why}" if run.why else words
+    words = f"{name or 'run'}: {track.kind}, {len(track)} samples in {span:.4g} s, "
+    words += f"{analysis.quality['used']} used"
+    return f"{words}; {analysis.motion.why}" if isinstance(analysis.motion, Still) else words
 
 
 def _law(motion: Oscillation) -> str:
@@ -97,11 +90,11 @@ def _law(motion: Oscillation) -> str:
     return f"{damping.selected} ({state} of {len(damping.fits)} laws){tail}"
 
 
-def _findings(run: Run) -> str:
-    counts: Counter[str] = Counter(finding.severity for finding in run.findings)
+def _findings(analysis: Analysis) -> str:
+    counts: Counter[str] = Counter(finding.severity for finding in analysis.findings)
     parts = [f"{counts[name]} {name}{'s' * (counts[name] > 1)}" for name in ("error", "warning") if counts[name]]
     parts += [f"{counts['info']} for information"] if counts["info"] else []
-    grave = [f.code for f in run.findings if f.severity != "info"]
+    grave = [f.code for f in analysis.findings if f.severity != "info"]
     return f"findings: {', '.join(parts) or 'none'}" + (f": {', '.join(grave)}" if grave else "")
 
 
@@ -112,56 +105,3 @@ def _cut(line: str) -> str:
 def _subscript(symbol: str) -> str:
     letter, _, index = symbol.partition(" ")
     return escape(letter) + (f"<sub>{escape(index)}</sub>" if index else "")
-
-
-def laws_of(motion: Oscillation) -> dict[str, Any]:
-    """Return the rows of all laws fitted to one run, and the reasons why other laws were not fitted."""
-    damping = motion.damping
-    fitted = {law: motion.derived.parameters_of(fit) for law, fit in damping.fits.items()}
-    laws = _laws(damping, fitted, lambda law: law_status(damping, law))
-    return {**laws, "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
-
-
-def laws_across(joint: JointDamping) -> dict[str, Any]:
-    """Return the rows of all laws fitted to several runs with shared coefficients, and the conclusion in words."""
-    fitted = {law: fit.coefficients for law, fit in joint.fits.items()}
-    return {
-        "message": typeset(joint.message),
-        "unfitted": [],
-        **_laws(joint, fitted, lambda law: _joint_status(joint, law)),
-    }
-
-
-def _laws(
-    found: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]], status: Callable[[str], str]
-) -> dict[str, Any]:
-    """Return one row per fitted law: goodness of fit, status and coefficients."""
-    chi2 = found.best.reduced_chi2 * found.best.dof
-    rows = [
-        {
-            "name": law,
-            "status": status(law),
-            "look": "rejected" if fit.rejected else "selected" if law == found.selected else "",
-            "fit": fit,
-            "chi2": _difference(fit.reduced_chi2 * fit.dof - chi2),
-            "bic": _difference(fit.bic - found.best.bic),
-            "coefficients": [equation(name, x) for name, x in fitted[law].items()],
-        }
-        for law, fit in found.fits.items()
-    ]
-    return {"rows": rows}
-
-
-def _difference(value: float) -> str:
-    if not math.isfinite(value):  # chi-square of a law with as many parameters as there are windows
-        return pretty_number(None)
-    return pretty_number(value) if abs(value) >= 1000.0 else f"{value:.1f}".replace("-", "−")
-
-
-def _joint_status(joint: JointDamping, law: str) -> str:
-    rejection = joint.fits[law].rejection
-    if rejection:
-        return {"differ": "coefficients differ"}.get(rejection, rejection)
-    if law == joint.selected:
-        return "selected"
-    return "admissible" if law in joint.admissible else "unlikely"

@@ -1,4 +1,4 @@
-"""The lines of Table 1, and every number of a run."""
+"""Table 1: its lines, each with an estimate of every run; and every number of a run by name, also as CSV."""
 
 from __future__ import annotations
 
@@ -135,6 +135,13 @@ def _needs_mass(run: Analysis, column: Mapping[TableKey, Estimate]) -> bool:
     amplitude = column.get(TableKey("amplitude"))
     of_length = TableKey("period") in column and amplitude is not None and amplitude.unit == "m"
     return of_length and run.scene.bob_mass_kg is None
+
+
+def numbers_of(analysis: Analysis) -> Mapping[str, Estimate]:
+    """Return all estimates of a run and the coefficients of the selected law, by name."""
+    motion = analysis.motion
+    law = motion.derived.coefficients if isinstance(motion, Oscillation) else {}
+    return {**analysis.estimates, **law}
 
 
 def _every_number(analysis: Analysis) -> dict[str, Estimate]:

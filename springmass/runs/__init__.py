@@ -1,6 +1,4 @@
-"""Load, analyse, compare and simulate runs without printing anything.
+"""Runs: a recording with its analysis, which every command, page, report, course and script shows; and lists of tasks.
 
-In: paths of recordings, run files and wire logs, scenes, options. Out: loaded, analysed, compared or simulated runs,
-and their JSON, which has one schema for all commands. Free to change: the processing of an input into a Track. The
-JSON may gain keys, together with docs/reference/json.md, but no key may change its meaning.
+In: paths or arrays, scenes, options. Out: analysed runs, or why there is none.
 """

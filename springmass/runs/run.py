@@ -3,33 +3,32 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from acquisition.errors import AcquisitionError, NeedsAnswer
 from acquisition.recordings.recording import FormatIssue
 from pipeline.analyse import Analysis, Oscillation, Overdamped, analyse
 from pipeline.bench.scene import Scene
-from pipeline.errors import AnalysisError, PipelineError
+from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
-from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic, classic
 from pipeline.track import Track
-from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, ProgramError, detail, internal_error
+from springmass.errors import detail
 from springmass.loading.arrays import loaded_of, refuse_reading
-from springmass.loading.load import Loaded, load, within
+from springmass.loading.load import load
+from springmass.loading.loaded import Loaded
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
-from springmass.loading.scenes import Amendments, amended, scene_from, stated_keys
+from springmass.loading.save import now_utc, save_run
+from springmass.loading.scenes import scene_from, stated_keys
+from springmass.loading.time_range import within
 from springmass.result.frames import estimates_frame, run_dataset, samples_dataset
-from springmass.result.outputs import now_utc, save_run
 from springmass.result.run_json import result_of, with_traps
 from springmass.result.summary import html_summary, text_summary
-from springmass.result.table1 import TableRow, table_rows
+from springmass.result.table1 import TableRow, numbers_of, table_rows
 from springmass.result.values import Value
-from storage.errors import StorageError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,14 +151,8 @@ class Run(Mapping[str, Value]):
         """The lines of Table 1."""
         return table_rows([self.analysis])
 
-    def _numbers(self) -> Mapping[str, Estimate]:
-        """Return all estimates and the coefficients of the selected law, by name."""
-        motion = self.analysis.motion
-        law = motion.derived.coefficients if isinstance(motion, Oscillation) else {}
-        return {**self.analysis.estimates, **law}
-
     def __getitem__(self, name: str) -> Value:
-        everything, motion = self._numbers(), self.analysis.motion
+        everything, motion = numbers_of(self.analysis), self.analysis.motion
         if name in everything:
             return Value.of(everything[name])
         for row in self.rows:
@@ -181,10 +174,10 @@ class Run(Mapping[str, Value]):
         )
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._numbers())
+        return iter(numbers_of(self.analysis))
 
     def __len__(self) -> int:
-        return len(self._numbers())
+        return len(numbers_of(self.analysis))
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self)
@@ -238,7 +231,7 @@ class Run(Mapping[str, Value]):
             A frame with the columns quantity, symbol, value, u, unit, dof, coverage_factor and expanded. The last three
             are those of the budget in the JSON output, and are NaN for an estimate without a budget.
         """
-        return estimates_frame(self, correlations=correlations)
+        return estimates_frame(self.analysis, correlations=correlations)
 
     def dataset(self) -> xr.Dataset:
         """Return the samples as they were recorded, with all that is known about them in the attributes.
@@ -259,7 +252,7 @@ class Run(Mapping[str, Value]):
             phase_of_window. Along ``law`` and ``window``: law_amplitude. Estimates have no dimension; their ``u`` and
             ``units`` are attributes.
         """
-        return run_dataset(self)
+        return run_dataset(self.loaded, self.analysis, self.name)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the recording to a run file with its scene, calibration, flags and original files.
@@ -274,10 +267,10 @@ class Run(Mapping[str, Value]):
         return save_run(path, self.loaded, scene=self.scene.to_mapping() or None, overwrite=overwrite)
 
     def __repr__(self) -> str:
-        return text_summary(self)
+        return text_summary(self.analysis, self.name)
 
     def _repr_html_(self) -> str:
-        return html_summary(self)
+        return html_summary(self.analysis, self.name)
 
 
 def analyse_track(track: Track, scene: Scene, how: AnalysisOptions, traps: Sequence[FormatIssue]) -> Analysis:
@@ -291,63 +284,3 @@ class _NoValue(KeyError):
 
     def __str__(self) -> str:
         return str(self.args[0])
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """A recording to analyse, under a name; ``values`` replace those of its scene."""
-
-    path: str
-    name: str
-    scene: Scene | None = None
-    how: AnalysisOptions = ANALYSIS_DEFAULTS
-    values: Amendments = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class Failed:
-    """A recording that gives no run: the exit code, a line that says why, and the question that it leaves open."""
-
-    task: Task
-    code: int
-    message: str
-    question: NeedsAnswer | None = None
-
-
-def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
-    """Yield the analysed run of each recording, or why there is none; a failure does not stop the others."""
-    for task in tasks:
-        try:
-            run = Run.of(task.path, task.scene, task.how, task.name)
-            if task.values:
-                run = replace(run, stated=amended(run.scene, task.values, where="the command line"))
-            _ = run.analysis
-            yield run
-        except NeedsAnswer as error:
-            yield Failed(task, UNREADABLE, str(error), error)
-        except ProgramError as error:
-            yield Failed(task, error.exit_code, str(error))
-        except (AcquisitionError, StorageError) as error:
-            yield Failed(task, UNREADABLE, str(error))
-        except (PipelineError, OSError) as error:
-            yield Failed(task, UNREADABLE, f"{task.path}: {error}")
-        except MemoryError:
-            yield Failed(task, UNREADABLE, f"{task.path}: {NO_MEMORY}")
-        except Exception as error:  # a defect that one recording meets must not keep the others from their results
-            yield Failed(task, INTERNAL, f"{task.path}: {internal_error(error)}")
-
-
-def analysed(tasks: Iterable[Task]) -> list[Run]:
-    """Return the analysed run of each recording; the first failure is an error."""
-    runs = []
-    for found in analyse_all(tasks):
-        if isinstance(found, Failed):
-            raise found.question or ProgramError(found.message, found.code)
-        runs.append(found)
-    return runs
-
-
-def law_lines(runs: Iterable[Run]) -> list[str]:
-    """Return a line for each damping law that a scene states, unless an option set another."""
-    laws = [run.scene.damping_law for run in runs if run.how.law in (None, run.scene.damping_law)]
-    return [f"damping law {law}: stated in the scene" for law in dict.fromkeys(filter(None, laws))]

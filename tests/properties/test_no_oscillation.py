@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from acquisition.recordings.identify import open_recording
 from pipeline.analyse import Analysis, analyse
 from pipeline.track import UNITS, Track
-from springmass.loading.load import to_track
+from springmass.loading.track import to_track
 from tests.sampling import sampled
 
 SEEDS = range(6)

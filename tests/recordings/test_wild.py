@@ -16,7 +16,7 @@ from acquisition.recordings.questions import Missing
 from pipeline.analyse import analyse
 from pipeline.track import UNUSABLE
 from springmass.cli import main
-from springmass.loading.load import to_track
+from springmass.loading.track import to_track
 from tests.sampling import sampled
 
 Given = dict[str, Any]

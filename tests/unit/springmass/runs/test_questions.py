@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 import springmass as sm
 from acquisition.errors import NeedsAnswer
-from springmass.commands.questions import as_arguments, as_options
+from springmass.api.questions import as_arguments
+from springmass.commands.questions import as_options
 
 ROWS = "t,x,y\n" + "".join(f"{i / 20},{0.5 + i % 4},{0.25 + i % 3}\n" for i in range(60))
 

@@ -5,16 +5,10 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from datetime import UTC, datetime
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from acquisition.block import Block
-from springmass import __version__
 from springmass.errors import ProgramError
-from springmass.loading.load import Loaded
-from storage.run_file.writing import write_run
 
 LONGEST_NAME = 255
 
@@ -61,38 +55,3 @@ def make_folder(path: str | Path) -> Path:
             f"{folder}: cannot make the folder for results ({error.strerror}); name another with -o"
         ) from error
     return folder
-
-
-def made_now() -> dict[str, str]:
-    """Return the origin that a run file states: program, version and time of creation."""
-    return {"software": "springmass", "version": __version__, "created_utc": now_utc()}
-
-
-def now_utc() -> str:
-    """Return the current time in ISO 8601, UTC, to the second."""
-    return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def save_run(
-    path: str | os.PathLike[str],
-    loaded: Loaded,
-    *,
-    blocks: Iterable[Block] | None = None,
-    scene: Mapping[str, Any] | None = None,
-    overwrite: bool = False,
-) -> Path:
-    """Write a run file of an input with everything it states, its own bytes inside; ``blocks`` replace its samples."""
-    return write_run(
-        path,
-        loaded.samples_in_blocks() if blocks is None else blocks,
-        loaded.info,
-        originals=loaded.originals,
-        scene=scene if scene is not None else loaded.scene,
-        title=loaded.title,
-        channel=loaded.channel,
-        traps=loaded.traps,
-        malformed_rows=loaded.malformed_rows,
-        format=loaded.recorded_format,
-        provenance={**loaded.provenance, **made_now()},
-        overwrite=overwrite,
-    )

@@ -1,0 +1,66 @@
+"""The table of damping laws of a run or of several: goodness of fit, status and coefficients of each law."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pipeline.analyse import Oscillation
+from pipeline.damping.joint import JointDamping
+from pipeline.damping.select import Damping
+from pipeline.numerics.estimate import Estimate
+from springmass.typeset import equation, law_status, pretty_number, typeset
+
+
+def laws_of(motion: Oscillation) -> dict[str, Any]:
+    """Return the rows of all laws fitted to one run, and the reasons why other laws were not fitted."""
+    damping = motion.damping
+    fitted = {law: motion.derived.parameters_of(fit) for law, fit in damping.fits.items()}
+    laws = _laws(damping, fitted, lambda law: law_status(damping, law))
+    return {**laws, "unfitted": [(law, typeset(why)) for law, why in damping.unfitted.items()]}
+
+
+def laws_across(joint: JointDamping) -> dict[str, Any]:
+    """Return the rows of all laws fitted to several runs with shared coefficients, and the conclusion in words."""
+    fitted = {law: fit.coefficients for law, fit in joint.fits.items()}
+    return {
+        "message": typeset(joint.message),
+        "unfitted": [],
+        **_laws(joint, fitted, lambda law: _joint_status(joint, law)),
+    }
+
+
+def _laws(
+    found: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]], status: Callable[[str], str]
+) -> dict[str, Any]:
+    """Return one row per fitted law: goodness of fit, status and coefficients."""
+    chi2 = found.best.reduced_chi2 * found.best.dof
+    rows = [
+        {
+            "name": law,
+            "status": status(law),
+            "look": "rejected" if fit.rejected else "selected" if law == found.selected else "",
+            "fit": fit,
+            "chi2": _difference(fit.reduced_chi2 * fit.dof - chi2),
+            "bic": _difference(fit.bic - found.best.bic),
+            "coefficients": [equation(name, x) for name, x in fitted[law].items()],
+        }
+        for law, fit in found.fits.items()
+    ]
+    return {"rows": rows}
+
+
+def _difference(value: float) -> str:
+    if not math.isfinite(value):  # chi-square of a law with as many parameters as there are windows
+        return pretty_number(None)
+    return pretty_number(value) if abs(value) >= 1000.0 else f"{value:.1f}".replace("-", "−")
+
+
+def _joint_status(joint: JointDamping, law: str) -> str:
+    rejection = joint.fits[law].rejection
+    if rejection:
+        return {"differ": "coefficients differ"}.get(rejection, rejection)
+    if law == joint.selected:
+        return "selected"
+    return "admissible" if law in joint.admissible else "unlikely"

@@ -1,0 +1,75 @@
+"""Recordings to analyse one after the other: a task for each, and its analysed run or the reason why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+from acquisition.errors import AcquisitionError, NeedsAnswer
+from pipeline.bench.scene import Scene
+from pipeline.errors import PipelineError
+from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, ProgramError, internal_error
+from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
+from springmass.loading.scenes import Amendments, amended
+from springmass.runs.run import Run
+from storage.errors import StorageError
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A recording to analyse, under a name; ``values`` replace those of its scene."""
+
+    path: str
+    name: str
+    scene: Scene | None = None
+    how: AnalysisOptions = ANALYSIS_DEFAULTS
+    values: Amendments = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """A recording that gives no run: the exit code, a line that says why, and the question that it leaves open."""
+
+    task: Task
+    code: int
+    message: str
+    question: NeedsAnswer | None = None
+
+
+def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
+    """Yield the analysed run of each recording, or why there is none; a failure does not stop the others."""
+    for task in tasks:
+        try:
+            run = Run.of(task.path, task.scene, task.how, task.name)
+            if task.values:
+                run = replace(run, stated=amended(run.scene, task.values, where="the command line"))
+            _ = run.analysis
+            yield run
+        except NeedsAnswer as error:
+            yield Failed(task, UNREADABLE, str(error), error)
+        except ProgramError as error:
+            yield Failed(task, error.exit_code, str(error))
+        except (AcquisitionError, StorageError) as error:
+            yield Failed(task, UNREADABLE, str(error))
+        except (PipelineError, OSError) as error:
+            yield Failed(task, UNREADABLE, f"{task.path}: {error}")
+        except MemoryError:
+            yield Failed(task, UNREADABLE, f"{task.path}: {NO_MEMORY}")
+        except Exception as error:  # a defect that one recording meets must not keep the others from their results
+            yield Failed(task, INTERNAL, f"{task.path}: {internal_error(error)}")
+
+
+def analysed(tasks: Iterable[Task]) -> list[Run]:
+    """Return the analysed run of each recording; the first failure is an error."""
+    runs = []
+    for found in analyse_all(tasks):
+        if isinstance(found, Failed):
+            raise found.question or ProgramError(found.message, found.code)
+        runs.append(found)
+    return runs
+
+
+def law_lines(runs: Iterable[Run]) -> list[str]:
+    """Return a line for each damping law that a scene states, unless an option set another."""
+    laws = [run.scene.damping_law for run in runs if run.how.law in (None, run.scene.damping_law)]
+    return [f"damping law {law}: stated in the scene" for law in dict.fromkeys(filter(None, laws))]
