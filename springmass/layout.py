@@ -17,8 +17,3 @@ PREFIX = "springmass." if (_HOME / PACKAGES[0]).is_dir() else ""
 def part(name: str) -> Path:
     """Return the folder of one of the packages or of the bundled recordings, without checking that it exists."""
     return (_HOME if PREFIX else _HOME.parent) / name
-
-
-def static_file(name: str) -> Path:
-    """Return the path of a file for browsers: a script, a style sheet or a picture."""
-    return _HOME / "page" / "static" / name

@@ -15,7 +15,7 @@ from pipeline.track import F8
 from springmass.typeset import page_unit
 
 Role = Literal["data", "law", "other", "rest", "flagged", "band", "mark"]
-"""What a series is; its colours, dashes and marker stand in charts.js, and the drawer of files reads them there."""
+"""What a series is; ``looks`` has its colours, dashes and marker."""
 
 MOST_POINTS, MOST_OF_LINE = 12_500, 6_000
 """Largest series that is kept as it is; of a larger one two thirds as many rows remain: the extremes of bins."""

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import io
-import json
 import os
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from springmass.charts.chart import Chart, Panel, Series, thinned
-from springmass.layout import static_file
+from springmass.charts.looks import LOOKS
 from storage.atomic import write_whole
 
 if TYPE_CHECKING:
@@ -27,20 +25,9 @@ if TYPE_CHECKING:
 PictureFormat = Literal["svg", "pdf", "png"]
 STYLE = Path(__file__).with_name("figures.mplstyle")
 FIGURE_WIDTH_IN = 7.2  # inches, the width of the text on A4
-MOST_OF_DRAWN_LINE, RASTER_POINTS = (
-    3000,
-    300,
-)  # of a line; more markers than the latter are pixels, which are fewer bytes
+MOST_OF_DRAWN_LINE = 3000  # points
+RASTER_POINTS = 300  # of a line; more markers than this are pixels, which are fewer bytes
 LONG_LABEL = 30  # characters; three columns of such labels fill the width of a page
-
-
-@cache
-def _looks() -> dict[str, dict[str, Any]]:
-    """Return the table of roles that charts.js draws with."""
-    found = re.search(r"const LOOKS = (\{.*?\n\});", static_file("charts.js").read_text("utf-8"), re.DOTALL)
-    assert found is not None
-    looks: dict[str, dict[str, Any]] = json.loads(found[1])
-    return looks
 
 
 def save(charts: Iterable[Chart], folder: Path, kinds: Sequence[PictureFormat], stem: str = "") -> dict[str, bytes]:
@@ -176,7 +163,7 @@ def _logarithmic(axis: Axis, ratio: float) -> None:
 
 
 def _draw(ax: Axes, s: Series, label: str, number: int, ends: tuple[float, float], above: float) -> None:
-    found = _looks()[s.role]
+    found = LOOKS[s.role]
     colour, dash = (found[name][number % len(found[name])] for name in ("light", "dash"))
     style: dict[str, Any] = {"color": colour, "label": label, "zorder": above}
     flat = s.x.size > RASTER_POINTS

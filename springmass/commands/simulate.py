@@ -121,7 +121,7 @@ def simulate(
         results["against"] = over.summary()
     written: list[Path] = []
     if output is not None:
-        from springmass.report.simulated import write_readings
+        from springmass.simulations.run_files import write_readings
 
         write_readings(Path(output), ready, simulation, sensor, seed, where, results)
         written.append(Path(output))

@@ -34,8 +34,8 @@ def run_course(
 ) -> tuple[list[CourseRow], int, list[str]]:
     """Analyse the new and changed runs of a course, and write table, page and reports of all runs.
 
-    ``remedy`` words how to answer what a recording leaves open. Runs that fail are reported as they do. Return all rows,
-    how many were made, and a line for each unwritten report.
+    ``remedy`` words how to answer what a recording leaves open. Runs that fail are reported as they do. Return all
+    rows, how many were made, and a line for each unwritten report.
     """
     made_of = {job.key: job.made_of() for job in course.jobs}
     stored = store.made_of()

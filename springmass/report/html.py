@@ -15,9 +15,9 @@ from pipeline.findings.finding import kinds
 from pipeline.numerics.estimate import Estimate
 from pipeline.registry.quantities import EFFECTS, INPUTS
 from pipeline.track import Track
+from springmass.charts.browser import chart_style, report_source
 from springmass.charts.chart import Chart, to_json
 from springmass.comparing.comparison import SpringComparison, line_and_hooke_words
-from springmass.layout import static_file
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
 from springmass.result.advice import notices_of, trust_of
@@ -44,8 +44,6 @@ BESIDE = 3  # columns of runs that fit on A4
 MOST_NOTES = 50  # of a recording that the page lists
 SHARED = "charts.js"
 """The name of the script's own file, where several reports share it."""
-SCRIPTS = ("uPlot.iife.min.js", "charts.js", "report.js")
-"""The sources of the script, in this order; a page that is opened from a disk cannot import modules."""
 
 
 @dataclass(slots=True)
@@ -109,17 +107,14 @@ def render_html(
 
 def drawn_by_script(charts: Sequence[Mapping[str, Any]], address: str = "") -> dict[str, Any]:
     """Return what a template needs to draw charts: their numbers, the style, and the script or its address."""
-    # The page of a recording has this style too.
-    style = "\n".join(static_file(name).read_text("utf-8") for name in ("uPlot.min.css", "charts.css"))
     script = "" if address else report_script()
-    return {"charts": charts, "chart_style": style, "script": script, "script_address": address}
+    return {"charts": charts, "chart_style": chart_style(), "script": script, "script_address": address}
 
 
 @functools.cache
 def report_script() -> str:
     """Return the script of reports; its sources may hold neither </script nor <!--, which would end its element."""
-    script = "\n".join(static_file(name).read_text("utf-8") for name in SCRIPTS)
-    return f"\n{script}\n"
+    return f"\n{report_source()}\n"
 
 
 @functools.cache

@@ -1,28 +1,23 @@
-"""Write a simulation: a folder with run file, charts, tables and JSON, or the readings of a sensor as a run file."""
+"""Write the folder of a simulation: its run file, a page of charts, figures, tables and JSON."""
 
 from __future__ import annotations
 
 import io
 import json
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from acquisition.block import Block, SourceInfo
-from acquisition.simulated import VirtualRangefinder, VirtualSensor
 from pipeline.bench.scene import Scene
-from pipeline.dynamics import Trajectory, effective_mass_kg
+from pipeline.dynamics import effective_mass_kg
 from pipeline.dynamics.band import LEVELS, Band
 from pipeline.track import F8
-from springmass.loading.save import made_now
 from springmass.result.output_names import in_a_name, make_folder
 from springmass.simulations.against import Against
-from springmass.simulations.bench import REST_M
-from springmass.simulations.simulation import FINE, Prepared, Simulation, count_of, solve
+from springmass.simulations.run_files import write_states
+from springmass.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
     from springmass.charts.draw import PictureFormat
@@ -65,8 +60,7 @@ def write_folder(
             tables["against"] |= _edges("predicted", against.predicted + against.band, "m")
     with whole_folder(target, FILES, "simulation.json") as folder:
         title = f"{Path(where).name} by {simulation.solution.integrator.name}"
-        configuration = {"rest_m": _rest_m(trajectory), **results}
-        _write_run(folder / "run.h5", *_exact(trajectory, Path(where).name), scene, title, configuration)
+        write_states(folder / "run.h5", trajectory, scene, where, title, results)
         figures = Figures(save(charts, make_folder(folder / "figures"), kinds) if kinds else {})
         shown = [figures.add(chart) for chart in charts]
         page = template("charts.html.j2").render(title=title, figures=shown, **drawn_by_script(figures.charts))
@@ -91,71 +85,6 @@ def _band_columns(band: Band, t: F8, predicted: F8) -> dict[str, F8]:
 
 def _edges(name: str, quantiles: F8, unit: str) -> dict[str, F8]:
     return {f"{name}_{level}_{unit}": each for level, each in zip(LEVELS, quantiles, strict=True)}
-
-
-def write_readings(
-    path: Path, ready: Prepared, found: Simulation, sensor: str, seed: int, where: str, results: Mapping[str, Any]
-) -> None:
-    """Write a sensor's readings of a simulated motion, one for each spacing, as a run of the kind "simulated".
-
-    The noise is that of the scene's sensor, or else that of the simulated bench.
-    """
-    name, motion = Path(where).name, found.trajectory
-    if sensor == "ideal":
-        block, info = _exact(motion, name)
-    else:
-        virtual = VirtualSensor(rate_hz=1.0 / motion.spacing_s)
-        if ready.stated.sensor_sigma_m is not None:
-            virtual = replace(virtual, noise_m=ready.stated.sensor_sigma_m.value)
-        block, info = _readings(found, virtual, name, seed)
-    configuration = {"sensor": sensor, "seed": seed, **results}
-    _write_run(path, block, info, ready.solved, f"{name}, as a {sensor} sensor reads it", configuration)
-
-
-def _rest_m(trajectory: Trajectory) -> float:
-    """Return a rest distance in m at which the bob never touches the sensor."""
-    return max(REST_M, 2.0 * float(np.max(np.abs(trajectory.y))))
-
-
-def _exact(trajectory: Trajectory, name: str) -> tuple[Block, SourceInfo]:
-    """Return the states as a sensor without noise, echoes or resolution would read them, with their velocities."""
-    distance = _rest_m(trajectory) + trajectory.y
-    block = Block(0, trajectory.t, distance, np.zeros(len(distance), np.uint8), velocity=trajectory.v.copy())
-    return block, SourceInfo("simulated", name, 1.0 / trajectory.spacing_s)
-
-
-def _readings(found: Simulation, sensor: VirtualSensor, name: str, seed: int) -> tuple[Block, SourceInfo]:
-    """Return a rangefinder's readings of the motion, solved again with states close enough for interpolation."""
-    problem, spacing_s, seconds = found.problem, found.trajectory.spacing_s, float(found.trajectory.t[-1])
-    omega, rest = problem.equation.angular_frequency_per_s, _rest_m(found.trajectory)
-    # The sound of the last reading is still on its way to the bob at the end of the run.
-    longer_s = seconds + 2.0 * spacing_s + 3.0 * rest / sensor.speed_of_sound_m_per_s
-    parts = max(1, math.ceil(FINE * omega * spacing_s)) if found.solution.chosen else 1
-    method = "auto" if found.solution.chosen else found.solution.integrator.name
-    count = parts * (count_of(longer_s, spacing_s) + 1)
-    motion = solve(problem, method, spacing_s / parts, count, None).trajectory
-
-    def position(t: float) -> float:
-        return rest + float(motion.at(np.array([t]))[0])
-
-    finder = VirtualRangefinder(position, sensor, np.random.default_rng(seed))
-    return finder.block(seconds + 1.0 / sensor.rate_hz), finder.info(name)
-
-
-def _write_run(
-    path: Path, block: Block, info: SourceInfo, scene: Scene, title: str, configuration: Mapping[str, Any]
-) -> None:
-    from storage.run_file.writing import write_run
-
-    write_run(
-        path,
-        [block],
-        info,
-        scene=scene.to_mapping(),
-        title=title,
-        provenance={**made_now(), "configuration": dict(configuration)},
-        overwrite=True,
-    )
 
 
 def _table(columns: Mapping[str, F8]) -> str:

@@ -12,7 +12,8 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from queue import SimpleQueue
+from typing import Any, Protocol
 
 from acquisition.errors import CalibrationError
 from acquisition.live.calibration import StillPoint
@@ -20,9 +21,6 @@ from springmass.session.session import Session
 from springmass.session.trigger import Trigger
 from storage.errors import WriteFailed
 from storage.recorder import Recorder
-
-if TYPE_CHECKING:
-    from springmass.page.recorder_side import PageProcess
 
 LOOK_S = 0.05
 PREVIEW_NS = 600_000_000_000
@@ -34,12 +32,27 @@ class Closed(Exception):
     """The page was closed before anything was recorded."""
 
 
+class BenchPage(Protocol):
+    """The page of a session, as far as an operator needs it."""
+
+    @property
+    def requests(self) -> SimpleQueue[dict[str, Any]]:
+        """What viewers ask for."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether the page died, so that nobody can ask for anything any more."""
+
+    def tell(self, phase: str, **facts: Any) -> None:
+        """Tell viewers the phase of the recording."""
+
+
 @dataclass(slots=True)
 class Operator:
     """Carries out requests from the page until a run begins in ``log``, at a listening session."""
 
     session: Session
-    page: PageProcess
+    page: BenchPage
     log: Path
     rest: StillPoint | None = None
     _folder: Path | None = None

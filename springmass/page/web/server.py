@@ -19,6 +19,8 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from springmass import charts
+from springmass.charts.looks import looks_script
 from springmass.errors import SENSOR, ProgramError, complain
 from springmass.page.state import PageState
 from springmass.page.view import View, json_of
@@ -28,6 +30,7 @@ from storage.errors import one_line
 
 LOG = logging.getLogger("page")  # not below "springmass", whose messages are all printed
 STATIC = Path(__file__).parents[1] / "static"
+"""The files of this page alone; those of all charts are in the room of charts."""
 TURN_S = 0.0225
 """Time between two reads of the log: little longer than a screen frame; samples reach the screen within 40 ms."""
 MANY_VIEWERS, EVERY = 4, 4
@@ -222,12 +225,16 @@ def application(page: PageState, share: str = "", polled: Callable[[int], None] 
             return PlainTextResponse("springmass: the page is not open to viewers; --lan opens it\n", 404)
         return Response(code_svg(share), media_type="image/svg+xml")
 
+    async def looks(_: Any) -> Response:
+        return Response(looks_script(), media_type="text/javascript")
+
     routes = [
         Route("/", main),
         Route(REPORT, report),
         Route("/v2/code.svg", code),
         WebSocketRoute("/v2/run", server.attend),
-        Mount("/static", StaticFiles(directory=STATIC)),
+        Route("/static/looks.js", looks),
+        Mount("/static", StaticFiles(directory=STATIC, packages=[(charts.__name__, "static")])),
     ]
     return Starlette(routes=routes, lifespan=server.reading)
 

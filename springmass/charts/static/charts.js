@@ -2,18 +2,7 @@
 // Every chart of reports, courses, simulations and the page of a recording. A chart is an object as
 // springmass/charts/chart.py makes it: panels of series, each with a role. uPlot draws the axes, this script the series.
 
-// The look of each role; springmass/charts/draw.py reads this table for files. Every colour has a contrast of at least
-// 4.5 to 1 on its background, and roles differ by dashes or markers as well.
-const LOOKS = {
-  "data": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
-  "law": {"light": ["#1d232a"], "dark": ["#e4e8ec"], "dash": [[]], "marker": "dot"},
-  "other": {"light": ["#00704f", "#a03f78", "#7d5f00", "#2a6f97"], "dark": ["#4fd1a5", "#e8a0c8", "#f0c04a", "#9ad5f5"],
-    "dash": [[8, 4], [2, 3], [10, 3, 2, 3], [4, 2, 4, 6]], "marker": "ring"},
-  "rest": {"light": ["#5f6b76"], "dark": ["#a3adb8"], "dash": [[1, 3]], "marker": "dot"},
-  "flagged": {"light": ["#b84a00"], "dark": ["#ff9d5c"], "dash": [[]], "marker": "cross"},
-  "band": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
-  "mark": {"light": ["#a03f78"], "dark": ["#e8a0c8"], "dash": [[4, 4]], "marker": "ring"}
-};
+// LOOKS is the table in springmass/charts/looks.py, which draws files too; the script that it makes stands before this one.
 const RANK = { data: 0, law: 1, other: 2, rest: 3, flagged: 4, band: 5, mark: 6 }, MANY = 2000, ZOOM = 0.5, PAN = 0.25, FONT = "system-ui, sans-serif";
 
 // Light text means a dark background, whatever the page takes its colours from.

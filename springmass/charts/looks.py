@@ -1,0 +1,30 @@
+"""The look of each role in a chart, such as a law or flagged samples: colours, dashes, marker, for page and print."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "data": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
+    "law": {"light": ["#1d232a"], "dark": ["#e4e8ec"], "dash": [[]], "marker": "dot"},
+    "other": {
+        "light": ["#00704f", "#a03f78", "#7d5f00", "#2a6f97"],
+        "dark": ["#4fd1a5", "#e8a0c8", "#f0c04a", "#9ad5f5"],
+        "dash": [[8, 4], [2, 3], [10, 3, 2, 3], [4, 2, 4, 6]],
+        "marker": "ring",
+    },
+    "rest": {"light": ["#5f6b76"], "dark": ["#a3adb8"], "dash": [[1, 3]], "marker": "dot"},
+    "flagged": {"light": ["#b84a00"], "dark": ["#ff9d5c"], "dash": [[]], "marker": "cross"},
+    "band": {"light": ["#0063a0"], "dark": ["#6cb8f0"], "dash": [[]], "marker": "dot"},
+    "mark": {"light": ["#a03f78"], "dark": ["#e8a0c8"], "dash": [[4, 4]], "marker": "ring"},
+}
+"""Colours on a light and on a dark background, dashes and marker of each role; a role with several takes them in turn.
+
+Every colour has a contrast of at least 4.5 to 1 on its background, and roles differ by dashes or markers as well.
+"""
+
+
+def looks_script() -> str:
+    """Return the table as the script that charts.js needs before it."""
+    return f"const LOOKS = {json.dumps(LOOKS, separators=(',', ':'))};\n"
