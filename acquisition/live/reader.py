@@ -1,4 +1,4 @@
-"""Read ports on one thread each, which pass the bytes on unchanged.
+"""Read ports on one thread each, pass the bytes on unchanged, and reopen a lost port once it has returned.
 
 Every read has the host time at which it returned. The loss of a port is reported with its time, and the port is opened
 again when it comes back.

@@ -1,4 +1,4 @@
-"""The look of each role in a chart, such as a law or flagged samples: colours, dashes, marker, for page and print."""
+"""Colours, dashes and markers in charts: of data, the selected law, other and rejected laws, flagged samples, marks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What several commands declare alike: files, outputs, figures, the law, the options of the page."""
+"""Options that several commands share: how a recording is read and analysed, files, outputs, figures, the page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Judge the values that somebody printed about runs against the recordings, and name the mistake that explains them."""
+"""Check values that somebody printed about runs against the recordings, and name the mistake that explains them."""
 
 from __future__ import annotations
 

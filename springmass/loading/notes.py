@@ -1,4 +1,4 @@
-"""Notes on a recording, saved next to it in ``NAME.about.toml``: scene, remarks and marks.
+"""Notes on a recording, also those made on the page: saved next to it in ``NAME.about.toml``, with scene and marks.
 
 Recordings and run files are never changed; the notes, in ``bob.about.toml`` or ``bob.txt.about.toml``, may be. Every
 command that reads the recording uses them and reports that it does. The page saves its notes here too.

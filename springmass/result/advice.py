@@ -1,4 +1,4 @@
-"""Advice to a reader: findings by what they do to the results, and which numbers of Table 1 may be quoted."""
+"""Advice to a reader: what a finding does to the results, and the grade of each number of Table 1: may it be quoted?"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Uncertainty budgets for readers: the share of each input, in words and as CSV."""
+"""Uncertainty budgets made for readers: the share of each input in u, in words and as CSV."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs and comparisons as pandas frames and xarray datasets."""
+"""Pandas frames and xarray datasets of a run and of a comparison."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names, folders and origins of what the program writes."""
+"""Names and folders of the results that the program writes."""
 
 from __future__ import annotations
 

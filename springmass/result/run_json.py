@@ -1,4 +1,4 @@
-"""The JSON of a result: one schema for the command line, the report's results.json and scripts.
+"""The JSON of a run: one schema for the command line, the report's results.json and scripts.
 
 Estimates, findings, effects and traps appear in it with their fields, as :func:`plain` returns them.
 """

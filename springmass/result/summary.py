@@ -1,4 +1,4 @@
-"""Summaries of a run: at most 15 lines for a terminal, and page-wide HTML for a notebook."""
+"""Short summaries of a run: at most 15 lines for a terminal, and an HTML fragment for a notebook."""
 
 from __future__ import annotations
 

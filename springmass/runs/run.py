@@ -1,4 +1,4 @@
-"""A recording with its analysis, which every command, page, report, course and script shows; and a loop over many."""
+"""A run: a recording with its analysis, which every command, page, report, course and script shows."""
 
 from __future__ import annotations
 

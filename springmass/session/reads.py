@@ -1,4 +1,4 @@
-"""Pass reads from the port to the recorder unchanged, and then through the decoders.
+"""Pass reads to the recorder unchanged, then to the decoders; decide whether a sensor that returned continues its run.
 
 Both happen on the reading threads, in this order, so that a defect of a decoder cannot lose bytes. Exceptions of a
 decoder are counted and go no further. A separate thread for decoding would be woken by every read, which costs more

@@ -1,4 +1,4 @@
-"""Simulate a bench: a bob that obeys the equation of motion of its scene, above a simulated rangefinder."""
+"""A simulated bench for ``record --simulate``: a bob that obeys the equation of its scene, above a simulated sensor."""
 
 from __future__ import annotations
 
