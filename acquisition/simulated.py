@@ -18,7 +18,7 @@ import numpy as np
 
 from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import Clock
-from acquisition.decoders.family import Sensor
+from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from acquisition.readings import carried
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from acquisition.decoders.family import Sensor
+    from acquisition.decoders.sensor import Sensor
     from acquisition.recordings.recording import Format
     from pipeline.bench.scene import Scene
     from pipeline.damping.laws import LAWS
@@ -37,7 +37,7 @@ else:
         "LAWS": "pipeline.damping.laws",
         "Run": "springmass.runs.run",
         "Scene": "pipeline.bench.scene",
-        "Sensor": "acquisition.decoders.family",
+        "Sensor": "acquisition.decoders.sensor",
         "Stream": "springmass.api.stream",
         "analyse": "springmass.api.analysing",
         "batch": "springmass.api.courses",

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import Clock, SystemClock, VirtualClock
-from acquisition.decoders.family import Decoder, Encoder, Identity, Poll, Sensor
+from acquisition.decoders.decoder import Decoder, Encoder, Identity
 from acquisition.decoders.frames import FramedDecoder, LineSplitter, SumFrames, with_sum
+from acquisition.decoders.sensor import Poll, Sensor
 from acquisition.errors import FormatError, NeedsAnswer, SensorError
 from acquisition.readings import Reading, Readings
 from acquisition.recordings.families.user_dialects import dialect

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from acquisition.decoders.family import Encoder
+from acquisition.decoders.decoder import Encoder
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 
 LENGTHS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}

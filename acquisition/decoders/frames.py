@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
+from acquisition.decoders.decoder import Decoder
 from acquisition.readings import NO_READINGS, Reading, Readings
 
 
@@ -141,7 +142,7 @@ class SumFrames:
         self._held = b""
 
 
-class FramedDecoder(ABC):
+class FramedDecoder(Decoder):
     """A :class:`springmass.extend.Decoder` of frames; each family implements :meth:`reading`.
 
     Parameters

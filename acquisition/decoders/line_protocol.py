@@ -12,8 +12,9 @@ import math
 import re
 from binascii import crc_hqx
 
-from acquisition.decoders.family import DeviceStatus, Identity, Sensor
+from acquisition.decoders.decoder import Identity
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
+from acquisition.decoders.sensor import Sensor
 from acquisition.readings import NAN, Reading
 
 LONGEST_LINE = 96  # maximum length of a line without its line feed, bytes
@@ -69,7 +70,6 @@ class LineProtocolDecoder(FramedDecoder):
             ("garbage_bytes", "bad_checksum", "bad_frame", "unknown_record", "refused_command", "comment"), 0
         )
         super().__init__(LineSplitter(b"\n", LONGEST_LINE, faults))
-        self.status = DeviceStatus()
 
     def reading(self, host_ns: int, frame: bytes) -> Reading | None:
         """Return the reading of a line, or None; count the fault of a line without a reading."""

@@ -11,8 +11,8 @@ import re
 from functools import partial
 from typing import NamedTuple
 
-from acquisition.decoders.family import Sensor
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
+from acquisition.decoders.sensor import Sensor
 from acquisition.readings import NAN, Reading
 
 _LONGEST = 64  # bytes; the lines of the start-up banner are shorter, and are counted as faults like any other text

@@ -1,7 +1,7 @@
 """The registry of the families of rangefinders, and the recognition of a family by its bytes.
 
 The table contains only names; the module of a family is imported on demand. Another package can add a family with an
-entry point in the group ``springmass.sensors`` that refers to a :class:`acquisition.decoders.family.Sensor`.
+entry point in the group ``springmass.sensors`` that refers to a :class:`acquisition.decoders.sensor.Sensor`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
-from acquisition.decoders.family import Sensor
+from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from failure.extensions import entry_points_of, load_entry
 
@@ -81,7 +81,7 @@ def describe_bytes(data: bytes, unread: Mapping[str, Any] | None = None) -> str:
     if len(set(data)) == 1:
         return f"{len(data)} bytes, all 0x{data[0]:02X}: a line held at one level, or the wrong baud rate?"
     if b"\n" in data and sum(byte in b"\t\r\n" or 32 <= byte < 127 for byte in data) >= 0.9 * len(data):
-        return cast(str, cast(Any, get_family("text-lines").decoder(**(unread or {}))).unread(data))
+        return get_family("text-lines").decoder(**(unread or {})).unread(data)
     return "looks like noise: wrong baud rate, or inverted polarity (RS-232 levels on a TTL adapter)?"
 
 

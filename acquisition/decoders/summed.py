@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
-from acquisition.decoders.family import Poll, Sensor
 from acquisition.decoders.frames import FramedDecoder, SumFrames, with_sum
+from acquisition.decoders.sensor import Poll, Sensor
 from acquisition.readings import NAN, Reading
 
 

@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
-from acquisition.decoders.family import DeviceStatus, Sensor
 from acquisition.decoders.frames import FramedDecoder, LineSplitter
+from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from acquisition.line_numbers import LENGTHS_M, TIMES_US, Number, find_distance, has_decimal_comma, numbers
 from acquisition.readings import NAN, Reading
@@ -69,8 +69,6 @@ class TextLinesDecoder(FramedDecoder):
             None if where is None else _place(option, where)
             for option, where in (("sequence", sequence), ("time", time), ("temperature", temperature))
         )
-        self.status = DeviceStatus()
-        self.resolution_m: float | None = None
         self._last = self._step = 0.0
         self._steps = 0
 

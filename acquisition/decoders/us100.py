@@ -15,7 +15,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from acquisition.decoders.family import Poll, Sensor
+from acquisition.decoders.decoder import Decoder
+from acquisition.decoders.sensor import Poll, Sensor
 from acquisition.errors import SensorError
 from acquisition.readings import NAN, Reading, Readings
 
@@ -26,7 +27,7 @@ def _in_range(high: int, low: int) -> bool:
     return _NEAREST_MM <= (high << 8 | low) <= _FARTHEST_MM
 
 
-class Us100Decoder:
+class Us100Decoder(Decoder):
     """Decodes US-100 replies.
 
     In logs of 0.2.0, one byte with a temperature may follow every ``temperature_every`` distances; it is skipped.

@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import F8, Block, Flag, SourceInfo, SourceKind
-from acquisition.decoders.family import DeviceStatus, Sensor
+from acquisition.decoders.decoder import Decoder, DeviceStatus
+from acquisition.decoders.sensor import Sensor
+from acquisition.errors import SensorError
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM, ClockSamples, fit_clock
 from acquisition.live.timebase import Timebase, demand_within
@@ -46,7 +48,11 @@ class SensorChain:
         family.demand_options(options or {}, past=True)
         self.family = family
         self.calibration = calibration or Calibration()
-        self.decoder = family.decoder(**(options or {}))
+        decoder: object = family.decoder(**(options or {}))
+        if not isinstance(decoder, Decoder):
+            message = "its decoder must inherit from springmass.extend.Decoder, got"
+            raise SensorError(f"sensor {family.name}: {message} {type(decoder).__name__}; repair the package")
+        self.decoder = decoder
         self.timebase = Timebase(family.rate_hz if rate_hz is None else rate_hz)
         if clock_ppm is not None:
             demand_within("clock_ppm", clock_ppm, *CLOCKS_PPM)
@@ -128,13 +134,12 @@ class SensorChain:
     @property
     def status(self) -> DeviceStatus:
         """The information that the device sent besides its readings; it is empty if its decoder has none."""
-        status = getattr(self.decoder, "status", None)
-        return status if isinstance(status, DeviceStatus) else DeviceStatus()
+        return self.decoder.status
 
     def info(self, name: str, kind: SourceKind = "live") -> SourceInfo:
         """Return the description of the source; its kind of clock is determined by the first reading."""
         rate_hz, clock = self.timebase.rate_hz, self.timebase.clock
-        quantum_m = getattr(self.decoder, "resolution_m", None) or self.family.resolution_m
+        quantum_m = self.decoder.resolution_m or self.family.resolution_m
         return SourceInfo(kind, name, rate_hz, quantum_m=quantum_m, clock=clock)
 
     def report(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from acquisition.clock import Clock
-from acquisition.decoders.family import Poll
+from acquisition.decoders.sensor import Poll
 from acquisition.errors import PortError
 from acquisition.live.serial_port import SerialPort
 from acquisition.readings import Read

@@ -17,8 +17,8 @@ import numpy as np
 from cyclopts import Parameter
 
 from acquisition.clock import SystemClock
-from acquisition.decoders.family import Sensor
 from acquisition.decoders.registry import get_family
+from acquisition.decoders.sensor import Sensor
 from acquisition.live.calibration import Calibration, StillPoint
 from acquisition.live.serial_port import SerialPort
 from acquisition.simulated import VirtualPort, VirtualRangefinder, VirtualSensor

@@ -31,7 +31,7 @@ COLUMN_HEADINGS = {
     "drag_coefficient": "C_d",
 }
 """Estimates with a column, and its heading; amplitudes have the unit of their run."""
-LOOKS = ("failed", "error", "warning", "fine")
+LINE_LOOKS = ("failed", "error", "warning", "fine")
 _STATUS = {"ok": 0, "no_oscillation": 1}
 
 
@@ -51,7 +51,7 @@ def write_page(
         lines=sorted(shown, key=lambda line: (*(-x for x in line["need"]), line["name"])),
         tags=tags,
         quantities={name: COLUMN_HEADINGS[name] for name in there},
-        counts={kind: sum(line["look"] == kind for line in shown) for kind in LOOKS},
+        counts={kind: sum(line["look"] == kind for line in shown) for kind in LINE_LOOKS},
         figures={figure["name"]: figure for figure in drawn},
         **drawn_by_script(figures.charts, SHARED),
     )
@@ -111,7 +111,7 @@ def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
         line = by_name[name]
         if not any(message in text for text in line["tell"]):
             line["tell"] = [sentence(message), *line["tell"]]
-        if LOOKS.index(look) < LOOKS.index(line["look"]):
+        if LINE_LOOKS.index(look) < LINE_LOOKS.index(line["look"]):
             line["look"] = look
         line["need"][1 if look == "error" else 2] += 1
         line["differs"] = line["differs"] or (message if look == "error" else "")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquisition.block import Block, SourceInfo
-from acquisition.decoders.family import RESONATOR_PPM
+from acquisition.decoders.sensor import RESONATOR_PPM
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.clock_fit import fit_clock
 from pipeline.track import Track

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.block import I8, Block, Flag
-from acquisition.decoders.family import Sensor
+from acquisition.decoders.sensor import Sensor
 from acquisition.live.decoding import SensorChain
 from pipeline.options import options_for
 from pipeline.streaming import LiveMotion, MotionAccumulator, NotYet

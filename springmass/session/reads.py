@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from acquisition.block import Block
-from acquisition.decoders.family import Decoder
+from acquisition.decoders.decoder import Decoder
 from acquisition.live.decoding import SensorChain
 from acquisition.readings import NO_READINGS, Read, Reading
 from springmass.session.failures import Failures

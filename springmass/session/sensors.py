@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from acquisition.decoders.family import Identity, Sensor
+from acquisition.decoders.decoder import Identity
 from acquisition.decoders.registry import describe_bytes
+from acquisition.decoders.sensor import Sensor
 from acquisition.live.calibration import Calibration
 from acquisition.live.clock_fit import COUNTER_PPM
 from acquisition.live.decoding import SensorChain

@@ -119,14 +119,14 @@ class Session:
         # A slow sensor can be distinguished from silence only after several of its periods.
         slowest = min(chain.timebase.rate_hz for chain in self._chains)
         deadline = self._clock.now_ns() + int(max(HEAR_S, 5.0 / slowest) * 1e9)
-        while self._waits_for_word() or any(getattr(chain.decoder, "undecided", False) for chain in self._chains):
+        while self._waits_for_word() or any(chain.decoder.undecided for chain in self._chains):
             if self._clock.now_ns() > deadline:
                 if (mute := next((i for i, count in enumerate(self._tee.readings) if count < HEARD), None)) is None:
                     break
                 self._end_unheard(mute)
             self._wait_until(self._clock.now_ns() + 50_000_000)
         for channel, chain in enumerate(self._chains):
-            if getattr(chain.decoder, "counts", False):
+            if chain.decoder.counts:
                 self._end_unheard(channel)
             if (identity := chain.status.identity) is not None:
                 sensor = self.sensors[channel]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 from typing import Any
 
-from acquisition.decoders.family import Sensor
+from acquisition.decoders.sensor import Sensor
 from acquisition.recordings.recording import Format
 from pipeline.damping.laws import Law
 from pipeline.dynamics import Integrator

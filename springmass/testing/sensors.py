@@ -10,7 +10,8 @@ from itertools import product
 
 import numpy as np
 
-from acquisition.decoders.family import Decoder, Sensor
+from acquisition.decoders.decoder import Decoder
+from acquisition.decoders.sensor import Sensor
 from acquisition.readings import Reading
 from pipeline.track import F8
 from springmass.testing.demands import demand

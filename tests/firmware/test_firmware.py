@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.decoders.family import Identity
+from acquisition.decoders.decoder import Identity
 from acquisition.decoders.line_protocol import LONGEST_LINE, LineProtocolDecoder
 from acquisition.live.firmware import FIRMWARE_VERSION, HEX, MODEL
 

@@ -17,8 +17,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.decoders.family import Sensor
 from acquisition.decoders.registry import describe_bytes, families, probe
+from acquisition.decoders.sensor import Sensor
 from acquisition.readings import Reading
 from tests.encoders import ENCODERS, crc16
 

@@ -29,7 +29,7 @@ from springmass.session.failures import raised_at
 from storage.errors import one_line
 
 LOG = logging.getLogger("page")  # not below "springmass", whose messages are all printed
-STATIC = Path(__file__).parents[1] / "static"
+PAGE_FILES = Path(__file__).parents[1] / "static"
 """The files of this page alone; those of all charts are in the room of charts."""
 TURN_S = 0.0225
 """Time between two reads of the log: little longer than a screen frame; samples reach the screen within 40 ms."""
@@ -213,7 +213,7 @@ def application(page: PageState, share: str = "", polled: Callable[[int], None] 
     server = Server(page, share, polled)
 
     async def main(_: Any) -> Response:
-        return FileResponse(STATIC / "page.html")
+        return FileResponse(PAGE_FILES / "page.html")
 
     async def report(_: Any) -> Response:
         if page.after is None or page.after.report is None:
@@ -234,7 +234,7 @@ def application(page: PageState, share: str = "", polled: Callable[[int], None] 
         Route("/v2/code.svg", code),
         WebSocketRoute("/v2/run", server.attend),
         Route("/static/looks.js", looks),
-        Mount("/static", StaticFiles(directory=STATIC, packages=[(charts.__name__, "static")])),
+        Mount("/static", StaticFiles(directory=PAGE_FILES, packages=[(charts.__name__, "static")])),
     ]
     return Starlette(routes=routes, lifespan=server.reading)
 

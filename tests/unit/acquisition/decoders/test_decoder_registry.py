@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from acquisition.decoders.family import Sensor
 from acquisition.decoders.registry import describe_bytes, families, get_family, probe
+from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
+from acquisition.live.decoding import SensorChain
 from tests.encoders import ENCODERS
 
 LOOK_ALIKE = {
@@ -114,3 +116,9 @@ def test_a_maxbotix_line_behind_garbage_is_read(before: bytes) -> None:
     assert dict(decoder.faults) == {"garbage_bytes": len(before), "bad_frame": 1}
     assert decoder.feed(0, b"\nR0457\r\n").distance_m.tolist() == [0.457]
     assert decoder.faults["bad_frame"] == 1
+
+
+def test_a_decoder_without_the_defaults_is_refused() -> None:
+    """One line says what its class must inherit, when the sensor is opened."""
+    with pytest.raises(SensorError, match=r"must inherit from springmass\.extend\.Decoder, got object"):
+        SensorChain(replace(get_family("us100"), decoder=object))

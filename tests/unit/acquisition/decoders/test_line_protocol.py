@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.decoders.family import Identity
+from acquisition.decoders.decoder import Identity
 from acquisition.decoders.line_protocol import SETTINGS, LineProtocolDecoder, LineProtocolEncoder, frame
 
 ROOT = Path(__file__).resolve().parents[4]

@@ -1,64 +1,17 @@
-"""The description of a family of rangefinders: its decoder, its polling and its numerical limits."""
+"""The description of a kind of rangefinder: its decoder, its polling and its numerical limits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Protocol
+from typing import Any
 
+from acquisition.decoders.decoder import Decoder, Encoder
 from acquisition.errors import SensorError
-from acquisition.readings import Readings
 
 RESONATOR_PPM = 10_000.0
 """Limit for the error of a ceramic resonator, ppm: about the sum of 5000 when new, 3000 by temperature and 3000 by
 aging (Murata P16E)."""
-
-
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """How a device identifies itself; names of settings include the units."""
-
-    model: str
-    version: str
-    name: str = ""
-    settings: Mapping[str, int] = field(default_factory=dict)
-
-    def __str__(self) -> str:
-        return f"{self.model} {self.version}{f' named {self.name}' if self.name else ''}"
-
-
-@dataclass(slots=True)
-class DeviceStatus:
-    """Information that a device sends besides readings; its decoder has it as the attribute ``status``.
-
-    ``conditions`` counts the readings without a measured value by the reason that the device gave. ``complaint`` is the
-    fault that the device currently reports, with advice on what to check.
-    """
-
-    identity: Identity | None = None
-    conditions: dict[str, int] = field(default_factory=dict)
-    complaint: str = ""
-
-
-class Decoder(Protocol):
-    """Turns bytes into readings; it never raises on any bytes and resynchronises within two frames after garbage."""
-
-    @property
-    def faults(self) -> Mapping[str, int]:
-        """Counts of faults, by name: "garbage_bytes", "bad_checksum", "bad_frame", ...
-
-        "garbage_bytes" counts the bytes outside of frames. Their fraction shows whether a stream is of this family.
-        """
-
-    @property
-    def pending(self) -> int:
-        """Number of bytes of an incomplete frame; it is bounded for any input."""
-
-    def feed(self, host_ns: int, data: bytes) -> Readings:
-        """Decode the bytes of one read of the port, and return the readings of the completed frames, if any."""
-
-    def flush(self) -> None:
-        """Discard an incomplete frame, after the port was reopened or a reply timed out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,15 +35,6 @@ class Poll:
     interval_s: float
     timeout_s: float
     reply_bytes: int = 1
-
-
-class Encoder(Protocol):
-    """Encodes readings as bytes of a family for the simulated sensor; it shares no code with the decoder."""
-
-    def encode(
-        self, *, sequence: int, device_us: int, echo_us: float, distance_m: float, temperature_c: float
-    ) -> bytes:
-        """Return one frame; a NaN distance means no target."""
 
 
 @dataclass(frozen=True, slots=True)
