@@ -98,10 +98,10 @@ def has_decimal_comma(text: str, separator: str = "") -> bool | None:
         return True
     if re.search(r"[0-9],[0-9]+,[0-9]|(?<![0-9]),(?=\S)|,(?=[^\s0-9])", bare):
         return False
-    found = list(_NUMBER[","].finditer(bare))
-    if len(found) > 1:
+    matches = list(_NUMBER[","].finditer(bare))
+    if len(matches) > 1:
         return True
-    return True if found and bare[: found[0].start()].strip() else None
+    return True if matches and bare[: matches[0].start()].strip() else None
 
 
 def numbers(text: str, *, decimal_comma: bool = False, colon_separates: bool = False) -> list[Number]:
@@ -111,7 +111,7 @@ def numbers(text: str, *, decimal_comma: bool = False, colon_separates: bool = F
     """
     bare = _STAMP.sub(_blank, text) if ":" in text or "-" in text or "/" in text or text.count(".") > 1 else text
     mark = "," if decimal_comma else "."
-    found: list[Number] = []
+    line_of_numbers: list[Number] = []
     end = 0
     for match in _NUMBER[mark].finditer(bare):
         after = bare[match.end() : match.end() + 40]
@@ -126,20 +126,22 @@ def numbers(text: str, *, decimal_comma: bool = False, colon_separates: bool = F
             unit = "other"  # cm/s
         end = match.end() + (word.end() if word and unit else 0)
         unit = unit or (UNIT_OF_WORD.get(label[-1], "") if label else "")
-        found.append(Number(float(match[0].replace(",", ".")), 10.0**-digits, match.start(), before, label, unit))
-    return found
+        line_of_numbers.append(
+            Number(float(match[0].replace(",", ".")), 10.0**-digits, match.start(), before, label, unit)
+        )
+    return line_of_numbers
 
 
-def find_distance(text: str, found: Sequence[Number], unit: str = "") -> Number | None:
+def find_distance(text: str, candidates: Sequence[Number], unit: str = "") -> Number | None:
     """Return the number of a line that is the distance, with its unit if one is printed; None if that is not clear.
 
     With a stated unit, which may be ``us`` for echo times, numbers with another unit do not count.
     """
     if unit == "us":
-        found = [number for number in found if number.unit in ("us", "") and "s" not in number.label]
-        return found[0] if len(found) == 1 else None
+        candidates = [number for number in candidates if number.unit in ("us", "") and "s" not in number.label]
+        return candidates[0] if len(candidates) == 1 else None
     open_ = [
-        each for each in found if not each.is_other and not (unit and each.unit in LENGTHS_M and each.unit != unit)
+        each for each in candidates if not each.is_other and not (unit and each.unit in LENGTHS_M and each.unit != unit)
     ]
     with_unit = [each for each in open_ if each.unit]
     named = [each for each in open_ if each.is_distance]

@@ -65,8 +65,8 @@ class TrueMotion:
         drags = dict(zip([*self.law.parameters][1:], self.theta[1:].tolist(), strict=True))
         if not drags.keys() <= SCENE_DRAGS.keys():
             return None
-        found = {SCENE_DRAGS[name][1]: max(value, 0.0) for name, value in drags.items()}
-        return Problem(Equation.from_laws(2.0 * math.pi * self.frequency_hz, **found), float(self.theta[0]))
+        coefficients = {SCENE_DRAGS[name][1]: max(value, 0.0) for name, value in drags.items()}
+        return Problem(Equation.from_laws(2.0 * math.pi * self.frequency_hz, **coefficients), float(self.theta[0]))
 
 
 def motion_of(analysis: Analysis, oscillation: Oscillation) -> TrueMotion:
@@ -178,13 +178,15 @@ def _rate(law: Law, theta: F8) -> float:
 def measure_tiers(motion: TrueMotion, seeds: int) -> Iterator[list[dict[str, Any]]]:
     """Yield for each kind of records the errors and the time of every tier; all evaluate the same records in turn."""
     for name, kind in RECORD_DEFECTS.items():
-        found = spoilt(motion, kind)
-        bound, truth = bounds(found, kind), found.truth()
+        spoilt_motion = spoilt(motion, kind)
+        bound, truth = bounds(spoilt_motion, kind), spoilt_motion.truth()
         asked = [each for each in SCORED_QUANTITIES if bound[each] > 0.0]  # without damping there is no rate to find
         errors: dict[str, list[list[float]]] = {tier: [] for tier in TIERS}
         times = dict.fromkeys(TIERS, math.inf)
         for seed in range(seeds):
-            track = Track.from_arrays(found.t, record(found, kind, np.random.default_rng(seed)), kind="simulated")
+            track = Track.from_arrays(
+                spoilt_motion.t, record(spoilt_motion, kind, np.random.default_rng(seed)), kind="simulated"
+            )
             for tier in TIERS:
                 start = time.perf_counter()
                 try:

@@ -117,12 +117,12 @@ class TextLinesDecoder(FramedDecoder):
         """Return what the lines look like that gave no reading, and which option would read them."""
         lines = [line.strip() for line in data.rpartition(b"\n")[0].decode("utf-8", "replace").splitlines()[1:]]
         lines = [line for line in lines if line]
-        found = [line for line in map(self._found, lines) if not all(number.is_other for number in line[1])]
-        if not found:
+        distance_lines = [line for line in map(self._found, lines) if not all(number.is_other for number in line[1])]
+        if not distance_lines:
             return f"looks like text lines without a distance ({(lines or [''])[0][:40]!r})"
-        text, known, cells = found[-1]
+        text, known, cells = distance_lines[-1]
         quoted = f"looks like text lines with numbers ({text[:40]!r})"
-        if self._column is not None and _at(self._column, found[-1]) is None:
+        if self._column is not None and _at(self._column, distance_lines[-1]) is None:
             listed = ", ".join(f"{_cell(each, cells)} is {each.value:g}" for each in known[:8])
             return f"{quoted}, none at column {self._column}: of the columns, counted from 0, {listed}"
         units = {number.unit for number in known if number.unit in LENGTHS_M}
@@ -135,7 +135,7 @@ class TextLinesDecoder(FramedDecoder):
                 f"{quoted}: add --option separator=space if the comma is a decimal comma, "
                 "or --option separator=comma --option column=1 if it separates the distance"
             )
-        even = {cell for cell in (_cell(each, cells) for each in known) if _counts(cell, found)}
+        even = {cell for cell in (_cell(each, cells) for each in known) if _counts(cell, distance_lines)}
         likely = [each for each in known if not each.is_other and _cell(each, cells) not in even] or known
         if len(known) == 1 and even:
             return f"{quoted} that count evenly: a clock or a counter; let the sketch print the distance"
@@ -192,12 +192,12 @@ def _at(where: int | str, line: FoundNumber) -> Number | None:
     _, known, cells = line
     if isinstance(where, int):
         begin, end = cells[where] if where < len(cells) else (0, 0)
-        found = [number for number in known if begin <= number.start < end]
+        named = [number for number in known if begin <= number.start < end]
     else:
         name = re.escape(where) + r"[\"')\] ]*(?:[(\[][^\W\d_]+[)\]])?[\"' ]*[:=]?[\"'\s]*$"
-        found = [number for number in known if re.search(r"(?<!\w)" + name, number.before)]
-        found = found or [each for each in known if re.search(r"(?<!\w)" + name, each.before, re.IGNORECASE)]
-    return found[0] if len(found) == 1 else None
+        named = [number for number in known if re.search(r"(?<!\w)" + name, number.before)]
+        named = named or [each for each in known if re.search(r"(?<!\w)" + name, each.before, re.IGNORECASE)]
+    return named[0] if len(named) == 1 else None
 
 
 def _cell(number: Number, cells: list[tuple[int, int]]) -> int:

@@ -118,14 +118,14 @@ def to_json(chart: Chart) -> dict[str, Any]:
             x = _evenly(one.x) or _from_start(one.x)
             if x not in xs:
                 xs.append(x)
-            found: dict[str, Any] = {"label": one.label, "role": one.role, "line": one.line}
-            found |= {"x": xs.index(x), "y": coded(one.y)}
+            entry: dict[str, Any] = {"label": one.label, "role": one.role, "line": one.line}
+            entry |= {"x": xs.index(x), "y": coded(one.y)}
             if one.u is not None:
-                found["u"] = coded(one.u)
+                entry["u"] = coded(one.u)
             if one.why is not None:
                 words = list(dict.fromkeys(one.why))
-                found |= {"why": [words.index(each) for each in one.why], "words": words}
-            series.append(found)
+                entry |= {"why": [words.index(each) for each in one.why], "words": words}
+            series.append(entry)
         axes = {"label": panel.label, "x_label": panel.x_label, "height": panel.height, "log": panel.log}
         shown = {name: getattr(panel, name) for name in ("log_x", "equal", "zero", "names") if getattr(panel, name)}
         panels.append(axes | shown | {"range": panel.reach(), "series": series})

@@ -163,8 +163,8 @@ def _logarithmic(axis: Axis, ratio: float) -> None:
 
 
 def _draw(ax: Axes, s: Series, label: str, number: int, ends: tuple[float, float], above: float) -> None:
-    found = LOOKS[s.role]
-    colour, dash = (found[name][number % len(found[name])] for name in ("light", "dash"))
+    of_role = LOOKS[s.role]
+    colour, dash = (of_role[name][number % len(of_role[name])] for name in ("light", "dash"))
     style: dict[str, Any] = {"color": colour, "label": label, "zorder": above}
     flat = s.x.size > RASTER_POINTS
     if s.role == "mark":
@@ -186,8 +186,8 @@ def _draw(ax: Axes, s: Series, label: str, number: int, ends: tuple[float, float
             lines = [part / 2 for part in dash]
             ax.plot(s.x, s.y, lw=1.2 if s.role != "rest" else 0.8, ls=(0, lines) if lines else "-", **style)
     else:
-        marker = {"dot": "o", "ring": "o", "cross": "x"}[found["marker"]]
-        look = {"fmt": marker, "ms": 2.4 if flat else 3.4, "mew": 0 if found["marker"] == "dot" else 0.8}
+        marker = {"dot": "o", "ring": "o", "cross": "x"}[of_role["marker"]]
+        look = {"fmt": marker, "ms": 2.4 if flat else 3.4, "mew": 0 if of_role["marker"] == "dot" else 0.8}
         shown = np.clip(s.y, *ends) if s.role == "flagged" else s.y
-        hollow: dict[str, Any] = {"mfc": "none"} if found["marker"] == "ring" else {}
+        hollow: dict[str, Any] = {"mfc": "none"} if of_role["marker"] == "ring" else {}
         ax.errorbar(s.x, shown, s.u, elinewidth=0.8, rasterized=flat, **style, **look, **hollow)

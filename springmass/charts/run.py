@@ -214,16 +214,16 @@ def frequency(a: Analysis) -> Chart | None:
     stretches = Series("a stretch of the run", size * factor, shift * (slope - mean), u=shift * u)
     label = f"(frequency − {mean / (2.0 * np.pi):.5g} Hz) / mHz"
     panel = Panel(label, (law, stretches), x_label=value_label("amplitude", a.track.unit))
-    found = "changes" if changes else "is constant"
-    caption = f"Frequency of stretches of the run ± u; in the fitted model it {found}."
+    behaviour = "changes" if changes else "is constant"
+    caption = f"Frequency of stretches of the run ± u; in the fitted model it {behaviour}."
     return Chart("frequency", "Frequency against amplitude", caption, (panel,))
 
 
 def spectrum(a: Analysis) -> Chart | None:
     """Amplitude spectra of the recording and of the residuals of its fit, with the highest peaks."""
-    if not isinstance(a.motion, Oscillation) or (found := spectrum_of(a, a.motion)) is None:
+    if not isinstance(a.motion, Oscillation) or (spectra := spectrum_of(a, a.motion)) is None:
         return None
-    f, whole, left = found
+    f, whole, left = spectra
     factor, best = SHOWN[a.track.unit].factor, peaks_of(whole)
     floor = float(np.median(left[left > 0])) if (left > 0).any() else float(whole.max()) * 1e-6
     lines = (
@@ -392,10 +392,10 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
 def _smoothed(a: Analysis) -> Smoothed | None:
     """Return the motion at every sample, or None if the recording does not allow it."""
     try:
-        found = a.smoothed()
+        smoothed = a.smoothed()
     except AnalysisError:
         return None
-    return found if np.isfinite(found.position).any() else None
+    return smoothed if np.isfinite(smoothed.position).any() else None
 
 
 CHARTS: Mapping[str, Callable[[Analysis], Chart | None]] = {

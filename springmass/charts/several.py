@@ -39,17 +39,17 @@ def overlay(names: Sequence[str], analyses: Sequence[Analysis]) -> Chart | None:
     return Chart("overlay", "Positions", caption, (panel,), DETAIL_PERIODS / fastest if fastest else None)
 
 
-def comparison(found: Comparison) -> Chart:
+def comparison(compared: Comparison) -> Chart:
     """Spring constants with their uncertainties and their mean; below, the difference of each from it over its u."""
-    names = tuple(visible(name) for name in found.names)
+    names = tuple(visible(name) for name in compared.names)
     x = np.arange(1.0, len(names) + 1.0)
-    k, u = (np.array([getattr(each, of) for each in found.each]) for of in ("value", "u"))
-    exchanged = np.array([name in found.exchanged for name in found.names])
+    k, u = (np.array([getattr(each, of) for each in compared.each]) for of in ("value", "u"))
+    exchanged = np.array([name in compared.exchanged for name in compared.names])
     series = [Series("spring constant ± u", x[~exchanged], k[~exchanged], u=u[~exchanged])]
     if exchanged.any():
         series.append(Series("perhaps exchanged", x[exchanged], k[exchanged], "flagged", u=u[exchanged]))
-    if found.agree:  # constants that disagree have no meaningful mean
-        mean, ends = found.spring_constant, np.array([0.5, len(names) + 0.5])
+    if compared.agree:  # constants that disagree have no meaningful mean
+        mean, ends = compared.spring_constant, np.array([0.5, len(names) + 0.5])
         series[:0] = [
             band_of("mean ± u", ends, np.full(2, mean.value), np.full(2, mean.u)),
             line_of("mean", ends, np.full(2, mean.value)),
@@ -58,7 +58,7 @@ def comparison(found: Comparison) -> Chart:
     margin = 0.1 * (high - low) or 1.0
     panels = (
         Panel("k / (N/m)", tuple(series), x_label="run", names=names, range=(low - margin, high + margin)),
-        Panel("residual / u", (Series("residual", x, np.array(found.pulls)),), 1.2, "run", zero=True, names=names),
+        Panel("residual / u", (Series("residual", x, np.array(compared.pulls)),), 1.2, "run", zero=True, names=names),
     )
     caption = (
         "Spring constant of every run; below, its difference from the mean divided by its uncertainty, in which errors "
@@ -90,12 +90,12 @@ def masses(line: MassLine) -> Chart:
     return Chart("masses", "Many masses", caption, panels)
 
 
-def static(found: Hooke) -> Chart:
+def static(hooke: Hooke) -> Chart:
     """Rest positions against the mass, with the line of Hooke's law."""
-    order = np.argsort(found.mass_kg)
-    mass, position, line = (1e3 * each[order] for each in (found.mass_kg, found.position_m, found.line_m))
+    order = np.argsort(hooke.mass_kg)
+    mass, position, line = (1e3 * each[order] for each in (hooke.mass_kg, hooke.position_m, hooke.line_m))
     series = (line_of("line", mass, line), Series("rest position", mass, position))
-    caption = f"Rest position of every mass. The line has the slope g/k with k = {pretty(found.constant)}."
+    caption = f"Rest position of every mass. The line has the slope g/k with k = {pretty(hooke.constant)}."
     return Chart("hooke", "Hooke's law", caption, (Panel("position / mm", series, x_label="mass on the spring / g"),))
 
 

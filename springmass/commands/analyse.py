@@ -91,22 +91,22 @@ def analyse(
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself")
     scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
-    found, folders = files_of(inputs)
+    files, folders = files_of(inputs)
     for line in folders:
         tell(line)
-    alone = len(found) == 1
-    names = [""] if alone else distinct_names(["stdin" if one.path == STDIN else one.path for one in found])
+    alone = len(files) == 1
+    names = [""] if alone else distinct_names(["stdin" if one.path == STDIN else one.path for one in files])
     how = replace(how, method=options.method)
-    of_files = [how if one.velocity is None else replace(how, velocity=one.velocity) for one in found]
+    of_files = [how if one.velocity is None else replace(how, velocity=one.velocity) for one in files]
     tasks = [
-        Task(one.path, name, scenes[one.of], its, values) for one, name, its in zip(found, names, of_files, strict=True)
+        Task(one.path, name, scenes[one.of], its, values) for one, name, its in zip(files, names, of_files, strict=True)
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
     if not alone:
         return _several(tasks, inputs, options, out)
     (run,) = analyse_all(tasks)
     if isinstance(run, Failed):
-        if run.question is not None and inputs == [found[0].path]:
+        if run.question is not None and inputs == [files[0].path]:
             raise run.question  # the caller answers it with the typed command line
         return _failed(run)
     if options.json:

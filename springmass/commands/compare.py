@@ -104,17 +104,17 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
             "-o, --scene, --reported and --hooke go with single runs; a course has its page and its scenes"
         )
     rows = [{**row, COURSE: visible(folder)} for folder in inputs for row in read_rows(folder)[0]]
-    found = compare_rows(rows)
+    compared = compare_rows(rows)
     print(
-        json.dumps({"schema": RESULT_SCHEMA, **plain(found)}, allow_nan=False)
+        json.dumps({"schema": RESULT_SCHEMA, **plain(compared)}, allow_nan=False)
         if options.json
-        else visible_lines(_course_text(found))
+        else visible_lines(_course_text(compared))
     )
-    wrong = {one.name for one in found.suspects}.union(*(one.names for one in found.disagreements))
+    wrong = {one.name for one in compared.suspects}.union(*(one.names for one in compared.disagreements))
     if options.strict and wrong:
         complain(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
         return REJECTED
-    for suspect in found.suspects[:1]:
+    for suspect in compared.suspects[:1]:
         path = next(row["path"] for row in rows if suspect.name in (row["run"], f"{row[COURSE]}: {row['run']}"))
         suggest(f"springmass analyse {shlex.quote(path)}")
     return OK

@@ -35,8 +35,8 @@ def doctor(*, as_json: Json = False) -> int:
         whole = all(ok for _, ok, _, _ in checks)
     if as_json:
         print(json.dumps([dict(zip(("name", "ok", "found", "remedy"), each, strict=True)) for each in checks]))
-    for name, ok, found, remedy in () if as_json else checks:
-        print(visible(f"{'ok  ' if ok else 'FAIL'}  {name:<24} {found}"))
+    for name, ok, state, remedy in () if as_json else checks:
+        print(visible(f"{'ok  ' if ok else 'FAIL'}  {name:<24} {state}"))
         if not ok:
             print(visible(f"      {remedy}"))
     if whole:
@@ -53,9 +53,9 @@ def _packages() -> Iterator[InstallationCheck]:
     for name in PACKAGES:
         spec = importlib.util.find_spec(PREFIX + name)
         place = None if spec is None or spec.origin is None else Path(spec.origin).resolve().parent
-        found = "nowhere" if spec is None else str(place or "a folder that is no package")
+        state = "nowhere" if spec is None else str(place or "a folder that is no package")
         remedy = "another distribution brings a package of this name: install springmass into a virtual environment"
-        yield f"package {name}", place == part(name), found, remedy
+        yield f"package {name}", place == part(name), state, remedy
 
 
 def _libraries() -> Iterator[InstallationCheck]:
@@ -63,10 +63,10 @@ def _libraries() -> Iterator[InstallationCheck]:
         remedy = "install springmass again: pip install --force-reinstall"
         try:
             importlib.import_module(name)
-            found, ok = importlib.metadata.version({"serial": "pyserial"}.get(name, name)), True
+            state, ok = importlib.metadata.version({"serial": "pyserial"}.get(name, name)), True
         except ImportError as error:
-            found, ok = str(error), False
-        yield f"library {name}", ok, found, remedy
+            state, ok = str(error), False
+        yield f"library {name}", ok, state, remedy
 
 
 def _bundled() -> InstallationCheck:

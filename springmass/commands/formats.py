@@ -66,12 +66,12 @@ def _describe(path: Path, read: ReadOptions, *, as_json: bool) -> dict[str, Any]
         samples = loaded.samples
         survey = Survey("", loaded.channel, samples.unit, len(samples), loaded.info.rate_hz, loaded.traps)
         return {**_file(path, Inspection(kind, OURS[kind], WHY[kind], (survey,))), **_facts(loaded)}
-    found = inspect(path, delimiter=read.delimiter, decimal=read.decimal)
-    facts = _file(path, found)
+    inspection = inspect(path, delimiter=read.delimiter, decimal=read.decimal)
+    facts = _file(path, inspection)
     try:
         return {**facts, **_facts(load(path, read))}
     except NeedsAnswer as error:
-        traps = list(dict.fromkeys(trap for survey in found.surveys for trap in survey.traps))
+        traps = list(dict.fromkeys(trap for survey in inspection.surveys for trap in survey.traps))
         words = ["springmass", "formats", str(path), *(["--json"] if as_json else []), *option_words(read.given())]
         answered = error.with_remedy(for_command(error.question, words))
         question = [plain(need) for need in error.question.needs]
@@ -79,15 +79,21 @@ def _describe(path: Path, read: ReadOptions, *, as_json: bool) -> dict[str, Any]
         return {**facts, "needs": needs, "question": question, "traps": plain(traps)}
 
 
-def _file(path: Path, found: Inspection) -> dict[str, Any]:
+def _file(path: Path, inspection: Inspection) -> dict[str, Any]:
     channels = [
         {"run": each.run or None, "name": each.channel, "unit": each.unit or None}
         | picked(each, ("samples", "rate_hz"))
         | {"traps": [trap.code for trap in each.traps]}
-        for each in found.surveys
+        for each in inspection.surveys
     ]
-    why = found.why or None
-    return {"path": str(path), "format": found.format, "family": found.title, "why": why, "channels": channels}
+    why = inspection.why or None
+    return {
+        "path": str(path),
+        "format": inspection.format,
+        "family": inspection.title,
+        "why": why,
+        "channels": channels,
+    }
 
 
 def _facts(loaded: Loaded) -> dict[str, Any]:

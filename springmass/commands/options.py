@@ -88,10 +88,10 @@ def _measured(_: Any, tokens: Sequence[Token]) -> float | dict[str, float]:
 
 def _setting(text: str) -> tuple[tuple[str, str], Any]:
     """Return table and key of the scene, and the value."""
-    found = re.fullmatch(r"\s*(\w+)\.(\w+)\s*=\s*(.+)", text)
-    if found is None:
+    match = re.fullmatch(r"\s*(\w+)\.(\w+)\s*=\s*(.+)", text)
+    if match is None:
         raise ValueError("must be TABLE.KEY=VALUE as in a scene, for example spring.mass_kg=0.0104+/-0.0001")
-    table, key, value = found.groups()
+    table, key, value = match.groups()
     try:
         return (table, key), measured(value)
     except ValueError:

@@ -347,9 +347,9 @@ class _Bench:
             self._ask(f"bring the target to {known:g} m by the ruler, then press Enter")
             points.append(self._still(seconds, "keep it still"))
         self.session.calibrate(points, ruler, U_RULER_M)
-        found = self.session.sensors[0].calibration
-        scale = format_value(found.scale, found.u_scale)
-        self.console.line(f"scale {scale}, offset {format_value(found.offset_m, found.u_offset_m, 'm')}")
+        calibration = self.session.sensors[0].calibration
+        scale = format_value(calibration.scale, calibration.u_scale)
+        self.console.line(f"scale {scale}, offset {format_value(calibration.offset_m, calibration.u_offset_m, 'm')}")
         self._ask("hang the bob over the sensor, then press Enter")
         return self._still(seconds, "let it hang still")
 

@@ -181,13 +181,13 @@ def _after(simulation: Simulation, count: int) -> str:
 
 def _predicted(simulation: Simulation) -> str:
     """Return the motion in the quantities of Table 1."""
-    found, seconds = prediction(simulation), float(simulation.trajectory.t[-1])
-    if found is None:
+    predicted, seconds = prediction(simulation), float(simulation.trajectory.t[-1])
+    if predicted is None:
         return "none: this start and drag give no oscillation"
-    quality = "" if found["quality_factor"] is None else f", Q = {found['quality_factor']:.4g}"
+    quality = "" if predicted["quality_factor"] is None else f", Q = {predicted['quality_factor']:.4g}"
     return (
-        f"T = {found['period_s']:.6g} s, lambda = {found['damping_rate_per_s']:.4g} 1/s{quality} at A0 = "
-        f"{found['amplitude_m']:.4g} m; A = {found['last_amplitude_m']:.4g} m after {seconds:.4g} s"
+        f"T = {predicted['period_s']:.6g} s, lambda = {predicted['damping_rate_per_s']:.4g} 1/s{quality} at A0 = "
+        f"{predicted['amplitude_m']:.4g} m; A = {predicted['last_amplitude_m']:.4g} m after {seconds:.4g} s"
     )
 
 

@@ -80,8 +80,8 @@ def trade(
 
 
 def _tier(row: Mapping[str, Any]) -> list[str]:
-    found = row["error_over_bound"]
-    errors = [f"{found[each]:.3g}" if each in found else "-" for each in SCORED_QUANTITIES]
+    ratios = row["error_over_bound"]
+    errors = [f"{ratios[each]:.3g}" if each in ratios else "-" for each in SCORED_QUANTITIES]
     return [row["record"], row["tier"], *errors, _ms(row), str(row["failed"] or "-")]
 
 

@@ -142,18 +142,18 @@ def line_and_hooke_words(compared: SpringComparison) -> list[str]:
 def comparison_json(compared: SpringComparison, provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Return a comparison as a JSON-serialisable mapping; numbers that are not finite become None."""
     runs = compared.runs.values()
-    found = compared.comparison
+    springs = compared.comparison
     derived = [_moving(run).derived for run in runs]
-    each = zip(found.names, derived, found.each, found.own_u, found.pulls, strict=True)
+    each = zip(springs.names, derived, springs.each, springs.own_u, springs.pulls, strict=True)
     numbers = ("chi2", "dof", "largest_deviation", "exchanged", "exchanged_chi2", "message")
     content: dict[str, Any] = {
         "schema": RESULT_SCHEMA,
         "comparison": {
-            "agree": found.agree,
-            "spring_constant": found.spring_constant if found.agree else None,
-            "spring_mass": found.spring_mass if found.agree else None,
-            "spring_mass_stated": found.spring_mass_stated,
-            **picked(found, numbers),
+            "agree": springs.agree,
+            "spring_constant": springs.spring_constant if springs.agree else None,
+            "spring_mass": springs.spring_mass if springs.agree else None,
+            "spring_mass_stated": springs.spring_mass_stated,
+            **picked(springs, numbers),
             "each": [
                 {
                     "name": name,
@@ -210,7 +210,7 @@ def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Fin
     elif not comparison.agree:
         findings.append(Found("springs_differ", {"sentence": comparison.message}))
     findings += [Found("laws_differ", {"sentence": one.message}) for one in joint if not one.one_law]
-    return [word(found) for found in findings]
+    return [word(code) for code in findings]
 
 
 def _law(fit: JointFit) -> dict[str, Any]:

@@ -94,7 +94,7 @@ def judge(rows: Sequence[Reported], runs: Sequence[Run]) -> tuple[tuple[Reported
     """Return each row with its verdict, and a finding for each mistake, the most severe first."""
     by_name = {run.name: run for run in runs}
     judged: list[Reported] = []
-    found: list[Found] = []
+    mistakes: list[Found] = []
     exchanged: dict[str, list[str]] = {}
     for row in rows:
         run = by_name[row.run]
@@ -112,10 +112,10 @@ def judge(rows: Sequence[Reported], runs: Sequence[Run]) -> tuple[tuple[Reported
         if small is not None:
             also = f"its u is {small.numbers['times']} times too small"
             verdict = also if verdict == "agrees" else f"{verdict}; {also}"
-        found += [each for each in (wrong, small) if each is not None]
+        mistakes += [each for each in (wrong, small) if each is not None]
         judged.append(replace(row, found=expected[0], verdict=verdict))
     mixed = [Found("reported_exchanged", {"runs": p, "names": ", ".join(each)}) for p, each in exchanged.items()]
-    return tuple(judged), by_severity(word(each) for each in (*mixed, *found))
+    return tuple(judged), by_severity(word(each) for each in (*mixed, *mistakes))
 
 
 def _expected(run: Run, name: str, period: Estimate | None = None) -> list[Estimate]:
@@ -125,8 +125,8 @@ def _expected(run: Run, name: str, period: Estimate | None = None) -> list[Estim
     """
     if name not in run and name != "gamma":
         return []
-    found = run[name if name in run else "damping_rate"]
-    estimates = [Estimate(found.value, found.u, found.unit or "")]
+    value = run[name if name in run else "damping_rate"]
+    estimates = [Estimate(value.value, value.u, value.unit or "")]
     omega, mass = run["angular_frequency"], run.scene.bob_mass_kg
     if name == "spring_constant" and mass is not None:
         k = omega.value**2 * mass.value

@@ -76,8 +76,8 @@ def read_rows(path: str | os.PathLike[str], what: str) -> tuple[list[str], list[
                 wrong = f"expected {len(names)} columns, got {len(cells)}; put quotes around a text with a separator"
                 raise ProgramError(f"{where}: {wrong}")
             else:
-                found = {name: cell for name, cell in zip(names, cells, strict=False) if cell}
-                rows.append(Row(where, reader.line_num, found, mark != ","))
+                filled = {name: cell for name, cell in zip(names, cells, strict=False) if cell}
+                rows.append(Row(where, reader.line_num, filled, mark != ","))
     except csv.Error as error:
         raise ProgramError(f"{path}, line {reader.line_num}: not a row of a table ({error})") from error
     return names, rows
@@ -90,7 +90,7 @@ _SI = {"kg": 1.0, "g": 1e-3, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
 def read_hooke(path: str | os.PathLike[str]) -> Hooke:
     """Return the spring constant of a table with the columns mass_kg and position_m, or mass (g) and position (cm)."""
     names, rows = read_rows(path, "table")
-    columns = {found[1]: (name, _SI[found[2]]) for name in names if (found := _COLUMN.fullmatch(name))}
+    columns = {match[1]: (name, _SI[match[2]]) for name in names if (match := _COLUMN.fullmatch(name))}
     if len(columns) < 2:
         raise ProgramError(f"{path}: expected the columns mass_kg and position_m (or mass (g), position (cm))")
     (mass, to_kg), (position, to_m) = columns["mass"], columns["position"]

@@ -76,13 +76,13 @@ def _agreement(quantity: str, name: str, group: Sequence[CourseRun]) -> Agreemen
         why = "all its runs are among those that differ"
         return Agreement(called, name, None, math.nan, math.nan, math.nan, 0, 0, why=why)
     values = [getattr(run, quantity) for run in group]
-    found = agreement(called, name, values, [run.bench for run in group])
-    scatter = max(x for x in (found.within, found.between, 0.0) if not math.isnan(x))
-    if quantity == "spring_constant" and found.mean is not None and scatter > SCATTERED * found.mean.value:
+    agreed = agreement(called, name, values, [run.bench for run in group])
+    scatter = max(x for x in (agreed.within, agreed.between, 0.0) if not math.isnan(x))
+    if quantity == "spring_constant" and agreed.mean is not None and scatter > SCATTERED * agreed.mean.value:
         low, high = (f"{end.value:.4g}" for end in (min(values, key=float), max(values, key=float)))
         why = f"from {low} to {high} N/m: no one spring; a column spring in runs.csv tells springs apart"
-        return replace(found, mean=None, why=why)
-    return found
+        return replace(agreed, mean=None, why=why)
+    return agreed
 
 
 def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:

@@ -125,7 +125,7 @@ def _damping(analysis: Analysis) -> dict[str, Any]:
     damping, derived = analysis.motion.damping, analysis.motion.derived
     undetermined = [name for name, x in derived.coefficients.items() if isinstance(x, UpperLimit)]
     matrix = [[_number(x) for x in line] for line in derived.joint.correlation.round(DIGITS).tolist()]
-    found = _numbers(derived.coefficients) | {
+    row = _numbers(derived.coefficients) | {
         "law": damping.selected,
         "admissible": " ".join(damping.admissible),
         "stated_law": damping.stated or None,
@@ -141,9 +141,9 @@ def _damping(analysis: Analysis) -> dict[str, Any]:
     try:
         spring = SpringRun.of("", derived, clock=analysis.track.clock)
     except AnalysisError:
-        return found  # without a mass, no spring constant can be compared
+        return row  # without a mass, no spring constant can be compared
     own = {"natural_angular_frequency": spring.angular_frequency, "own_mass_kg": spring.mass_kg}
-    return found | {"u_clock": _number(spring.u_clock)} | _numbers(own)
+    return row | {"u_clock": _number(spring.u_clock)} | _numbers(own)
 
 
 def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, float | None]:

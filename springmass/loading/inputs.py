@@ -35,11 +35,11 @@ def files_of(
     ``known`` absolute paths count as recordings without being opened; ``but`` are files and subfolders to leave out.
     In a folder, ``X_velocity.txt`` belongs to ``X_position.txt``, and a log belongs to the run file of the same name.
     """
-    found: list[InputFile] = []
+    named: list[InputFile] = []
     messages: list[str] = []
     for number, text in enumerate(inputs):
         if not Path(text).is_dir():
-            found.append(InputFile(text, None, number))
+            named.append(InputFile(text, None, number))
             continue
         taken: list[InputFile] = []
         others: list[str] = []
@@ -51,8 +51,8 @@ def files_of(
             raise ProgramError(f"{text}: expected a folder with recordings, got none{_named(others)}", UNREADABLE)
         files = "file" if len(others) == 1 else "files"
         messages.append(f"{text}: {len(taken)} recordings; {len(others)} other {files}{_named(others)}")
-        found += taken
-    return found, messages
+        named += taken
+    return named, messages
 
 
 def _named(others: Sequence[str]) -> str:

@@ -95,10 +95,10 @@ def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:
     for law in named:
         find_law(law)
     others = [name for name in LAWS if name not in named]
-    found: list[str | Law] = []
+    laws: list[str | Law] = []
     for each in wanted:
-        found += others if isinstance(each, EllipsisType) else [each]
-    return tuple(found)
+        laws += others if isinstance(each, EllipsisType) else [each]
+    return tuple(laws)
 
 
 ANALYSIS_DEFAULTS = AnalysisOptions()

@@ -123,11 +123,11 @@ def _zero_of(event: Mapping[str, Any]) -> dict[str, float]:
 
 def _calibration(numbers: Mapping[str, Any] | None) -> str:
     """Return how the first sensor's distances are calibrated, in words."""
-    found = Calibration.from_mapping(numbers or {})
-    if not (found.u_scale or found.u_offset_m):
+    calibration = Calibration.from_mapping(numbers or {})
+    if not (calibration.u_scale or calibration.u_offset_m):
         return "not calibrated"
-    offset = f"offset {found.offset_m * 1e3:.1f} mm"
-    return f"by ruler: {offset}, scale {found.scale:.4f}" if found.u_scale else f"by ruler: {offset}"
+    offset = f"offset {calibration.offset_m * 1e3:.1f} mm"
+    return f"by ruler: {offset}, scale {calibration.scale:.4f}" if calibration.u_scale else f"by ruler: {offset}"
 
 
 def view_of(loaded: Loaded) -> View:

@@ -77,9 +77,9 @@ def _message(analysis: Analysis, accuracy: str, wanted_u_s: float | None, *, cha
         "t_s": _end(analysis.track),
         "findings": [picked(f, ("code", "severity", "message", "advice")) for f in graver],
     }
-    found = {name: analysis.estimates[name] for name in NAMES if name in analysis.estimates}
+    shown = {name: analysis.estimates[name] for name in NAMES if name in analysis.estimates}
     if isinstance(motion, Oscillation):
-        found |= _amplitude_now(motion, unit)
+        shown |= _amplitude_now(motion, unit)
         message |= {
             "law": motion.damping.selected,
             "stated_law": motion.damping.stated,
@@ -93,7 +93,7 @@ def _message(analysis: Analysis, accuracy: str, wanted_u_s: float | None, *, cha
             message["charts"] = {name: to_json(chart) for name, chart in made.items() if chart is not None}
     else:
         message["why"] = motion.why
-    estimates = {name: {"value": x.value, "u": x.u, "unit": x.unit, "text": str(x)} for name, x in found.items()}
+    estimates = {name: {"value": x.value, "u": x.u, "unit": x.unit, "text": str(x)} for name, x in shown.items()}
     return {**message, "estimates": estimates}
 
 

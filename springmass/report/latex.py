@@ -138,12 +138,12 @@ def _tex_quantity(estimate: Estimate | None) -> str:
         return "--"
     if isinstance(estimate, UpperLimit):
         return f"$<$ {_tex_number(format_limit(estimate.limit), estimate.unit)} (\\qty{{95}}{{\\percent}})"
-    found = re.fullmatch(r"(-?[\d.]+)(\([\d.]+\))?(?:e([+-]\d+))?", in_brackets(estimate.value, estimate.u))
-    if found is None:
+    match = re.fullmatch(r"(-?[\d.]+)(\([\d.]+\))?(?:e([+-]\d+))?", in_brackets(estimate.value, estimate.u))
+    if match is None:
         return "--"
     # siunitx wants the u in the last digit: 13.9(12) for 13.9(1.2).
-    power = f"e{int(found[3])}" if found[3] else ""
-    return _tex_number(f"{found[1]}{(found[2] or '').replace('.', '')}{power}", estimate.unit)
+    power = f"e{int(match[3])}" if match[3] else ""
+    return _tex_number(f"{match[1]}{(match[2] or '').replace('.', '')}{power}", estimate.unit)
 
 
 def _tex_number(number: str, unit: str) -> str:

@@ -56,12 +56,12 @@ def event_words(kind: str, facts: Mapping[str, Any], *, named: bool = False) -> 
 
 def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Return the calibration from echoes to distances as (quantity, value) in words; empty for an old recording."""
-    found = recorded.get("sensor", {}).get("calibration") or {}
+    calibration = recorded.get("sensor", {}).get("calibration") or {}
     rows = []
     for key, (words, unit) in _CALIBRATED.items():
-        if key in found:
-            u = found.get(f"u_{key}", 0.0)
-            rows.append((words, pretty(Estimate(float(found[key]), float(u), unit))))
+        if key in calibration:
+            u = calibration.get(f"u_{key}", 0.0)
+            rows.append((words, pretty(Estimate(float(calibration[key]), float(u), unit))))
     return tuple(rows)
 
 

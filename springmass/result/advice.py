@@ -131,7 +131,7 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
     motion = analysis.motion
     if not isinstance(motion, Oscillation):
         return {}
-    found = {}
+    by_name = {}
     for key, x in table_estimates(analysis).items():
         reasons = [*_assumed(motion, analysis, key.name), *_sized(motion, key.name, x)]
         if motion.damping.best.rejected:
@@ -140,8 +140,8 @@ def trust_of(analysis: Analysis) -> dict[str, Trust]:
             elif key.row:
                 reasons.append(Trust("uncertain", "no damping law fits"))
         grade = max(reasons, key=lambda each: GRADES.index(each.grade), default=Trust("sound")).grade
-        found[key.name] = Trust(grade, ", ".join(dict.fromkeys(each.why for each in reasons)))
-    return found
+        by_name[key.name] = Trust(grade, ", ".join(dict.fromkeys(each.why for each in reasons)))
+    return by_name
 
 
 def _assumed(motion: Oscillation, analysis: Analysis, name: str) -> Iterator[Trust]:
@@ -179,11 +179,11 @@ def _sized(motion: Oscillation, name: str, x: Estimate) -> Iterator[Trust]:
 
 def trust_text(analysis: Analysis, *, page: bool = False) -> str:
     """Return the symbols of Table 1 in groups: sound, uncertain and not to be quoted, each with its reason."""
-    found = trust_of(analysis)
+    by_name = trust_of(analysis)
     groups: dict[Grade, dict[str, list[str]]] = {grade: {} for grade in GRADES}
     for row in table_rows([analysis]):
-        if row.name in found:
-            trust = found[row.name]
+        if row.name in by_name:
+            trust = by_name[row.name]
             groups[trust.grade].setdefault(trust.why, []).append(row.on_screen if page else row.symbol)
     parts = []
     for grade, by_reason in groups.items():

@@ -51,19 +51,19 @@ def estimates_frame(analysis: Analysis, *, correlations: bool = False) -> pd.Dat
     return frame
 
 
-def comparison_frame(found: Comparison, periods: Mapping[str, Value]) -> pd.DataFrame:
+def comparison_frame(compared: Comparison, periods: Mapping[str, Value]) -> pd.DataFrame:
     """Return one row per run, by name, and one for their mean."""
     import pandas as pd
 
     rows = [
         {"period": periods[name].value, "u_period": periods[name].u, "spring_constant": k.value, "u": k.u}
-        | {"u_own": own, "pull": pull, "agree": found.agree}
-        for name, k, own, pull in zip(found.names, found.each, found.own_u, found.pulls, strict=True)
+        | {"u_own": own, "pull": pull, "agree": compared.agree}
+        for name, k, own, pull in zip(compared.names, compared.each, compared.own_u, compared.pulls, strict=True)
     ]
-    mean = found.spring_constant if found.agree else Estimate(math.nan, math.nan, "N/m")
-    rows.append({"spring_constant": mean.value, "u": mean.u, "agree": found.agree})  # the others are NaN
+    mean = compared.spring_constant if compared.agree else Estimate(math.nan, math.nan, "N/m")
+    rows.append({"spring_constant": mean.value, "u": mean.u, "agree": compared.agree})  # the others are NaN
     columns = ["period", "u_period", "spring_constant", "u", "u_own", "pull", "agree"]
-    return pd.DataFrame(rows, index=pd.Index([*found.names, "together"], name="run"), columns=columns)
+    return pd.DataFrame(rows, index=pd.Index([*compared.names, "together"], name="run"), columns=columns)
 
 
 def samples_dataset(loaded: Loaded, scene: Scene) -> xr.Dataset:
@@ -89,13 +89,13 @@ def samples_dataset(loaded: Loaded, scene: Scene) -> xr.Dataset:
 
 def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
     """Return samples, windows and estimates; see :meth:`springmass.Run.to_dataset`."""
-    found, track, motion = samples_dataset(loaded, analysis.scene), analysis.track, analysis.motion
+    dataset, track, motion = samples_dataset(loaded, analysis.scene), analysis.track, analysis.motion
     of_value, of_first, of_second = (Unit(1, -order).of(track.unit) for order in range(3))
     meanings = " ".join(str(flag.name).lower() for flag in Quality)
     masks = np.array([flag.value for flag in Quality], np.uint8)
     if len(track) < len(loaded.samples):
         times = loaded.samples.t
-        found = found.isel(time=(times >= np.nanmin(track.t)) & (times <= np.nanmax(track.t)))
+        dataset = dataset.isel(time=(times >= np.nanmin(track.t)) & (times <= np.nanmax(track.t)))
     left_out = {"flag_masks": masks, "flag_meanings": meanings, "long_name": "why the analysis left a sample out"}
     variables: dict[str, Any] = {"left_out": ("time", analysis.flags, left_out)}
     coordinates: dict[str, Any] = {}
@@ -118,10 +118,10 @@ def run_dataset(loaded: Loaded, analysis: Analysis, name: str) -> xr.Dataset:
             "phase_of_window": ("window", windows.phase, {"units": "rad"}),
             "law_amplitude": (("law", "window"), np.array(curves), {"units": of_value}),
         }
-        found.attrs["damping_law"] = damping.selected
+        dataset.attrs["damping_law"] = damping.selected
     for quantity, value in ((quantity, Value.of(x)) for quantity, x in numbers_of(analysis).items()):
         variables[quantity] = ((), value.value, {"u": value.u, "units": value.unit or "1"})
-    return found.assign_coords(coordinates).assign(variables).assign_attrs(name=name)
+    return dataset.assign_coords(coordinates).assign(variables).assign_attrs(name=name)
 
 
 def smoothed_or_why(analysis: Analysis) -> Smoothed | str:

@@ -32,21 +32,21 @@ def laws_across(joint: JointDamping) -> dict[str, Any]:
 
 
 def _laws(
-    found: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]], status: Callable[[str], str]
+    damping: Damping | JointDamping, fitted: Mapping[str, Mapping[str, Estimate]], status: Callable[[str], str]
 ) -> dict[str, Any]:
     """Return one row per fitted law: goodness of fit, status and coefficients."""
-    chi2 = found.best.reduced_chi2 * found.best.dof
+    chi2 = damping.best.reduced_chi2 * damping.best.dof
     rows = [
         {
             "name": law,
             "status": status(law),
-            "look": "rejected" if fit.rejected else "selected" if law == found.selected else "",
+            "look": "rejected" if fit.rejected else "selected" if law == damping.selected else "",
             "fit": fit,
             "chi2": _difference(fit.reduced_chi2 * fit.dof - chi2),
-            "bic": _difference(fit.bic - found.best.bic),
+            "bic": _difference(fit.bic - damping.best.bic),
             "coefficients": [equation(name, x) for name, x in fitted[law].items()],
         }
-        for law, fit in found.fits.items()
+        for law, fit in damping.fits.items()
     ]
     return {"rows": rows}
 

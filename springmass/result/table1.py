@@ -64,11 +64,11 @@ class TableRow:
 
 def table_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     """Return the contents of Table 1 for a run: estimates and coefficients, each with its law."""
-    found = _shown_estimates(analysis)
+    shown = _shown_estimates(analysis)
     moving = ("m/s", "m/s^2", "rad/s")  # what is recorded of a motion is zero on average, and a sensor's zero no result
     if is_about(analysis, "offset") or analysis.track.unit in moving:
-        found.pop(TableKey("offset"), None)
-    return found
+        shown.pop(TableKey("offset"), None)
+    return shown
 
 
 def is_about(analysis: Analysis, subject: str) -> bool:
@@ -84,14 +84,14 @@ def _shown_estimates(analysis: Analysis) -> dict[TableKey, Estimate]:
     law, certain = derived.law_of_coefficients, bool(motion.damping.admissible) or motion.damping.by_statement
     # A coefficient of a user-defined law is not one of these quantities, even if it has the same name.
     coefficients = derived.coefficients if derived.quoted and law in LAWS else {}
-    found = {}
+    shown = {}
     for name in _IN_TABLE:
         if name in derived.estimates:
             key = TableKey(name, derived.law, bool(derived.law)) if QUANTITIES[name].by_law else TableKey(name)
-            found[key] = derived.estimates[name]
+            shown[key] = derived.estimates[name]
         elif name in coefficients:
-            found[TableKey(name, law, certain, law)] = coefficients[name]
-    return found
+            shown[TableKey(name, law, certain, law)] = coefficients[name]
+    return shown
 
 
 _IN_TABLE = tuple(name for name, quantity in QUANTITIES.items() if quantity.in_table)

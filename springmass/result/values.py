@@ -37,13 +37,13 @@ def exponents_of(unit: str) -> Exponents | None:
     total = [0.0] * 5
     for sign, part in ((1, above), (-1, below.strip("()"))):
         for factor in part.split():
-            found = re.fullmatch(r"([A-Za-z]+)(?:\^(-?\d+))?", factor)
-            if found is None or found[1] not in _BASE:
+            match = re.fullmatch(r"([A-Za-z]+)(?:\^(-?\d+))?", factor)
+            if match is None or match[1] not in _BASE:
                 if factor != "1":
                     return None
                 continue
-            for i, one in enumerate(_BASE[found[1]]):
-                total[i] += sign * one * int(found[2] or 1)
+            for i, one in enumerate(_BASE[match[1]]):
+                total[i] += sign * one * int(match[2] or 1)
     return tuple(total)
 
 
@@ -166,9 +166,9 @@ def _operator(name: str, reflected: bool) -> Callable[[Any, Any], Any]:
     method = getattr(UFloat, f"__{'r' * reflected}{name}__")
 
     def operate(self: Value, other: Any) -> Any:
-        found = method(self, other)
+        number = method(self, other)
         left, right = (other, self) if reflected else (self, other)
-        return Value(found, _unit(name, left, right)) if isinstance(found, UFloat) else found
+        return Value(number, _unit(name, left, right)) if isinstance(number, UFloat) else number
 
     return operate
 

@@ -275,8 +275,8 @@ class Run(Mapping[str, Value]):
 
 def analyse_track(track: Track, scene: Scene, how: AnalysisOptions, traps: Sequence[FormatIssue]) -> Analysis:
     """Analyse samples; the findings include what their reader noticed."""
-    found = analyse(track, scene, how.options)
-    return replace(found, findings=with_traps(found.findings, traps))
+    analysis = analyse(track, scene, how.options)
+    return replace(analysis, findings=with_traps(analysis.findings, traps))
 
 
 class _NoValue(KeyError):

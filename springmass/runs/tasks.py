@@ -62,10 +62,10 @@ def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
 def analysed(tasks: Iterable[Task]) -> list[Run]:
     """Return the analysed run of each recording; the first failure is an error."""
     runs = []
-    for found in analyse_all(tasks):
-        if isinstance(found, Failed):
-            raise found.question or ProgramError(found.message, found.code)
-        runs.append(found)
+    for outcome in analyse_all(tasks):
+        if isinstance(outcome, Failed):
+            raise outcome.question or ProgramError(outcome.message, outcome.code)
+        runs.append(outcome)
     return runs
 
 

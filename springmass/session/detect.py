@@ -50,9 +50,9 @@ def listen(device: str, bauds: Sequence[int] = PROBED_BAUDS) -> tuple[str, list[
             heard = _bytes_of(device, baud)
         except PortError as error:
             return str(error), [], baud
-        found = probe(heard) if heard else []
-        if found:
-            return f"{describe_bytes(heard)} at {baud} baud", found, baud
+        families = probe(heard) if heard else []
+        if families:
+            return f"{describe_bytes(heard)} at {baud} baud", families, baud
     return describe_bytes(heard), [], bauds[-1]
 
 

@@ -163,15 +163,15 @@ def _leaves(t: F8, outside: NDArray[np.bool_], problem: Problem) -> float | None
     ends = np.searchsorted(t, t + period_s, side="right")
     share = (total[ends] - total[:-1]) / (ends - np.arange(t.size))
     whole = t + period_s <= t[-1]
-    found = np.flatnonzero(whole & (share > HALF))
-    return float(t[found[0]]) if found.size else None
+    beginnings = np.flatnonzero(whole & (share > HALF))
+    return float(t[beginnings[0]]) if beginnings.size else None
 
 
 def _shifts(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> tuple[InputShift, ...]:
     """Return the least-squares change of each input alone that brings the prediction closest to the record."""
     from scipy.optimize import minimize_scalar
 
-    found = []
+    shifts = []
     # Evaluated at the times of the band, whose states are two fifths of a radian apart.
     rows = np.unique(np.searchsorted(band.t, since).clip(max=band.t.size - 1))
     at = np.interp(band.t[rows], since, left)
@@ -191,8 +191,8 @@ def _shifts(band: Band, since: F8, left: F8, values: Mapping[str, Estimate]) -> 
         step = float(grid[1] - grid[0])
         shift = float(minimize_scalar(rms, bounds=(best - step, best + step), method="bounded").x)
         given = values[name]
-        found.append(InputShift(name, given.value, given.value + shift * given.u, shift, rms(shift)))
-    return tuple(sorted(found, key=lambda shift: shift.rms_m))
+        shifts.append(InputShift(name, given.value, given.value + shift * given.u, shift, rms(shift)))
+    return tuple(sorted(shifts, key=lambda shift: shift.rms_m))
 
 
 def deviation_text(against: Against) -> list[str]:
@@ -232,10 +232,10 @@ def _oscillation(analysis: Analysis) -> Oscillation:
 def _covariance(motion: Oscillation) -> F8:
     """Return the covariance of frequency, phase, and the damping law's amplitude and coefficients."""
     phase, law = motion.phase, motion.damping.best.joint
-    found = np.zeros((2 + len(law.names), 2 + len(law.names)))
-    found[2:, 2:] = law.covariance
+    covariance = np.zeros((2 + len(law.names), 2 + len(law.names)))
+    covariance[2:, 2:] = law.covariance
     u_omega, u_phase = phase.angular_frequency.u, phase.phase.u
-    found[0, 0], found[1, 1] = u_omega**2, u_phase**2
+    covariance[0, 0], covariance[1, 1] = u_omega**2, u_phase**2
     between = (phase.t0 - phase.middle) * u_omega**2
-    found[0, 1] = found[1, 0] = math.copysign(min(abs(between), u_omega * u_phase), between)
-    return found
+    covariance[0, 1] = covariance[1, 0] = math.copysign(min(abs(between), u_omega * u_phase), between)
+    return covariance

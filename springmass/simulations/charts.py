@@ -20,15 +20,15 @@ POINTS_DRAWN = 1500
 GROWN = 1e6  # multiple of the starting amplitude above which curves are cut off
 
 
-def simulation(found: Simulation, mass_kg: float | None, over: Against | None = None) -> tuple[Chart, ...]:
+def simulation(solved: Simulation, mass_kg: float | None, over: Against | None = None) -> tuple[Chart, ...]:
     """Return the charts of a simulation over a measured run; without a mass, the energy is that of one kilogram."""
-    runs = beside_exact(found)
+    runs = beside_exact(solved)
     exact = runs.exact
-    period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
+    period = 2.0 * math.pi / float(solved.problem.equation.angular_frequency_per_s)
     turns = max(2, int(TURNS * period / exact.spacing_s) + 1)
     end = PERIODS_DRAWN * period if exact.t[-1] > 2 * PERIODS_DRAWN * period else None
     label, kg = ("E per mass / (mJ/kg)", 1.0) if mass_kg is None else ("E / mJ", mass_kg)
-    beside_run = _measured(found, kg, over, exact.t[-1], TURNS * period)
+    beside_run = _measured(solved, kg, over, exact.t[-1], TURNS * period)
     of_position = _both(runs, "y / mm", lambda of, n: (of.t[:n], of.y[:n] * 1e3), beside_run[:1])
     of_velocity = _both(runs, "v / (m/s)", lambda of, n: (of.t[:n], of.v[:n]), beside_run[1:2])
     of_energy = _both(runs, label, lambda of, n: _energy(of, n, kg), beside_run[2:3], log=True)
@@ -43,14 +43,16 @@ def simulation(found: Simulation, mass_kg: float | None, over: Against | None = 
     return (
         Chart("position", "Position", beside, of_position, end),
         Chart("velocity", "Velocity", beside, of_velocity, end),
-        Chart("energy", "Energy", f"{beside} {_growth(found)}", of_energy),
+        Chart("energy", "Energy", f"{beside} {_growth(solved)}", of_energy),
         Chart("phase", "Phase plot", f"The first {TURNS} turns of each method.", of_phase),
-        Chart("error", "Error of each method", "Largest difference so far from the exact motion.", _error(found, runs)),
+        Chart(
+            "error", "Error of each method", "Largest difference so far from the exact motion.", _error(solved, runs)
+        ),
     )
 
 
-def _growth(found: Simulation) -> str:
-    forward, _ = growths(found.problem, found.trajectory.spacing_s, len(found.trajectory.y) - 1)
+def _growth(solved: Simulation) -> str:
+    forward, _ = growths(solved.problem, solved.trajectory.spacing_s, len(solved.trajectory.y) - 1)
     measured = "" if forward.measured is None else f", as computed here by {forward.measured:.6f}"
     return f"Each step of forward Euler multiplies the amplitude by √(1 + ω²h²) = {forward.predicted:.6f}{measured}."
 
@@ -89,13 +91,13 @@ def _energy(of: Trajectory, count: int, mass_kg: float) -> tuple[F8, F8]:
     return of.t[rows], 0.5e3 * mass_kg * start * start * relative[rows]
 
 
-def _measured(found: Simulation, mass_kg: float, over: Against | None, end_s: float, turns_s: float) -> list[Series]:
+def _measured(solved: Simulation, mass_kg: float, over: Against | None, end_s: float, turns_s: float) -> list[Series]:
     """Return a measured run to its end: displacement in mm, velocity in m/s, energy in mJ, and its first turns."""
     if over is None:
         return []
     rows = over.free[0] <= end_s
     t, y, v = (each[rows] for each in over.free)
-    omega = found.problem.equation.angular_frequency_per_s
+    omega = solved.problem.equation.angular_frequency_per_s
     energy = 0.5e3 * mass_kg * (v**2 + (omega * y) ** 2)
     first = t <= turns_s
     return [
@@ -104,32 +106,32 @@ def _measured(found: Simulation, mass_kg: float, over: Against | None, end_s: fl
     ]
 
 
-def _error(found: Simulation, runs: Eulers) -> tuple[Panel, ...]:
+def _error(solved: Simulation, runs: Eulers) -> tuple[Panel, ...]:
     """Return running maxima of the errors, because an error crosses zero twice per period."""
-    start = found.problem.amplitude_m() or 1.0
+    start = solved.problem.amplitude_m() or 1.0
     curves = [(run, words) for run, (_, words) in zip(runs.eulers, EULERS, strict=True)]
-    if found.solution.integrator.name not in [name for name, _ in EULERS] and found.trajectory is not runs.exact:
-        curves.append((found.trajectory, found.solution.integrator.words))
+    if solved.solution.integrator.name not in [name for name, _ in EULERS] and solved.trajectory is not runs.exact:
+        curves.append((solved.trajectory, solved.solution.integrator.words))
     series = []
     for run, words in curves:
         error = np.maximum.accumulate(np.abs(run.y - runs.exact.y[: len(run.y)])) / start
         drawn = np.flatnonzero((error > 0) & (error < GROWN))
         rows = drawn[np.unique(np.linspace(0, drawn.size - 1, min(drawn.size, POINTS_DRAWN)).astype(np.intp))]
         series.append(line_of(words, run.t[rows], error[rows], "other"))
-    predicted = found.solution.error
+    predicted = solved.solution.error
     if predicted is not None and 0.0 < predicted < GROWN:
         ends = runs.exact.t[[0, -1]]
         series.append(line_of("predicted", ends, np.full(2, predicted)))
     return (Panel("largest error so far / amplitude", tuple(series), 3.0, log=True),)
 
 
-def against(found: Against) -> Chart:
+def against(compared: Against) -> Chart:
     """A measured run with its prediction and the band from the uncertain inputs, and the residuals."""
-    bands = [] if found.band is None else _bands(found.t, found.band, 1e3)
-    over = [] if found.band is None else _bands(found.t, found.band + found.predicted, 1e3)
-    predicted = line_of("predicted", found.t, found.predicted * 1e3)
-    measured = Series("measured", found.t, found.measured * 1e3)
-    residual = Series("residual", found.t, (found.measured - found.predicted) * 1e3)
+    bands = [] if compared.band is None else _bands(compared.t, compared.band, 1e3)
+    over = [] if compared.band is None else _bands(compared.t, compared.band + compared.predicted, 1e3)
+    predicted = line_of("predicted", compared.t, compared.predicted * 1e3)
+    measured = Series("measured", compared.t, compared.measured * 1e3)
+    residual = Series("residual", compared.t, (compared.measured - compared.predicted) * 1e3)
     panels = (
         Panel("distance / mm", (*over, predicted, measured)),
         Panel("residual / mm", (*bands, residual), 1.6, zero=True),
@@ -137,15 +139,15 @@ def against(found: Against) -> Chart:
     return Chart("against", "Measured and predicted", "The measured run over the prediction of its scene.", panels)
 
 
-def band(found: Simulation, spread: Band) -> Chart:
+def band(solved: Simulation, spread: Band) -> Chart:
     """Motion, amplitude and phase with the band from the scene's uncertainties, and the band alone."""
-    end = float(found.trajectory.t[-1])
+    end = float(solved.trajectory.t[-1])
     # The motion is drawn for the last periods, where the grid is fine enough; amplitude and band for the whole run.
-    period = 2.0 * math.pi / float(found.problem.equation.angular_frequency_per_s)
+    period = 2.0 * math.pi / float(solved.problem.equation.angular_frequency_per_s)
     last: F8 = np.linspace(max(0.0, end - PERIODS_DRAWN * period), end, POINTS_DRAWN)
     whole = spread.t[spread.t <= end]
     amplitude, of_amplitude = spread.amplitude_at(whole)
-    middle = found.trajectory.at(last)
+    middle = solved.trajectory.at(last)
     law, late = "the scene's values", "time in the last periods / s"
     motion = (*_bands(last, middle + spread.displacement_at(last), 1e3), line_of(law, last, middle * 1e3))
     size = (*_bands(whole, of_amplitude, 1e3), line_of(law, whole, amplitude * 1e3))

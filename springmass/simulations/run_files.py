@@ -20,20 +20,20 @@ from springmass.simulations.simulation import FINE, Prepared, Simulation, count_
 
 
 def write_readings(
-    path: Path, ready: Prepared, found: Simulation, sensor: str, seed: int, where: str, results: Mapping[str, Any]
+    path: Path, ready: Prepared, solved: Simulation, sensor: str, seed: int, where: str, results: Mapping[str, Any]
 ) -> None:
     """Write a sensor's readings of a simulated motion, one for each spacing, as a run of the kind "simulated".
 
     The noise is that of the scene's sensor, or else that of the simulated bench.
     """
-    name, motion = Path(where).name, found.trajectory
+    name, motion = Path(where).name, solved.trajectory
     if sensor == "ideal":
         block, info = _exact(motion, name)
     else:
         virtual = VirtualSensor(rate_hz=1.0 / motion.spacing_s)
         if ready.stated.sensor_sigma_m is not None:
             virtual = replace(virtual, noise_m=ready.stated.sensor_sigma_m.value)
-        block, info = _readings(found, virtual, name, seed)
+        block, info = _readings(solved, virtual, name, seed)
     configuration = {"sensor": sensor, "seed": seed, **results}
     _write_run(path, block, info, ready.solved, f"{name}, as a {sensor} sensor reads it", configuration)
 
@@ -57,14 +57,14 @@ def _exact(trajectory: Trajectory, name: str) -> tuple[Block, SourceInfo]:
     return block, SourceInfo("simulated", name, 1.0 / trajectory.spacing_s)
 
 
-def _readings(found: Simulation, sensor: VirtualSensor, name: str, seed: int) -> tuple[Block, SourceInfo]:
+def _readings(solved: Simulation, sensor: VirtualSensor, name: str, seed: int) -> tuple[Block, SourceInfo]:
     """Return a rangefinder's readings of the motion, solved again with states close enough for interpolation."""
-    problem, spacing_s, seconds = found.problem, found.trajectory.spacing_s, float(found.trajectory.t[-1])
-    omega, rest = problem.equation.angular_frequency_per_s, _rest_m(found.trajectory)
+    problem, spacing_s, seconds = solved.problem, solved.trajectory.spacing_s, float(solved.trajectory.t[-1])
+    omega, rest = problem.equation.angular_frequency_per_s, _rest_m(solved.trajectory)
     # The sound of the last reading is still on its way to the bob at the end of the run.
     longer_s = seconds + 2.0 * spacing_s + 3.0 * rest / sensor.speed_of_sound_m_per_s
-    parts = max(1, math.ceil(FINE * omega * spacing_s)) if found.solution.chosen else 1
-    method = "auto" if found.solution.chosen else found.solution.integrator.name
+    parts = max(1, math.ceil(FINE * omega * spacing_s)) if solved.solution.chosen else 1
+    method = "auto" if solved.solution.chosen else solved.solution.integrator.name
     count = parts * (count_of(longer_s, spacing_s) + 1)
     motion = solve(problem, method, spacing_s / parts, count, None).trajectory
 

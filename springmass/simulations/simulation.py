@@ -195,11 +195,11 @@ def simulated(
 def _checked(problem: Problem, solution: Solution, spacing_s: float, count: int) -> Check:
     parts = solution.parts if solution.integrator is STRANG else None
     other, words, resolution = reference(problem, spacing_s, count, parts)
-    start, found = problem.amplitude_m(), solution.trajectory
+    start, trajectory = problem.amplitude_m(), solution.trajectory
     if start == 0.0:
         return Check(other, words, 0.0, 0.0)
-    velocity = float(np.max(np.abs(found.v - other.v))) / (start * problem.equation.angular_frequency_per_s)
-    return Check(other, words, max(_apart(found, other), resolution), max(velocity, resolution))
+    velocity = float(np.max(np.abs(trajectory.v - other.v))) / (start * problem.equation.angular_frequency_per_s)
+    return Check(other, words, max(_apart(trajectory, other), resolution), max(velocity, resolution))
 
 
 def reference(
@@ -241,18 +241,18 @@ class Eulers:
     eulers: tuple[Trajectory, ...]
 
 
-def beside_exact(found: Simulation) -> Eulers:
+def beside_exact(solved: Simulation) -> Eulers:
     """Run both Euler methods beside the reference, the run itself, or auto's solution if the run is inaccurate."""
-    run, words, error = found.trajectory, "exact", found.solution.error
-    if found.check is not None:
-        run = found.check.reference
+    run, words, error = solved.trajectory, "exact", solved.solution.error
+    if solved.check is not None:
+        run = solved.check.reference
     else:
         if error is None or not error <= VISIBLE_ERROR:
-            better = auto(found.problem, run.spacing_s, len(run.y) - 1, VISIBLE_ERROR)
+            better = auto(solved.problem, run.spacing_s, len(run.y) - 1, VISIBLE_ERROR)
             run, error = better.trajectory, better.error
         if error is None or error >= EXACT_ERROR:
             words = f"solved to {error:.0e}"
-    return Eulers(run, words, tuple(_euler(found.problem, run, name) for name, _ in EULERS))
+    return Eulers(run, words, tuple(_euler(solved.problem, run, name) for name, _ in EULERS))
 
 
 def _euler(problem: Problem, exact: Trajectory, name: str) -> Trajectory:
@@ -267,13 +267,13 @@ def _euler(problem: Problem, exact: Trajectory, name: str) -> Trajectory:
             count //= 2
 
 
-def prediction(found: Simulation) -> dict[str, float | None] | None:
+def prediction(solved: Simulation) -> dict[str, float | None] | None:
     """Return what Table 1 gives of a measured run: at the start, and the amplitude at the end; None without swings.
 
     :math:`\\lambda = \\gamma + \\beta A + \\mu/A`, :math:`Q = \\omega_0/2\\lambda`, and the phase turns by
     :math:`\\sqrt{\\omega_0^2-\\gamma^2} + 3cA^2/8\\omega_0`. The last amplitude is that of the last state.
     """
-    eq, start = found.problem.equation, found.problem.amplitude_m()
+    eq, start = solved.problem.equation, solved.problem.amplitude_m()
     omega, (gamma, beta, mu) = eq.angular_frequency_per_s, eq.laws()
     if not start or not (rate := gamma + beta * start + mu / start) < STRONGEST * omega:
         return None
@@ -282,13 +282,13 @@ def prediction(found: Simulation) -> dict[str, float | None] | None:
         "damping_rate_per_s": rate,
         "quality_factor": 0.5 * omega / rate if rate else None,
         "amplitude_m": start,
-        "last_amplitude_m": _last_amplitude(found),
+        "last_amplitude_m": _last_amplitude(solved),
     }
 
 
-def _last_amplitude(found: Simulation) -> float:
+def _last_amplitude(solved: Simulation) -> float:
     """Return the amplitude of the last state, for which drag tilts the ellipse of states and friction shifts it."""
-    eq, y, v = found.problem.equation, float(found.trajectory.y[-1]), float(found.trajectory.v[-1])
+    eq, y, v = solved.problem.equation, float(solved.trajectory.y[-1]), float(solved.trajectory.v[-1])
     omega, (gamma, beta, _) = eq.angular_frequency_per_s, eq.laws()
     y += math.copysign(eq.friction_m_per_s2, v) / omega**2 if v else 0.0
     rate = min(gamma + beta * math.hypot(y, v / omega), STRONGEST * omega)
@@ -318,13 +318,13 @@ def growths(problem: Problem, step_s: float, count: int) -> tuple[Growth, ...]:
     turn = problem.equation.angular_frequency_per_s * step_s
     period = max(1, round(2.0 * math.pi / turn))
     steps = min(10 * period, count)
-    found = []
+    rows = []
     for name, words in EULERS:
         integrator = get_integrator(name)
         predicted = math.sqrt(1.0 + turn * turn) if name == "forward-euler" else 1.0
         measured = _measured_growth(problem, integrator, step_s, steps, period)
-        found.append(Growth(name, words, predicted, measured, integrator.stable_step(problem)))
-    return tuple(found)
+        rows.append(Growth(name, words, predicted, measured, integrator.stable_step(problem)))
+    return tuple(rows)
 
 
 def _measured_growth(problem: Problem, integrator: Integrator, step_s: float, steps: int, period: int) -> float | None:
@@ -342,16 +342,18 @@ def _measured_growth(problem: Problem, integrator: Integrator, step_s: float, st
     return math.exp(grown) if math.isfinite(grown) and grown < 1.0 else None
 
 
-def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | None, band: Band | None) -> dict[str, Any]:
+def summary(
+    solved: Simulation, effects: Sequence[Effect], tolerance: float | None, band: Band | None
+) -> dict[str, Any]:
     """Return a simulation as the JSON of ``springmass simulate``, compared with no run."""
-    solution, check = found.solution, found.check
+    solution, check = solved.solution, solved.check
     content = {
         "schema": 1,
         "method": solution.integrator.name,
         "step_s": solution.step_s,
-        "steps": solution.parts * (len(found.trajectory.y) - 1),
-        "samples": len(found.trajectory.y),
-        "spacing_s": found.trajectory.spacing_s,
+        "steps": solution.parts * (len(solved.trajectory.y) - 1),
+        "samples": len(solved.trajectory.y),
+        "spacing_s": solved.trajectory.spacing_s,
         "stable_step_s": solution.integrator.stable_step(solution.problem),
         "predicted_error": solution.error,
         "predicted_velocity_error": solution.velocity_error,
@@ -360,14 +362,14 @@ def summary(found: Simulation, effects: Sequence[Effect], tolerance: float | Non
         "measured_velocity_error": None if check is None else check.velocity_error,
         "reference": None if check is None else check.words,
         "tolerance": tolerance,
-        "choosing_s": found.choosing_s,
+        "choosing_s": solved.choosing_s,
         "running_s": solution.running_s,
-        "amplitude_m": found.problem.amplitude_m(),
-        "prediction": prediction(found),
-        "equation": picked(found.problem.equation, found.problem.equation.__slots__),
+        "amplitude_m": solved.problem.amplitude_m(),
+        "prediction": prediction(solved),
+        "equation": picked(solved.problem.equation, solved.problem.equation.__slots__),
         "effects": [picked(each, ("name", "predicted", "measured", "unit", "included", "why")) for each in effects],
         "against": None,
-        "band": None if band is None else _band_summary(band, found.trajectory.t),
+        "band": None if band is None else _band_summary(band, solved.trajectory.t),
     }
     return {name: plain(value) for name, value in content.items()}
 
@@ -376,8 +378,8 @@ def _band_summary(band: Band, t: F8) -> dict[str, Any]:
     """Return the band as JSON; each half-width is the largest of the run."""
     around, (_, of_amplitude) = band.displacement_at(t), band.amplitude_at(t)
     widths = {
-        f"{name}_half_width_{share}_m": float(0.5 * np.max(found[high] - found[low]))
-        for name, found in (("displacement", around), ("amplitude", of_amplitude))
+        f"{name}_half_width_{share}_m": float(0.5 * np.max(quantiles[high] - quantiles[low]))
+        for name, quantiles in (("displacement", around), ("amplitude", of_amplitude))
         for share, low, high in ((68, 1, 2), (95, 0, 3))
     }
     phase = band.phase_at(t)

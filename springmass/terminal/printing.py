@@ -121,8 +121,8 @@ def reported_text(rows: Sequence[Reported], style: TerminalStyle = PLAIN) -> str
     """Return printed values beside those of this analysis, with the verdict on each."""
     lines = [("printed", "of", "value", "this analysis", "verdict")]
     for row in rows:
-        found = "-" if row.found is None else concise(row.found, style)
-        lines.append((readable(row.name, style), readable(row.run, style), row.printed, found, row.verdict))
+        ours = "-" if row.found is None else concise(row.found, style)
+        lines.append((readable(row.name, style), readable(row.run, style), row.printed, ours, row.verdict))
     return aligned(lines)
 
 

@@ -62,13 +62,13 @@ def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
     parts = ["waiting for the bob" if progress.waiting else f"{progress.seconds:.0f} s"]
     # On a terminal the first analysis, which loads its libraries, must not delay troubles and keys.
     listening = style.terminal and progress.seconds < FIRST_MOTION_S
-    found = NotYet("listening") if listening else progress.motion()
-    if isinstance(found, LiveMotion):
+    motion = NotYet("listening") if listening else progress.motion()
+    if isinstance(motion, LiveMotion):
         form = concise if style.terminal else shown
-        parts += [f"T {form(found.period, style)}", f"A {form(found.amplitude, style)}"]
-        parts.append(f"trust {_trust_in(found, progress.missing_share)}")
+        parts += [f"T {form(motion.period, style)}", f"A {form(motion.amplitude, style)}"]
+        parts.append(f"trust {_trust_in(motion, progress.missing_share)}")
     else:
-        parts.append(found.why)
+        parts.append(motion.why)
     parts.append(f"{progress.rate_hz:.0f} Hz")
     parts.append(f"{progress.missing} missing" + (f", {progress.gaps} gaps" if progress.gaps else ""))
     if progress.status is not None:
@@ -78,9 +78,9 @@ def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
     return parts
 
 
-def _trust_in(found: LiveMotion, missing_share: float) -> str:
+def _trust_in(motion: LiveMotion, missing_share: float) -> str:
     """Return how reliable the displayed motion is: good, fair or poor, by its uncertainty and its missing readings."""
-    period, amplitude = found.period, found.amplitude
+    period, amplitude = motion.period, motion.amplitude
     off = max(period.u / period.value / 1e-3, amplitude.u / max(abs(amplitude.value), 1e-12) / 2e-2)
     for word, (most_off, most_missing) in (("good", GOOD), ("fair", FAIR)):
         if off <= most_off and missing_share <= most_missing:

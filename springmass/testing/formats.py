@@ -71,9 +71,9 @@ class Case:
     def demand_distances(self, recording: Recording, x: F8 = DISTANCE) -> None:
         """Demand the distances where no flag is set, up to a constant if the file does not know it."""
         sound = recording.samples.flags == 0
-        found, known = recording.samples.distance[sound], x[: sound.size][sound]
-        shift = 0.0 if self.file.offset_known or not found.size else found[0] - known[0]
-        demand(np.allclose(found - shift, known, rtol=0, atol=1e-9), "return the distances of the file in m")
+        distances, known = recording.samples.distance[sound], x[: sound.size][sound]
+        shift = 0.0 if self.file.offset_known or not distances.size else distances[0] - known[0]
+        demand(np.allclose(distances - shift, known, rtol=0, atol=1e-9), "return the distances of the file in m")
 
 
 def _demand_trap(recording: Recording, code: str, flag: Flag | None = None, first: int = 0, stop: int = 0) -> None:
@@ -198,8 +198,11 @@ def odd_distances(case: Case) -> None:
     x[200:230] = np.concatenate((np.linspace(3.6, 8.1, 10), np.full(20, 8.1)))
     _demand_trap(case.written(x=x), "lost_target", Flag.FALSE_ECHO, 200, 230)
     if case.file.quantum_m is not None:
-        found = case.written(x=np.round(DISTANCE, 2)).info.quantum_m
-        demand(found is not None and np.isclose(found, 0.01), f"report a step of 0.01 m as quantum_m, got {found}")
+        quantum_m = case.written(x=np.round(DISTANCE, 2)).info.quantum_m
+        demand(
+            quantum_m is not None and np.isclose(quantum_m, 0.01),
+            f"report a step of 0.01 m as quantum_m, got {quantum_m}",
+        )
 
 
 RULES = (

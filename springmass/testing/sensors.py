@@ -75,9 +75,11 @@ def decoded_as_encoded(case: SensorCase) -> None:
     readings, decoder = case.run(b"".join(case.frames()))
     lead = N - len(readings)
     demand(lead in (0, 1), f"return one Reading for each sound frame, got {len(readings)} for {N}")
-    sent, found = case.distance[lead:], _metres(readings)
-    demand(np.array_equal(np.isnan(found), np.isnan(sent)), "return a Reading of NaN for no target, and only for that")
-    off, allowed = float(np.nanmax(np.abs(found - sent))), case.family.resolution_m / 2 + 1e-9
+    sent, decoded = case.distance[lead:], _metres(readings)
+    demand(
+        np.array_equal(np.isnan(decoded), np.isnan(sent)), "return a Reading of NaN for no target, and only for that"
+    )
+    off, allowed = float(np.nanmax(np.abs(decoded - sent))), case.family.resolution_m / 2 + 1e-9
     demand(off <= allowed, f"decode distances to half of resolution_m, {allowed:g} m, got an error of {off:g} m")
     demand(decoder.pending == 0, f"keep no byte after the last frame, got pending {decoder.pending}")
     demand(lead or not any(decoder.faults.values()), f"count no fault on a sound stream, got {dict(decoder.faults)}")
@@ -95,9 +97,9 @@ def frames_of_the_data_sheet(case: SensorCase) -> None:
     """Frames of the data sheet are read as the maker says, and no target as NaN."""
     lead = b"" if len(case.clean()) == N else case.frames()[0]
     for frame, distance in (*case.known, *((frame, math.nan) for frame in case.frames(np.full(4, math.nan)))):
-        found = _metres(case.run(lead + frame)[0])
-        same = found.size == 1 and np.allclose(found, distance, rtol=1e-12, atol=0, equal_nan=True)
-        demand(same, f"read the frame {frame!r} as {distance} m, got {found.tolist()}")
+        distances = _metres(case.run(lead + frame)[0])
+        same = distances.size == 1 and np.allclose(distances, distance, rtol=1e-12, atol=0, equal_nan=True)
+        demand(same, f"read the frame {frame!r} as {distance} m, got {distances.tolist()}")
 
 
 def cuts_do_not_matter(case: SensorCase) -> None:

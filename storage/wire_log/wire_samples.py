@@ -36,8 +36,8 @@ class Origin:
         if self._needed > 0 and block.host_ns is not None and len(block):
             early = slice(self._needed)
             # A host time may be late but never early, so the earliest estimate is the best.
-            found = int((block.host_ns[early] - np.rint(1e9 * block.t[early]).astype(np.int64)).min())
-            self.ns = found if self.ns is None else min(found, self.ns)
+            origin_ns = int((block.host_ns[early] - np.rint(1e9 * block.t[early]).astype(np.int64)).min())
+            self.ns = origin_ns if self.ns is None else min(origin_ns, self.ns)
             self._needed -= len(block)
 
 

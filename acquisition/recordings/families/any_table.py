@@ -153,8 +153,8 @@ def without_monitor(text: Text) -> Text:
     if not _MONITOR.search(decode(text.data[: 1 << 16])):
         return text
     lines = decode(text.data)
-    found = len(_MONITOR.findall(lines))
-    if found < max(_FEWEST, _SHARE * len(re.findall(r"^.*\S", lines, re.MULTILINE))):
+    stamped = len(_MONITOR.findall(lines))
+    if stamped < max(_FEWEST, _SHARE * len(re.findall(r"^.*\S", lines, re.MULTILINE))):
         return text
     messages = [line for line in _MONITOR.sub("", lines[: 1 << 16]).split("\n") if line.strip()]
     marks = Counter(next((mark for mark in "\t;," if mark in line), " ") for line in messages)

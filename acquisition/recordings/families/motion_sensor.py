@@ -256,8 +256,8 @@ def _outer_join(left: I8, right: I8, regular: B1) -> tuple[I8, I8]:
     inserted according to their numbers.
     """
     order = np.argsort(right, kind="stable")
-    found = order[np.minimum(np.searchsorted(right[order], left), right.size - 1)]
-    partner = np.where(right[found] == left, found, -1)
+    nearest = order[np.minimum(np.searchsorted(right[order], left), right.size - 1)]
+    partner = np.where(right[nearest] == left, nearest, -1)
     alone = np.setdiff1d(np.arange(right.size), partner)
     standing = np.where(regular, left, np.iinfo(np.int64).min)
     where = np.searchsorted(np.maximum.accumulate(standing), right[alone], side="right")

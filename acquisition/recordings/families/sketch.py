@@ -53,8 +53,8 @@ def _joined(lines: list[str]) -> list[tuple[int, str]]:
     return [(number, f"{line}\t{below}") for (number, line), (_, below) in pairs]
 
 
-def _kind(found: list[Number]) -> LineForm:
-    return tuple((each.label, each.unit) for each in found)
+def _kind(of_line: list[Number]) -> LineForm:
+    return tuple((each.label, each.unit) for each in of_line)
 
 
 def _evidence(head: bytes) -> str:
@@ -70,9 +70,9 @@ def _tables(path: str, data: bytes) -> list[Table]:
         raise FormatError(path, "expected lines with words and numbers", "export a table of times and positions")
     comma, kind = usual
     lines = [(number, line, numbers(line, decimal_comma=comma)) for number, line in joined]
-    like = [_kind(found) == kind for _, _, found in lines]
+    like = [_kind(of_line) == kind for _, _, of_line in lines]
     first, stop = like.index(True), len(like) - like[::-1].index(True)
-    rows = [(line, found if _kind(found) == kind else []) for _, line, found in lines[first:stop]]
+    rows = [(line, of_line if _kind(of_line) == kind else []) for _, line, of_line in lines[first:stop]]
     distance = find_distance(*rows[0])
     headings, columns = [], []
     for at, (words, unit) in enumerate(kind):
@@ -84,11 +84,11 @@ def _tables(path: str, data: bytes) -> list[Table]:
                 name, "" if unit == "other" else unit, role="time" if is_time(name) else "aside" if is_other else ""
             )
         )
-        values = np.array([found[at].value if found else np.nan for _, found in rows])
-        forms = [max(0, round(-np.log10(found[at].step))) if found else UNREAD_CELL for _, found in rows]
+        values = np.array([of_line[at].value if of_line else np.nan for _, of_line in rows])
+        forms = [max(0, round(-np.log10(of_line[at].step))) if of_line else UNREAD_CELL for _, of_line in rows]
         columns.append(Column("", "", values, np.array(forms, np.int8)))
     stamps = [match[0].strip(" [").encode() if (match := _CLOCK.match(line)) else b"" for line, _ in rows]
-    if all(stamp or not found for stamp, (_, found) in zip(stamps, rows, strict=True)):
+    if all(stamp or not of_line for stamp, (_, of_line) in zip(stamps, rows, strict=True)):
         columns.insert(0, Column("", "", *clock_times(stamps)[:2]))
         count_from_first(columns[0])
         headings.insert(0, Heading("Time", "s", role="time"))

@@ -232,14 +232,14 @@ def _by_formula(path: str, formula: Formula, rows: ChannelRows, rate_hz: float |
 
 def _by_column(path: str, printed: F8, resolution: float, rate_hz: float | None) -> Timing:
     """Infer the rate from the printed times (s) of valid rows; ask for it if they do not show it."""
-    found = find_rate(printed, resolution, rate_hz)
-    if found is None:
+    fitted = find_rate(printed, resolution, rate_hz)
+    if fitted is None:
         if rate_hz is None:
             reason = f"expected different times, got {printed.size} rows at one time"
             raise NeedsAnswer(Question(path, (rate_needed(),), reason=reason))
         origin = float(printed[0]) if printed.size else 0.0
         return Timing(rate_hz, Grid(rate_hz, origin), resolution, traps=_nominal(rate_hz))
-    rate, relative_u, grid, certain = found
+    rate, relative_u, grid, certain = fitted
     jitter = None if grid is not None else _jitter(printed)
     if rate_hz is not None:
         allowed = rate_hz * (1.5 * relative_u + 1e-6 + (0.01 if jitter else 0.0))

@@ -57,9 +57,9 @@ def read_samples(
 ) -> Samples:
     """Return the samples in the rows of a channel."""
     timing = find_timing(path, rows, table.formula, rate_hz)
-    found = list(timing.traps)
+    issues = list(timing.traps)
     if table.formula is None and table.times is not None and not table.times.unit:
-        found.insert(0, FormatIssue("time_unit_assumed", "the times have no unit: read as seconds"))
+        issues.insert(0, FormatIssue("time_unit_assumed", "the times have no unit: read as seconds"))
     unread, t = rows.unread, place(rows, timing)
     timed = np.isfinite(t)
     t, value = t[timed], rows.value[timed]
@@ -72,11 +72,11 @@ def read_samples(
     flags[unread[timed]] |= UNREAD_FLAGS
     if difference and not unread[0] and np.isnan(value[0]):
         flags[0] &= ~np.uint8(Flag.MISSING)
-    found += _jumps(t, timing.rate_hz, lines)
+    issues += _jumps(t, timing.rate_hz, lines)
     zeros = table.lines.zeros if table.lines else 0
-    found += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, lines)]
+    issues += [*row_traps(rows, timed, zeros), *sample_traps(flags, t, timing.rate_hz, lines)]
     return Samples(
-        path, table, column, measured, t, value, flags, timing, rows.resolution, tuple(found), lines, ~unread
+        path, table, column, measured, t, value, flags, timing, rows.resolution, tuple(issues), lines, ~unread
     )
 
 
@@ -98,8 +98,8 @@ def _jumps(t: F8, rate_hz: float, lines: I8 | None) -> list[FormatIssue]:
 
 def check_values(samples: Samples, *, length: bool) -> Samples:
     """Return samples with their quantum and with what is peculiar in their values; see :func:`value_traps`."""
-    quantum, found = value_traps(samples.value, samples.flags, samples.resolution, samples.lines, length=length)
-    return replace(samples, quantum=quantum or None, traps=(*samples.traps, *found))
+    quantum, issues = value_traps(samples.value, samples.flags, samples.resolution, samples.lines, length=length)
+    return replace(samples, quantum=quantum or None, traps=(*samples.traps, *issues))
 
 
 def rows_of(path: str, table: Table, column: Column, measured: Measure) -> ChannelRows:

@@ -113,19 +113,19 @@ def text_format(
         lines = head_lines(head)
         if prepare is not None and lines != [""]:
             lines = prepare(Text.of(head)).head(_HEAD_LINES)
-        found = header(lines[:_HEAD_LINES])
-        return found.why if found else ""
+        above = header(lines[:_HEAD_LINES])
+        return above.why if above else ""
 
     def tables(path: str, data: bytes) -> list[Table]:
         text = text_of(path, data)
         text = prepare(text) if prepare else text
         head = text.head(_HEAD_LINES)
-        found = header(head or [""])
-        if found is None or not head:
+        above = header(head or [""])
+        if above is None or not head:
             raise FormatError(path, f"expected {expected}", "export the run again", line=1)
-        if found.refused is not None:
-            raise FormatError(path, *found.refused, line=found.lines + 1)
-        begins = [(0, found), *islice(blocks(text, found) if blocks else (), _MOST_RUNS)]
+        if above.refused is not None:
+            raise FormatError(path, *above.refused, line=above.lines + 1)
+        begins = [(0, above), *islice(blocks(text, above) if blocks else (), _MOST_RUNS)]
         if len(begins) > _MOST_RUNS:
             raise FormatError(path, f"expected at most {_MOST_RUNS} runs", "split the file")
         titles, several = " / ".join([each.title for _, each in begins if each.title][:4]), len(begins) > 1

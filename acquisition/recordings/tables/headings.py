@@ -108,10 +108,10 @@ def _ends(name: str, unit: str) -> bool:
 
 def is_time(name: str) -> bool:
     """Return whether a column's name denotes time, in one of a dozen languages."""
-    found = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
-    time_words = [word for word in found if word in _TIME_WORDS]
-    others = [word for word in found if word not in time_words]
-    if not time_words or found[0].isdecimal() or (len(found[0]) == 1 and found[0] not in _TIME_WORDS):
+    all_words = [word.rstrip("0123456789") or word for word in _WORDS.findall(_CAMEL.sub(" ", name).lower())]
+    time_words = [word for word in all_words if word in _TIME_WORDS]
+    others = [word for word in all_words if word not in time_words]
+    if not time_words or all_words[0].isdecimal() or (len(all_words[0]) == 1 and all_words[0] not in _TIME_WORDS):
         return False
     return all(len(word) == 1 or word.isdecimal() or word in _BESIDE_TIME for word in others)
 

@@ -67,13 +67,13 @@ def find_table(lines: tuple[str, ...]) -> Layout | None:
     Rows are lines in which each column contains either only numbers or only words, apart from empty cells. The chosen
     separator gives the earliest rows; among several such separators, it is one that also fits a line of names.
     """
-    found = []
+    candidates = []
     stated = _SEP.match(lines[0]) if lines else None
     for order, mark in enumerate(stated[1] if stated else _MARKS):
         # Without its mark each line is a single cell, a case that the first separator has covered.
         if (not order or not mark or any(mark in each for each in lines)) and (table := _split_by(lines, mark)):
-            found.append(((table.at, not table.named, not _is_separator(table), order), table))
-    return min(found)[1] if found else None
+            candidates.append(((table.at, not table.named, not _is_separator(table), order), table))
+    return min(candidates)[1] if candidates else None
 
 
 def _is_separator(table: Layout) -> bool:

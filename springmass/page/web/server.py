@@ -70,18 +70,18 @@ def checked(text: str | None) -> dict[str, Any]:
     """Return a browser's request with only its own values; Refused for everything else."""
     try:
         request = json.loads(text or "")
-        found = {"type": request["type"]}
+        accepted = {"type": request["type"]}
         for name, limits in REQUESTS[request["type"]].items():
             if limits is None:
-                found[name] = " ".join(request[name].split())[:LONGEST_TEXT]
+                accepted[name] = " ".join(request[name].split())[:LONGEST_TEXT]
             elif limits[0] <= (number := float(request[name])) <= limits[1]:
-                found[name] = number
+                accepted[name] = number
             else:
                 raise ValueError
     # These include the errors for integers of thousands of digits and for deeply nested lists.
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise Refused("a message that is none of the page's") from error
-    return found
+    return accepted
 
 
 class Server:
