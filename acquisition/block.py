@@ -81,8 +81,8 @@ class Block:
 
     def __post_init__(self) -> None:
         if UNITS.get(self.quantity) != self.unit:
-            known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
-            raise ValueError(f"expected one of {known}, got {self.quantity} in {self.unit}; convert to SI first")
+            allowed = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
+            raise ValueError(f"expected one of {allowed}, got {self.quantity} in {self.unit}; convert to SI first")
 
     def __len__(self) -> int:
         return int(self.t.size)

@@ -49,9 +49,9 @@ class Replay:
         self.info = info if info.kind == "simulated" else replace(info, kind="replay")
         self._run = concatenate(blocks)
         # Samples whose time is unknown or jumps back are due immediately.
-        known = self._run.t[np.isfinite(self._run.t)]
-        self._due = np.fmax.accumulate(np.concatenate([known[:1], self._run.t]))[known[:1].size :]
-        if not known.size:
+        finite = self._run.t[np.isfinite(self._run.t)]
+        self._due = np.fmax.accumulate(np.concatenate([finite[:1], self._run.t]))[finite[:1].size :]
+        if not finite.size:
             self._due = np.zeros(len(self._run))
         self._clock = clock
         self._speed = math.inf if speed is None else float(speed)

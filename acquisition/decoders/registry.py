@@ -48,8 +48,8 @@ def get_family(name: str) -> Sensor:
     entries = entry_points_of(SENSORS_GROUP)
     if name in entries:
         return _load(entries[name])
-    known = ", ".join(dict.fromkeys([*_MODULES, *entries]))
-    raise SensorError(f"sensor must be one of {known}, got {name!r}")
+    names = ", ".join(dict.fromkeys([*_MODULES, *entries]))
+    raise SensorError(f"sensor must be one of {names}, got {name!r}")
 
 
 def probe(data: bytes) -> list[str]:

@@ -103,8 +103,8 @@ class Sensor:
         """Check that the family has all the given options, or had them in an earlier version."""
         unknown = sorted(set(options) - set(self.options) - set(self.past_options if past else ()))
         if unknown:
-            known = ", ".join(self.options) or "none"
-            raise SensorError(f"sensor {self.name}: expected options among {known}, got {', '.join(unknown)}")
+            allowed = ", ".join(self.options) or "none"
+            raise SensorError(f"sensor {self.name}: expected options among {allowed}, got {', '.join(unknown)}")
 
     def describe(self) -> dict[str, Any]:
         """Return the description as plain data, for the JSON list of the sensors."""

@@ -120,12 +120,12 @@ class TextLinesDecoder(FramedDecoder):
         distance_lines = [line for line in map(self._found, lines) if not all(number.is_other for number in line[1])]
         if not distance_lines:
             return f"looks like text lines without a distance ({(lines or [''])[0][:40]!r})"
-        text, known, cells = distance_lines[-1]
+        text, in_line, cells = distance_lines[-1]
         quoted = f"looks like text lines with numbers ({text[:40]!r})"
         if self._column is not None and _at(self._column, distance_lines[-1]) is None:
-            listed = ", ".join(f"{_cell(each, cells)} is {each.value:g}" for each in known[:8])
+            listed = ", ".join(f"{_cell(each, cells)} is {each.value:g}" for each in in_line[:8])
             return f"{quoted}, none at column {self._column}: of the columns, counted from 0, {listed}"
-        units = {number.unit for number in known if number.unit in LENGTHS_M}
+        units = {number.unit for number in in_line if number.unit in LENGTHS_M}
         if units and self._unit and self._unit not in units:
             return (
                 f"{quoted}, whose unit is {' and '.join(sorted(units))} and not {self._unit}; leave out --option unit"
@@ -135,9 +135,9 @@ class TextLinesDecoder(FramedDecoder):
                 f"{quoted}: add --option separator=space if the comma is a decimal comma, "
                 "or --option separator=comma --option column=1 if it separates the distance"
             )
-        even = {cell for cell in (_cell(each, cells) for each in known) if _counts(cell, distance_lines)}
-        likely = [each for each in known if not each.is_other and _cell(each, cells) not in even] or known
-        if len(known) == 1 and even:
+        even = {cell for cell in (_cell(each, cells) for each in in_line) if _counts(cell, distance_lines)}
+        likely = [each for each in in_line if not each.is_other and _cell(each, cells) not in even] or in_line
+        if len(in_line) == 1 and even:
             return f"{quoted} that count evenly: a clock or a counter; let the sketch print the distance"
         time = f", --option time={min(even)} --option time_unit=ms for the one that counts evenly" if even else ""
         example = f"--option column={_cell(likely[0], cells)}" + ("" if likely[0].unit else " --option unit=cm")
@@ -151,7 +151,7 @@ class TextLinesDecoder(FramedDecoder):
         return text, numbers(text, decimal_comma=bool(comma), colon_separates=self._separator == ":"), cells
 
     def _distance(self, line: FoundNumber) -> Number | None:
-        text, known, _ = line
+        text, in_line, _ = line
         if self._column is not None:
             number = _at(self._column, line)
             allowed = ("", self._unit) if self._unit else ("", *LENGTHS_M, "us")
@@ -159,7 +159,7 @@ class TextLinesDecoder(FramedDecoder):
         if has_decimal_comma(text, self._separator) is None:
             return None
         others = [_at(where, line) for where in (self._sequence, self._time, self._temperature) if where is not None]
-        return find_distance(text, [number for number in known if number not in others], self._unit)
+        return find_distance(text, [number for number in in_line if number not in others], self._unit)
 
     def _is_counter(self, number: Number) -> bool:
         """Return whether a number without a name and a unit has counted evenly for a while."""
@@ -189,14 +189,14 @@ def _text(line: bytes) -> str:
 
 def _at(where: int | str, line: FoundNumber) -> Number | None:
     """Return the number in a cell, given by its index, or behind a name; None unless it is the only one there."""
-    _, known, cells = line
+    _, in_line, cells = line
     if isinstance(where, int):
         begin, end = cells[where] if where < len(cells) else (0, 0)
-        named = [number for number in known if begin <= number.start < end]
+        named = [number for number in in_line if begin <= number.start < end]
     else:
         name = re.escape(where) + r"[\"')\] ]*(?:[(\[][^\W\d_]+[)\]])?[\"' ]*[:=]?[\"'\s]*$"
-        named = [number for number in known if re.search(r"(?<!\w)" + name, number.before)]
-        named = named or [each for each in known if re.search(r"(?<!\w)" + name, each.before, re.IGNORECASE)]
+        named = [number for number in in_line if re.search(r"(?<!\w)" + name, number.before)]
+        named = named or [each for each in in_line if re.search(r"(?<!\w)" + name, each.before, re.IGNORECASE)]
     return named[0] if len(named) == 1 else None
 
 
@@ -243,9 +243,9 @@ def _separator(text: str | None) -> str:
     return plain
 
 
-def _demand(option: str, unit: str | None, known: Mapping[str, Any]) -> None:
-    if unit is not None and unit not in known:
-        raise SensorError(f"{option} of text-lines must be one of {', '.join(known)}, got {unit!r}")
+def _demand(option: str, unit: str | None, allowed: Mapping[str, Any]) -> None:
+    if unit is not None and unit not in allowed:
+        raise SensorError(f"{option} of text-lines must be one of {', '.join(allowed)}, got {unit!r}")
 
 
 FAMILY = Sensor(

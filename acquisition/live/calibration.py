@@ -85,23 +85,23 @@ def from_still(distance: F8) -> StillPoint:
 
     The bob moves if the distances scatter by more than five times the noise and by more than 0.5 mm.
     """
-    known = distance[np.isfinite(distance)]
-    if known.size < 10:
+    measured = distance[np.isfinite(distance)]
+    if measured.size < 10:
         raise CalibrationError(
-            f"a rest position needs at least ten distances, got {known.size} in {distance.size} readings; "
+            f"a rest position needs at least ten distances, got {measured.size} in {distance.size} readings; "
             "check that the sensor sees the bob"
         )
-    rest_m = float(np.median(known))
-    total = MAD_TO_SIGMA * float(np.median(np.abs(known - rest_m)))
+    rest_m = float(np.median(measured))
+    total = MAD_TO_SIGMA * float(np.median(np.abs(measured - rest_m)))
     # First differences contain the noise, but almost no slow motion.
-    steps = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(known)))) / math.sqrt(2.0)
+    steps = MAD_TO_SIGMA * float(np.median(np.abs(np.diff(measured)))) / math.sqrt(2.0)
     if total > max(5.0 * steps, 5e-4):
         raise CalibrationError(
             f"the bob moves: its positions scatter by {total * 1e3:.2g} mm, but the noise is {steps * 1e3:.2g} mm; "
             "wait until it hangs still"
         )
     noise = max(total, steps)
-    return StillPoint(rest_m, 1.2533 * noise / math.sqrt(known.size), noise, int(known.size))
+    return StillPoint(rest_m, 1.2533 * noise / math.sqrt(measured.size), noise, int(measured.size))
 
 
 def against_ruler(

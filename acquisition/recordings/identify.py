@@ -58,8 +58,8 @@ def get_format(name: str) -> Format:
     """Return the format with a given name."""
     loaders = _loaders()
     if name not in loaders:
-        known = ", ".join(loaders)
-        raise UnknownFormat(f'format "{name}"', f"must be one of {known}", "name one of these or leave it out")
+        names = ", ".join(loaders)
+        raise UnknownFormat(f'format "{name}"', f"must be one of {names}", "name one of these or leave it out")
     return loaders[name]()
 
 
@@ -224,8 +224,8 @@ def foreign_format(path: str, head: bytes) -> UnknownFormat | None:
 
 def unknown_format(path: str, head: bytes, names: tuple[str, ...]) -> FormatError:
     """Return the error for a file that none of the named formats recognises."""
-    if (known := foreign_format(path, head)) is not None:
-        return known
+    if (foreign := foreign_format(path, head)) is not None:
+        return foreign
     if not "".join(head_lines(head)).strip("\0 \t"):
         return UnknownFormat(path, "expected a recording, got binary data or nothing", _TEXT)
     if head.count(b"\n") + head.count(b"\r") == 0 and len(head) > 4096:

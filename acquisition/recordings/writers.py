@@ -105,8 +105,8 @@ def _losses(samples: Block, rounding_m: float) -> tuple[str, ...]:
     if flagged:
         those = "1 sample" if flagged == 1 else f"{flagged} samples"
         lost.append(f"the flags of {those} cannot be stored; the distances are unchanged")
-    known = samples.distance[np.isfinite(samples.distance)]
-    finer = int(np.count_nonzero(np.abs(np.rint(known / rounding_m) * rounding_m - known) > 1e-3 * rounding_m))
+    measured = samples.distance[np.isfinite(samples.distance)]
+    finer = int(np.count_nonzero(np.abs(np.rint(measured / rounding_m) * rounding_m - measured) > 1e-3 * rounding_m))
     if finer:
         lost.append(f"{finer} distance{'s were' if finer > 1 else ' was'} rounded to {rounding_m:g} m")
     if samples.host_ns is not None:

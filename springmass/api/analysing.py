@@ -168,8 +168,10 @@ def compare(
     if len(scenes) != len(sources):
         raise AnalysisError(f"expected one scene for all runs or one for each, got {len(scenes)} for {len(sources)}")
     each = [
-        one if isinstance(one, Run) and its is None and not how else _run(one, its, "springmass.compare", how)
-        for one, its in zip(sources, scenes, strict=True)
+        source
+        if isinstance(source, Run) and its_scene is None and not how
+        else _run(source, its_scene, "springmass.compare", how)
+        for source, its_scene in zip(sources, scenes, strict=True)
     ]
     names = distinct_names([run.name or "run" for run in each])
     named = [run.named(name) for run, name in zip(each, names, strict=True)]

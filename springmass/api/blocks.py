@@ -101,9 +101,9 @@ def source(
     if isinstance(what, Scene | Mapping):
         return _bench(what if isinstance(what, Scene) else Scene.from_mapping(what), speed)
     if os.path.isfile(what):
-        stated = scene_from(scene)
+        given_scene = scene_from(scene)
         loaded = load(Path(what), ReadOptions.of(how))
-        loaded = loaded if stated is None else replace(loaded, scene=stated.to_mapping())
+        loaded = loaded if given_scene is None else replace(loaded, scene=given_scene.to_mapping())
         pace = speed if math.isfinite(speed) else None
         replay = Replay(loaded.samples_in_blocks(), _clock(speed), info=loaded.info, speed=pace)
         return _Played(replace(loaded, info=replay.info), replay)

@@ -64,9 +64,9 @@ def simulate(
     spacing_s = float(times[1]) if times.ndim == 1 and times.size > 1 else 0.0
     if spacing_s <= 0.0 or not np.allclose(times, spacing_s * np.arange(times.size), rtol=1e-9, atol=1e-9 * spacing_s):
         raise DynamicsError("simulate takes equally spaced times from 0 on; give np.arange(0, SECONDS, STEP)")
-    stated, seconds = scene_from(scene), float(times[-1])
-    assert stated is not None
-    ready = prepare(stated, seconds)
+    given_scene, seconds = scene_from(scene), float(times[-1])
+    assert given_scene is not None
+    ready = prepare(given_scene, seconds)
     band, _ = band_of(ready, seconds)
     integrator: str | Integrator = method if isinstance(method, str) else _own(method)
     if tolerance is None and method == "auto":

@@ -114,17 +114,17 @@ def to_json(chart: Chart) -> dict[str, Any]:
     panels = []
     for panel in chart.panels:
         series = []
-        for one in map(thinned, panel.series):
-            x = _evenly(one.x) or _from_start(one.x)
+        for thin in map(thinned, panel.series):
+            x = _evenly(thin.x) or _from_start(thin.x)
             if x not in xs:
                 xs.append(x)
-            entry: dict[str, Any] = {"label": one.label, "role": one.role, "line": one.line}
-            entry |= {"x": xs.index(x), "y": coded(one.y)}
-            if one.u is not None:
-                entry["u"] = coded(one.u)
-            if one.why is not None:
-                words = list(dict.fromkeys(one.why))
-                entry |= {"why": [words.index(each) for each in one.why], "words": words}
+            entry: dict[str, Any] = {"label": thin.label, "role": thin.role, "line": thin.line}
+            entry |= {"x": xs.index(x), "y": coded(thin.y)}
+            if thin.u is not None:
+                entry["u"] = coded(thin.u)
+            if thin.why is not None:
+                words = list(dict.fromkeys(thin.why))
+                entry |= {"why": [words.index(each) for each in thin.why], "words": words}
             series.append(entry)
         axes = {"label": panel.label, "x_label": panel.x_label, "height": panel.height, "log": panel.log}
         shown = {name: getattr(panel, name) for name in ("log_x", "equal", "zero", "names") if getattr(panel, name)}

@@ -115,8 +115,8 @@ def _until(panel: Panel, end: float | None) -> Panel:
     """Return a panel with the part of its series up to an end."""
     if end is None:
         return panel
-    parts = (one.at(np.flatnonzero(one.x <= end)) for one in panel.series)
-    return replace(panel, series=tuple(one for one in parts if one.x.size))
+    parts = (part.at(np.flatnonzero(part.x <= end)) for part in panel.series)
+    return replace(panel, series=tuple(part for part in parts if part.x.size))
 
 
 def legend(ax: Axes) -> None:
@@ -129,7 +129,7 @@ def legend(ax: Axes) -> None:
 def draw(panel: Panel, ax: Axes) -> Axes:
     """Draw a panel into axes, in their own style; text from outside is never set as mathematics."""
     low, high = panel.reach()
-    others = list(dict.fromkeys(one.label for one in panel.series if one.role == "other"))
+    others = list(dict.fromkeys(line.label for line in panel.series if line.role == "other"))
     named: set[str] = set()
     for i, series in enumerate(each if panel.equal else thinned(each, MOST_OF_DRAWN_LINE) for each in panel.series):
         label = "_" if series.label in named else series.label.replace("$", r"\$")

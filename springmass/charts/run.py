@@ -141,10 +141,12 @@ def _relaxing(a: Analysis, motion: Overdamped) -> tuple[F8, F8]:
 def _rest(a: Analysis, motion: Oscillation, factor: float) -> Panel:
     """Rest positions of the windows minus their mean, and the curve that was fitted to them."""
     rest, windows = motion.rest, motion.demodulated
-    own = windows.offset - rest.mean.value
+    deviation = windows.offset - rest.mean.value
     grid = np.linspace(float(windows.t.min()), float(windows.t.max()), 400)
     curve = line_of("rest position, fitted", grid, (rest.at(grid) - rest.mean.value) * factor)
-    points = Series("rest of one window", windows.t, own * factor, u=np.sqrt(windows.covariance[:, 2, 2]) * factor)
+    points = Series(
+        "rest of one window", windows.t, deviation * factor, u=np.sqrt(windows.covariance[:, 2, 2]) * factor
+    )
     return Panel(value_label("rest", a.track.unit), (curve, points), 1.2)
 
 
@@ -176,14 +178,14 @@ def _law_lines(a: Analysis, motion: Oscillation, laws: Sequence[str] | None) -> 
     named = list(laws or dict.fromkeys((damping.selected, *damping.admissible)))[: len(laws or ()) or MOST_NAMED]
     if laws is None and EXPONENTIAL in damping.fits and EXPONENTIAL not in named:
         named.append(EXPONENTIAL)
-    rest = [] if laws else [name for name in damping.fits if name not in named]
+    unnamed = [] if laws else [name for name in damping.fits if name not in named]
     lines = []
-    for name in (*rest, *sorted(named, key=lambda name: name != damping.selected)):
+    for name in (*unnamed, *sorted(named, key=lambda name: name != damping.selected)):
         words = "exponential, linear drag" if name == EXPONENTIAL else name
-        together = name in rest and len(rest) > 1
-        label = f"{len(rest)} other laws" if together else f"{words} ({law_status(damping, name)})"
+        together = name in unnamed and len(unnamed) > 1
+        label = f"{len(unnamed)} other laws" if together else f"{words} ({law_status(damping, name)})"
         curve = damping.fits[name].amplitude(grid - damping.t0) * SHOWN[a.track.unit].factor
-        role: Role = "law" if name == damping.selected else "rest" if name in rest else "other"
+        role: Role = "law" if name == damping.selected else "rest" if name in unnamed else "other"
         lines.append(line_of(label, grid, curve, role))
     return lines
 
@@ -356,8 +358,8 @@ def phase(a: Analysis) -> Chart | None:
 
 def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     """The lab report's choices over this analysis: two maxima, two extremes, sliding windows and their exponential."""
-    own = amplitude(a, [a.motion.damping.selected]) if isinstance(a.motion, Oscillation) else None
-    if own is None:
+    ours = amplitude(a, [a.motion.damping.selected]) if isinstance(a.motion, Oscillation) else None
+    if ours is None:
         return None
     factor, period = SHOWN[a.track.unit].factor, classic.estimates["period"].value
     start, end = (float(classic.crests_t[i]) + s * 0.75 * period for i, s in ((0, -1), (-1, 1)))
@@ -381,7 +383,7 @@ def classic_method(a: Analysis, classic: Classic) -> Chart | None:
     fitted = line_of("its exponential", times, factor * classic.exponential()[every], "other")
     both = np.concatenate([sliding.y, fitted.y])
     ends = (float(np.min(both)), 1.05 * float(np.max(both)))
-    below = Panel(own.panels[0].label, (*own.panels[0].series, sliding, fitted), range=ends)
+    below = Panel(ours.panels[0].label, (*ours.panels[0].series, sliding, fitted), range=ends)
     caption = (
         "The lab report's method on this recording, for comparison only. Above, its maxima and extremes; below, half "
         "the range within 1.5 s of every sample and its exponential, with the amplitudes and the law of this analysis."

@@ -95,11 +95,12 @@ def analyse(
     for line in folders:
         tell(line)
     alone = len(files) == 1
-    names = [""] if alone else distinct_names(["stdin" if one.path == STDIN else one.path for one in files])
+    names = [""] if alone else distinct_names(["stdin" if file.path == STDIN else file.path for file in files])
     how = replace(how, method=options.method)
-    of_files = [how if one.velocity is None else replace(how, velocity=one.velocity) for one in files]
+    of_files = [how if file.velocity is None else replace(how, velocity=file.velocity) for file in files]
     tasks = [
-        Task(one.path, name, scenes[one.of], its, values) for one, name, its in zip(files, names, of_files, strict=True)
+        Task(file.path, name, scenes[file.of], of_file, values)
+        for file, name, of_file in zip(files, names, of_files, strict=True)
     ]
     out = Path(options.output or ".") if not options.no_report and (options.output or not options.json) else None
     if not alone:

@@ -68,7 +68,7 @@ def batch(
             runs_csv=None if options.runs is None else str(options.runs),
             scene=None if options.scene is None else str(options.scene),
             how=how,
-            known=[json.loads(key)[0] for key in store.made_of()],
+            known_paths=[json.loads(key)[0] for key in store.made_of()],
             output=str(folder),
         )
         for line in course.notes:

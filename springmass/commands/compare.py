@@ -110,7 +110,7 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
         if options.json
         else visible_lines(_course_text(compared))
     )
-    wrong = {one.name for one in compared.suspects}.union(*(one.names for one in compared.disagreements))
+    wrong = {group.name for group in compared.suspects}.union(*(group.names for group in compared.disagreements))
     if options.strict and wrong:
         complain(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
         return REJECTED

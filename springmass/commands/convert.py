@@ -39,11 +39,11 @@ def convert(
         raise ProgramError(f"convert writes one output, got {target} and -o {output}; name it once")
     if (output := target or output) is None:
         raise ProgramError(f"OUT is missing: convert {recording} to what? its suffix says the form")
-    stated = None if scene is None else read_scene(scene).to_mapping()
+    given_scene = None if scene is None else read_scene(scene).to_mapping()
     loaded = load(recording, read)
     out = Path(output)
     if out.suffix.lower() in RUN_SUFFIXES:
-        written = save_run(out, loaded, scene=stated, overwrite=overwrite)
+        written = save_run(out, loaded, scene=given_scene, overwrite=overwrite)
         tell(f"{written}: {len(loaded.samples)} samples from {loaded.path}")
         suggest(f"springmass analyse {shlex.quote(str(written))}")
         return OK

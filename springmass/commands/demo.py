@@ -35,9 +35,9 @@ def demo(
     compared = compare_runs(runs)
     print("Simulated recordings that come with springmass, as MotionSensor.vi would have written them.\n")
     print(text_table(BUNDLED_RUNS, [a.analysis for a in runs], style_of(sys.stdout)))
-    for one in runs:
-        print(f"\n{one.name.capitalize()}:")
-        print(findings_text(one.result["findings"]))
+    for run in runs:
+        print(f"\n{run.name.capitalize()}:")
+        print(findings_text(run.result["findings"]))
     print(f"\n{compared.comparison.message}")
     print(f"\nReport: {write_report(out / 'demo.results', runs, compared=compared)}")
     suggest("springmass analyse YOUR_RECORDING --scene BENCH.toml; springmass scene prints such a file to fill in")

@@ -25,18 +25,18 @@ def explain(
     as_json: Json = False,
 ) -> int:
     """Print each finding asked for; without a code, every code with its meaning by symptom."""
-    known = kinds()
+    all_kinds = kinds()
     for code in codes:
-        if code not in known:
-            near = get_close_matches(code, known, n=1)
+        if code not in all_kinds:
+            near = get_close_matches(code, all_kinds, n=1)
             hint = f"did you mean {near[0]}?" if near else "springmass explain lists all codes"
             raise ProgramError(f"there is no finding {code!r}; {hint}")
     if as_json:
-        print(json.dumps([_fields(code, known[code]) for code in codes or known]))
+        print(json.dumps([_fields(code, all_kinds[code]) for code in codes or all_kinds]))
     elif codes:
-        print("\n\n".join(_explained(code, known[code]) for code in codes))
+        print("\n\n".join(_explained(code, all_kinds[code]) for code in codes))
     else:
-        print(_listed(known))
+        print(_listed(all_kinds))
     return OK
 
 
@@ -69,8 +69,8 @@ def _explained(code: str, kind: Kind) -> str:
     )
 
 
-def _listed(known: Mapping[str, Kind]) -> str:
+def _listed(all_kinds: Mapping[str, Kind]) -> str:
     groups: dict[str, list[str]] = {}
-    for code, kind in known.items():
+    for code, kind in all_kinds.items():
         groups.setdefault(kind.symptom, []).append(wrapped(f"  {code}: {kind.meaning}", " " * 6, PAGE_WIDTH))
     return "\n\n".join("\n".join([symptom, *lines]) for symptom, lines in groups.items())

@@ -39,8 +39,8 @@ def ports(
         reach, step = "{:g} to {:g}".format(*family.range_m), f"{family.resolution_m * 1e3:.3g}"
         print(f"{family.name:<18} {family.rate_hz:>9.3g} {step:>9} {reach:>13} {family.baud:>7}")
         print(wrapped(f"    {family.title}. {family.limits}", "    "))
-    known = [row["device"] for row in rows if row["families"]]
-    suggest(f"springmass record --port {shlex.quote(known[0])}" if known else "springmass record --simulate")
+    recognised = [row["device"] for row in rows if row["families"]]
+    suggest(f"springmass record --port {shlex.quote(recognised[0])}" if recognised else "springmass record --simulate")
     return OK
 
 

@@ -343,8 +343,8 @@ class _Bench:
         if len(ruler) == 1:
             return self.session.calibrate([self._still(seconds, "let the bob hang still")], ruler, U_RULER_M)
         points = []
-        for known in ruler:
-            self._ask(f"bring the target to {known:g} m by the ruler, then press Enter")
+        for distance_m in ruler:
+            self._ask(f"bring the target to {distance_m:g} m by the ruler, then press Enter")
             points.append(self._still(seconds, "keep it still"))
         self.session.calibrate(points, ruler, U_RULER_M)
         calibration = self.session.sensors[0].calibration
@@ -399,7 +399,7 @@ def _virtual(options: RecordOptions, family: Sensor, scene: Scene | None, releas
     assert scene is not None
     if os.name == "nt":
         raise ProgramError("--simulate needs a pseudo-terminal, which this system has not; name a --port")
-    if len(options.ruler) > 1 or any(abs(known - REST_M) > 0.05 for known in options.ruler):
+    if len(options.ruler) > 1 or any(abs(distance_m - REST_M) > 0.05 for distance_m in options.ruler):
         got = ", ".join(f"{each:g}" for each in options.ruler)
         raise ProgramError(f"--ruler {got}: the simulated bob hangs at {REST_M:g} m; name one --ruler near that")
     waits = options.still is not None or options.ready

@@ -37,17 +37,17 @@ def trade(
 ) -> int:
     """Simulate records of one motion, evaluate them with every tier, and solve the motion with every integrator."""
     motion = TrueMotion(seconds=seconds)
-    stated = None if scene is None else read_scene(scene)
+    given_scene = None if scene is None else read_scene(scene)
     if recording is not None:
-        analysis = Run.of(recording, stated, how).analysis
+        analysis = Run.of(recording, given_scene, how).analysis
         analysis.track.demand_length("a simulation of the motion")
         if not isinstance(analysis.motion, Oscillation):
             raise ProgramError(f"{recording}: {analysis.motion.why}; name a run that oscillates", UNREADABLE)
         motion = motion_of(analysis, analysis.motion)
-    elif stated is not None:
+    elif given_scene is not None:
         from springmass.simulations.simulation import prepare
 
-        ready = prepare(stated, seconds, where=str(scene))
+        ready = prepare(given_scene, seconds, where=str(scene))
         sigma = ready.stated.sensor_sigma_m
         motion = motion_of_problem(ready.problem, None if sigma is None else sigma.value, seconds)
     if not motion.seconds * motion.frequency_hz >= 2.0 or not motion.theta[0] > 0.0:

@@ -69,7 +69,7 @@ class SpringComparison:
         return comparison_frame(self.comparison, {name: run["period"] for name, run in self.runs.items()})
 
     def __repr__(self) -> str:
-        return "\n".join([self.comparison.message, *(one.message for one in self.joint)])
+        return "\n".join([self.comparison.message, *(of_bob.message for of_bob in self.joint)])
 
 
 def demand_one_spring(scenes: Sequence[tuple[str, Scene]]) -> None:
@@ -198,8 +198,10 @@ def _of_one_bob(motions: list[tuple[str, Oscillation]], scenes: list[Scene]) -> 
     The bob must be the same because the damping coefficients are inversely proportional to the mass.
     """
     groups: dict[tuple[Estimate | None, Estimate | None, str], list[tuple[str, Oscillation]]] = {}
-    for one, scene in zip(motions, scenes, strict=True):
-        groups.setdefault((scene.bob_mass_kg, scene.disc_diameter_m, one[1].rest.mean.unit), []).append(one)
+    for named_motion, scene in zip(motions, scenes, strict=True):
+        groups.setdefault((scene.bob_mass_kg, scene.disc_diameter_m, named_motion[1].rest.mean.unit), []).append(
+            named_motion
+        )
     return [group for group in groups.values() if len(group) > 1]
 
 
@@ -209,7 +211,7 @@ def _findings(comparison: Comparison, joint: Sequence[JointDamping]) -> list[Fin
         findings.append(Found("runs_exchanged", {"sentence": comparison.message}))
     elif not comparison.agree:
         findings.append(Found("springs_differ", {"sentence": comparison.message}))
-    findings += [Found("laws_differ", {"sentence": one.message}) for one in joint if not one.one_law]
+    findings += [Found("laws_differ", {"sentence": of_bob.message}) for of_bob in joint if not of_bob.one_law]
     return [word(code) for code in findings]
 
 

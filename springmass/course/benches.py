@@ -91,16 +91,18 @@ def _run(row: Mapping[str, Any], bench: str, *, alone: bool) -> CourseRun:
     bob, spring = _estimate(row, "bob_mass_kg"), _estimate(row, "spring_mass_kg")
     points = np.array(json.loads(row.get("drag_points") or "[]"))
     middle = points[len(points) // 2] if len(points) else None
-    on_spring = own = None
+    on_spring = spring_constant = None
     if k is not None and omega is not None and mass is not None:
         on_spring = SpringRun(name, omega, mass, row.get("u_clock") or 0.0, row.get("clock") or "")
-        own = Estimate(k.value, k.value * math.hypot(2.0 * omega.u / omega.value, mass.u / mass.value), "N/m")
+        spring_constant = Estimate(
+            k.value, k.value * math.hypot(2.0 * omega.u / omega.value, mass.u / mass.value), "N/m"
+        )
     return CourseRun(
         name=name,
         spring=_label(row, "spring", "spring_mass_kg"),
         disc=_label(row, "disc", "disc_diameter_m"),
         bench=str(row.get(bench) or ""),
-        spring_constant=own,
+        spring_constant=spring_constant,
         drag=None if middle is None else Estimate(float(middle[2]), float(middle[3])),
         amplitude=_estimate(row, "amplitude"),
         unit=row.get("unit") or "",

@@ -61,9 +61,11 @@ def write_page(
 def _of_all(rows: Sequence[Mapping[str, Any]], differing: Mapping[str, str]) -> Chart | None:
     """Return the chart of all spring constants, or else of all periods, if at least two runs have one."""
     for name, label in (("spring_constant", "spring constant / (N/m)"), ("period", "period / s")):
-        known = [(visible(row["run"]), row[name], row[f"{name}_u"] or 0.0) for row in rows if row.get(name) is not None]
-        if len(known) > 1:
-            return course(label, known, differing)
+        values = [
+            (visible(row["run"]), row[name], row[f"{name}_u"] or 0.0) for row in rows if row.get(name) is not None
+        ]
+        if len(values) > 1:
+            return course(label, values, differing)
     return None
 
 
@@ -103,10 +105,10 @@ def line_of(row: Mapping[str, Any], tags: Sequence[str]) -> dict[str, Any]:
 def mark(lines: Sequence[dict[str, Any]], comparison: CourseComparison) -> None:
     """Put what the comparison says about a run first among the sentences for its group, and let it count."""
     by_name = {line["name"]: line for line in lines}
-    said = [(one.name, one.message, "error") for one in comparison.suspects]
+    said = [(group.name, group.message, "error") for group in comparison.suspects]
     if comparison.bench != COURSE:  # without a column of benches, nobody says that runs belong together
-        apart = [one for one in comparison.disagreements if one.spread > LITTLE]
-        said += [(name, one.message, "warning") for one in apart for name in one.names]
+        apart = [group for group in comparison.disagreements if group.spread > LITTLE]
+        said += [(name, group.message, "warning") for group in apart for name in group.names]
     for name, message, look in said:
         line = by_name[name]
         if not any(message in text for text in line["tell"]):

@@ -93,7 +93,7 @@ def plan(
     runs_csv: str | None = None,
     scene: str | None = None,
     how: AnalysisOptions = ANALYSIS_DEFAULTS,
-    known: Collection[str] = (),
+    known_paths: Collection[str] = (),
     output: str | None = None,
 ) -> Plan:
     """Find the runs of a course and the known values of each.
@@ -106,7 +106,7 @@ def plan(
     out = {os.path.abspath(path) for path in (output, runs_csv) if path is not None}
     texts = list(_expanded(inputs)) if inputs or table is None else table.files()
     # A file that the table names is a run even if it cannot be read.
-    named = {os.path.abspath(path) for path in (*known, *(() if table is None else table.files()))}
+    named = {os.path.abspath(path) for path in (*known_paths, *(() if table is None else table.files()))}
     recordings, notes = files_of(texts, deep=True, known=named, but=out)
     first: dict[str, InputFile] = {}
     for recording in recordings:  # a file named by several inputs is one run
@@ -124,10 +124,10 @@ def plan(
     jobs = []
     for file, line, values in joined:
         velocity = {} if file.velocity is None else {"velocity": file.velocity}
-        stated = how.given() | velocity | {name: values[name] for name in ANSWERS if name in values}
+        answers = how.given() | velocity | {name: values[name] for name in ANSWERS if name in values}
         of_run = _scene(values, shared, f"{runs_csv}, line {line}")
         of_tags = {name: values[name] for name in tags if name in values}
-        jobs.append(Job(file.path, os.getcwd(), stated, of_run, of_tags))
+        jobs.append(Job(file.path, os.getcwd(), answers, of_run, of_tags))
     return Plan(tuple(jobs), tags, tuple(notes))
 
 

@@ -142,8 +142,8 @@ def _damping(analysis: Analysis) -> dict[str, Any]:
         spring = SpringRun.of("", derived, clock=analysis.track.clock)
     except AnalysisError:
         return row  # without a mass, no spring constant can be compared
-    own = {"natural_angular_frequency": spring.angular_frequency, "own_mass_kg": spring.mass_kg}
-    return row | {"u_clock": _number(spring.u_clock)} | _numbers(own)
+    of_spring = {"natural_angular_frequency": spring.angular_frequency, "own_mass_kg": spring.mass_kg}
+    return row | {"u_clock": _number(spring.u_clock)} | _numbers(of_spring)
 
 
 def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, float | None]:

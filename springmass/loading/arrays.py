@@ -48,8 +48,8 @@ def loaded_of(source: Any, options: ReadOptions) -> Loaded:
     )
     velocity = np.asarray(source["velocity"], np.float64) if ABOUT in about and "velocity" in source else None
     samples = Block(0, track.t, track.y, track.flags, None, velocity, track.quantity, track.unit)
-    if (known := _stated(source, about, samples)) is not None:
-        return known
+    if (recorded := _stated(source, about, samples)) is not None:
+        return recorded
     track = replace(track, clock=getattr(t.values, "attrs", {}).get("clock", track.clock))
     info: Any = (track.kind, "", track.rate_hz, track.sigma_m, track.quantum_m, track.clock)
     return Loaded(Path(), "memory", SourceInfo(*info), "", "", samples, track)
@@ -70,10 +70,10 @@ def _stated(source: Any, about: Mapping[str, Any], samples: Block) -> Loaded | N
     """Return the recording of a dataset that says where its samples come from; None for any other."""
     path = Path(getattr(source, "encoding", {}).get("source", ""))
     if ABOUT in about:
-        known = json.loads(about[ABOUT])
-        info, traps = SourceInfo(**known.pop("info")), tuple(FormatIssue(**trap) for trap in known.pop("traps"))
-        path = Path(known.pop("path"))
-        return Loaded(path, info=info, traps=traps, samples=samples, track=_track(samples, info, known), **known)
+        content = json.loads(about[ABOUT])
+        info, traps = SourceInfo(**content.pop("info")), tuple(FormatIssue(**trap) for trap in content.pop("traps"))
+        path = Path(content.pop("path"))
+        return Loaded(path, info=info, traps=traps, samples=samples, track=_track(samples, info, content), **content)
     if path.is_file() and kind_of(path) == "run":
         loaded = load(path)
         # Samples at the same times have the same velocities and times of arrival.
@@ -83,8 +83,8 @@ def _stated(source: Any, about: Mapping[str, Any], samples: Block) -> Loaded | N
     return None
 
 
-def _track(samples: Block, info: SourceInfo, known: Mapping[str, Any]) -> Track:
-    return to_track(samples, info, recorded_format=known["recorded_format"], provenance=known["provenance"])
+def _track(samples: Block, info: SourceInfo, facts: Mapping[str, Any]) -> Track:
+    return to_track(samples, info, recorded_format=facts["recorded_format"], provenance=facts["provenance"])
 
 
 def about_json(loaded: Loaded, scene: Mapping[str, Any]) -> str:
@@ -150,8 +150,8 @@ def _unit_of(values: Any) -> str:
     """Return the unit that an array states: a quantity of pint, or the attribute of a data array."""
     if hasattr(values, "magnitude") and hasattr(values, "units"):
         return str(values.units)
-    stated = str(getattr(values, "attrs", {}).get("units", ""))
-    return stated.partition(" since ")[0]  # as in "milliseconds since 2026-11-26"
+    unit = str(getattr(values, "attrs", {}).get("units", ""))
+    return unit.partition(" since ")[0]  # as in "milliseconds since 2026-11-26"
 
 
 def _measure(unit: str) -> units.Measure:

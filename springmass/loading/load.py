@@ -47,8 +47,8 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
         _refuse(where, "a wire log", options, ("channel",))
         loaded = _load_wire(where, options.channel)
     else:
-        stated = {name: getattr(options, name) for name in _OF_FILES - {"velocity"}}
-        loaded = _from_recording(where, open_recording(where, velocity_path=options.velocity, **stated))
+        answers = {name: getattr(options, name) for name in _OF_FILES - {"velocity"}}
+        loaded = _from_recording(where, open_recording(where, velocity_path=options.velocity, **answers))
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             complain(f"{where}: {trap.message}")

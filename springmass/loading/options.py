@@ -44,9 +44,9 @@ class ReadOptions:
     @classmethod
     def of(cls, answers: Mapping[str, Any]) -> Self:
         """Return the options given as keyword arguments."""
-        known = [each.name for each in fields(cls)]
-        if unknown := [name for name in answers if name not in known]:
-            raise TypeError(f"{unknown[0]!r} is no option of reading; the options are {', '.join(known)}")
+        names = [each.name for each in fields(cls)]
+        if unknown := [name for name in answers if name not in names]:
+            raise TypeError(f"{unknown[0]!r} is no option of reading; the options are {', '.join(names)}")
         return cls(**answers)
 
 
@@ -82,9 +82,9 @@ class AnalysisOptions(ReadOptions):
     @property
     def parameters(self) -> dict[str, Any]:
         """Every option, as JSON has them."""
-        stated = {each.name: getattr(self, each.name) for each in fields(self)}
+        every_option = {each.name: getattr(self, each.name) for each in fields(self)}
         laws = None if self.laws is None else [getattr(law, "name", law) for law in _laws(self.laws)]
-        return {**stated, "law": getattr(self.law, "name", self.law), "laws": laws}
+        return {**every_option, "law": getattr(self.law, "name", self.law), "laws": laws}
 
 
 def _laws(wanted: Sequence[str | Law | EllipsisType]) -> tuple[str | Law, ...]:

@@ -27,8 +27,8 @@ def to_track(
 
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
-    stated = provenance or {}
-    moments = [event["t_s"] for event in stated.get("events", ()) if event.get("kind") == "trigger"]
+    facts = provenance or {}
+    moments = [event["t_s"] for event in facts.get("events", ()) if event.get("kind") == "trigger"]
     return Track(
         t=samples.t,
         y=samples.distance,
@@ -43,8 +43,8 @@ def to_track(
         quantity=samples.quantity,
         unit=samples.unit,
         trigger_s=float(moments[0]) if moments else None,  # when the bob left its rest position
-        **_clock_comparison(samples, info, stated),
-        **_scale(recorded_format, stated.get("sensor") or {}),
+        **_clock_comparison(samples, info, facts),
+        **_scale(recorded_format, facts.get("sensor") or {}),
     )
 
 
@@ -77,8 +77,8 @@ def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
     if not sensor:
         return {}
     calibration = Calibration.from_mapping(sensor.get("calibration", {}))
-    known = {"sonic": True, "u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
+    scale = {"sonic": True, "u_scale": calibration.u_scale, "u_offset_m": calibration.u_offset_m}
     # Families that send distances instead of echo times have applied an unknown speed of sound.
     if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
-        known["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
-    return known
+        scale["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
+    return scale

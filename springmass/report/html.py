@@ -86,7 +86,8 @@ def render_html(
     figures = Figures(pictures)
     overview = {name: figures.add(chart) for name, chart in several.items()}
     parts = [
-        _part(i, run, own, figures, stem) for i, (run, own, stem) in enumerate(zip(runs, charts, stems, strict=True))
+        _part(i, run, of_run, figures, stem)
+        for i, (run, of_run, stem) in enumerate(zip(runs, charts, stems, strict=True))
     ]
     return template("report.html.j2").render(
         title=", ".join(run.name for run in runs),
@@ -158,7 +159,7 @@ def _tables(runs: Sequence[Run]) -> Iterator[dict[str, Any]]:
             for row in table_rows([run.analysis for run in some], missing=True)
         ]
         trust = trust_of(some[0].analysis) if len(runs) == 1 else {}
-        sound = bool(trust) and all(one.grade == "sound" for one in trust.values())
+        sound = bool(trust) and all(of_value.grade == "sound" for of_value in trust.values())
         names = [run.name for run in some]
         yield {"names": names, "rows": rows, "trust": {} if sound else trust, "all_sound": sound}
 

@@ -49,8 +49,8 @@ def event_words(kind: str, facts: Mapping[str, Any], *, named: bool = False) -> 
             return f"Note: {facts['text']}"
     except (KeyError, TypeError, ValueError):  # a log by another program may state other facts
         pass
-    known = {name.replace("_", " "): value for name, value in facts.items() if value is not None}
-    words = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in known.items())
+    shown = {name.replace("_", " "): value for name, value in facts.items() if value is not None}
+    words = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in shown.items())
     return ": ".join(filter(None, (kind, words))) if named else words
 
 
@@ -84,7 +84,7 @@ def date_words(recorded: Mapping[str, Any]) -> str:
 
 def bench_words(scene: Scene) -> str:
     """Describe the bench in one line: bob, spring, disc, air and sensor."""
-    stated = [f"{words} {pretty(x)}" for words, name in _ON_THE_BENCH if (x := getattr(scene, name)) is not None]
+    parts = [f"{words} {pretty(x)}" for words, name in _ON_THE_BENCH if (x := getattr(scene, name)) is not None]
     if scene.sensor_position is not None:
-        stated.append(f"sensor {scene.sensor_position}")
-    return ", ".join(stated) if stated else "not stated; for the spring constant add --mass-kg KG"
+        parts.append(f"sensor {scene.sensor_position}")
+    return ", ".join(parts) if parts else "not stated; for the spring constant add --mass-kg KG"

@@ -73,8 +73,8 @@ def write_report(
         pictures: dict[str, bytes] = {}
         if kinds:
             (folder / "figures").mkdir()
-            for stem, own in (("", several), *zip(stems, charts, strict=True)):
-                pictures |= save(own.values(), folder / "figures", kinds, stem)
+            for stem, of_run in (("", several), *zip(stems, charts, strict=True)):
+                pictures |= save(of_run.values(), folder / "figures", kinds, stem)
         for stem, analysis, smoothed in zip(stems, analyses, motions, strict=True):
             if not isinstance(smoothed, str):
                 write_whole(folder / f"{stem}motion.csv", motion_csv(analysis, smoothed))

@@ -62,10 +62,10 @@ def lab_report_line(finding: Mapping[str, Any]) -> str:
     >>> lab_report_line({"code": "rest_drift", "severity": "warning", "message": "The rest position drifts by 1 mm."})
     'The rest position drifts by 1 mm. The stated uncertainties include this.'
     """
-    harm, own = harm_of(finding["code"], finding["severity"]), kinds()[finding["code"]].consequence
+    harm, consequence = harm_of(finding["code"], finding["severity"]), kinds()[finding["code"]].consequence
     if harm is Harm.NOTE:
         return ""
-    return f"{sentence(finding['message'])} {_CONSEQUENCES[harm] if own is None else own}".rstrip()
+    return f"{sentence(finding['message'])} {_CONSEQUENCES[harm] if consequence is None else consequence}".rstrip()
 
 
 def notices_of(findings: Iterable[Mapping[str, Any]], figures: Container[str]) -> dict[str, list[dict[str, str]]]:

@@ -57,8 +57,8 @@ def comparison_frame(compared: Comparison, periods: Mapping[str, Value]) -> pd.D
 
     rows = [
         {"period": periods[name].value, "u_period": periods[name].u, "spring_constant": k.value, "u": k.u}
-        | {"u_own": own, "pull": pull, "agree": compared.agree}
-        for name, k, own, pull in zip(compared.names, compared.each, compared.own_u, compared.pulls, strict=True)
+        | {"u_own": own_u, "pull": pull, "agree": compared.agree}
+        for name, k, own_u, pull in zip(compared.names, compared.each, compared.own_u, compared.pulls, strict=True)
     ]
     mean = compared.spring_constant if compared.agree else Estimate(math.nan, math.nan, "N/m")
     rows.append({"spring_constant": mean.value, "u": mean.u, "agree": compared.agree})  # the others are NaN

@@ -93,8 +93,8 @@ def _recorded(loaded: Loaded) -> dict[str, Any]:
 
 def with_traps(findings: Sequence[Finding], traps: Sequence[FormatIssue]) -> tuple[Finding, ...]:
     """Return the findings of an analysis and of the reader, the most severe first."""
-    known = {finding.code for finding in findings}
-    return by_severity([*findings, *(_of_reader(trap) for trap in traps if trap.code not in known)])
+    codes = {finding.code for finding in findings}
+    return by_severity([*findings, *(_of_reader(trap) for trap in traps if trap.code not in codes)])
 
 
 def _of_reader(trap: FormatIssue) -> Finding:
@@ -152,7 +152,7 @@ def _damping(analysis: Analysis, *, wanted: bool) -> dict[str, Any]:
         **picked(damping, ("selected", "admissible")),
         "stated": damping.stated or None,
         "law": derived.law or None,
-        "weights": {one.fit.name: one.weight for one in derived.laws},
+        "weights": {of_law.fit.name: of_law.weight for of_law in derived.laws},
         "of_law": sorted(derived.of_law),
         "coefficients": {name: {**x, "law": derived.law_of_coefficients} for name, x in coefficients.items()},
         "laws": laws,

@@ -42,8 +42,8 @@ def exponents_of(unit: str) -> Exponents | None:
                 if factor != "1":
                     return None
                 continue
-            for i, one in enumerate(_BASE[match[1]]):
-                total[i] += sign * one * int(match[2] or 1)
+            for i, power in enumerate(_BASE[match[1]]):
+                total[i] += sign * power * int(match[2] or 1)
     return tuple(total)
 
 
@@ -153,13 +153,13 @@ def _unit(name: str, left: Any, right: Any) -> str | None:
         return units[0] if units[0] == units[1] else None
     if name == "pow" and isinstance(right, UFloat):
         return "" if units == ("", "") else None
-    one, other = (None if unit is None else exponents_of(unit) for unit in units)
-    if one is None or other is None:
+    left_powers, right_powers = (None if unit is None else exponents_of(unit) for unit in units)
+    if left_powers is None or right_powers is None:
         return None
     if name == "pow":
-        return _NAMES.get(tuple(power * float(right) for power in one))
+        return _NAMES.get(tuple(power * float(right) for power in left_powers))
     sign = 1 if name == "mul" else -1
-    return _NAMES.get(tuple(a + sign * b for a, b in zip(one, other, strict=True)))
+    return _NAMES.get(tuple(a + sign * b for a, b in zip(left_powers, right_powers, strict=True)))
 
 
 def _operator(name: str, reflected: bool) -> Callable[[Any, Any], Any]:

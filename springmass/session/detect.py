@@ -22,24 +22,24 @@ def name_sensors(
     if ports and sensors:
         return ports, sensors, baud
     addresses = ports or [port.device for port in list_ports()]
-    descriptions, known = [], []
+    descriptions, named = [], []
     for address in addresses:
         heard, families, speed = listen(address, PROBED_BAUDS if baud is None else (baud,))
         wanted = [name for name in families if not sensors or name in sensors]
         descriptions.append(f"{address}: {heard}")
         if wanted:
-            known.append((address, wanted[0], speed))
-    if len(known) != max(len(ports), 1):
-        if known:
+            named.append((address, wanted[0], speed))
+    if len(named) != max(len(ports), 1):
+        if named:
             demand = "name one with --port and --sensor; several speak"
         else:
             demand = "no rangefinder that is known speaks; name it with --port and --sensor, or take --simulate"
         listed = "; ".join(descriptions) or "this machine has no serial port"
         raise ProgramError(f"record looked for a rangefinder: {demand}: {listed}", SENSOR)
-    for address, name, speed in known:
+    for address, name, speed in named:
         tell(f"{address}: a {name} sensor at {speed} baud")
-    measured = known[0][2] if len(known) == 1 else None
-    return tuple(each[0] for each in known), tuple(each[1] for each in known), baud or measured
+    measured = named[0][2] if len(named) == 1 else None
+    return tuple(each[0] for each in named), tuple(each[1] for each in named), baud or measured
 
 
 def listen(device: str, bauds: Sequence[int] = PROBED_BAUDS) -> tuple[str, list[str], int]:

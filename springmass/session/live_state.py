@@ -82,8 +82,8 @@ class Usefulness:
         if math.isnan(self._end):
             self._target = self._change = float(block.t[0])
         self._end = float(block.t[-1])
-        if (known := np.isfinite(block.distance)).any():
-            t, distance = block.t[known], block.distance[known]
+        if (measured := np.isfinite(block.distance)).any():
+            t, distance = block.t[measured], block.distance[measured]
             self.usable += t.size
             self._target = float(t[-1])
             changed = np.flatnonzero(np.diff(distance, prepend=self._last))  # the first differs from NaN

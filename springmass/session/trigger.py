@@ -31,10 +31,10 @@ class Watch:
 
     def moment_ns(self, block: Block) -> int | None:
         """Return the host's timestamp of the first sample beyond the threshold; None if there is no such sample."""
-        known = np.isfinite(block.distance)
-        if block.host_ns is None or not known.any():
+        measured = np.isfinite(block.distance)
+        if block.host_ns is None or not measured.any():
             return None
         if math.isnan(self._rest_m):
-            self._rest_m = float(block.distance[known][0])
-        off = known & (np.abs(block.distance - self._rest_m) > self._threshold_m)
+            self._rest_m = float(block.distance[measured][0])
+        off = measured & (np.abs(block.distance - self._rest_m) > self._threshold_m)
         return int(block.host_ns[off.argmax()]) if off.any() else None

@@ -114,8 +114,8 @@ def scene_from_run(scene: Scene, analysis: Analysis, *, damping: bool = True) ->
         slopes @ _covariance(motion) @ slopes.T,
         tuple(each.unit for each in taken.values()),
     )
-    known: dict[str, Any] = dict(taken)
-    return replace(scene, **known), measured
+    values: dict[str, Any] = dict(taken)
+    return replace(scene, **values), measured
 
 
 def compare_with_run(

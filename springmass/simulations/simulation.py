@@ -77,15 +77,15 @@ def prepare(scene: Scene, seconds: float, *, analysis: Analysis | None = None, w
     return Prepared(scene, solved, drag, measured, from_run, problem)
 
 
-def _together(one: Joint | None, other: Joint) -> Joint:
+def _together(first: Joint | None, second: Joint) -> Joint:
     """Return both joint distributions as one, with no correlation between the two."""
-    if one is None:
-        return other
-    size = len(one.names)
-    covariance = np.zeros((size + len(other.names),) * 2)
-    covariance[:size, :size], covariance[size:, size:] = one.covariance, other.covariance
-    values = np.concatenate([one.values, other.values])
-    return Joint((*one.names, *other.names), values, covariance, (*one.units, *other.units))
+    if first is None:
+        return second
+    size = len(first.names)
+    covariance = np.zeros((size + len(second.names),) * 2)
+    covariance[:size, :size], covariance[size:, size:] = first.covariance, second.covariance
+    values = np.concatenate([first.values, second.values])
+    return Joint((*first.names, *second.names), values, covariance, (*first.units, *second.units))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,13 +173,13 @@ def instability(problem: Problem, method: str, step_s: float | None) -> tuple[st
     limit = math.inf if integrator is None else integrator.stable_step(problem)
     if integrator is None or (limit > 0.0 and (step_s is None or step_s <= limit)):
         return "", ""
-    known, rounded = "it grows at any step without damping", ""
+    growth, rounded = "it grows at any step without damping", ""
     if limit > 0.0:
         power = 10.0 ** (math.floor(math.log10(limit)) - 2)
         rounded = f"{math.floor(limit / power) * power:.3g}"
-        known = f"its limit here is {rounded} s"
+        growth = f"its limit here is {rounded} s"
     step = "a step" if step_s is None else f"a step of {step_s:g} s"
-    return f"{integrator.words} is unstable with {step}: {known}", rounded
+    return f"{integrator.words} is unstable with {step}: {growth}", rounded
 
 
 def simulated(
@@ -226,10 +226,10 @@ def reference(
     return run, f"Strang splitting in {parts} steps a sample", _apart(run, coarse) / 3.0 + rounding
 
 
-def _apart(one: Trajectory, other: Trajectory) -> float:
+def _apart(run: Trajectory, other: Trajectory) -> float:
     """Return the maximum difference between two motions relative to the starting amplitude."""
-    start = one.problem.amplitude_m()
-    return float(np.max(np.abs(one.y - other.y))) / start if start else 0.0
+    start = run.problem.amplitude_m()
+    return float(np.max(np.abs(run.y - other.y))) / start if start else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,9 +71,9 @@ class Case:
     def demand_distances(self, recording: Recording, x: F8 = DISTANCE) -> None:
         """Demand the distances where no flag is set, up to a constant if the file does not know it."""
         sound = recording.samples.flags == 0
-        distances, known = recording.samples.distance[sound], x[: sound.size][sound]
-        shift = 0.0 if self.file.offset_known or not distances.size else distances[0] - known[0]
-        demand(np.allclose(distances - shift, known, rtol=0, atol=1e-9), "return the distances of the file in m")
+        distances, expected = recording.samples.distance[sound], x[: sound.size][sound]
+        shift = 0.0 if self.file.offset_known or not distances.size else distances[0] - expected[0]
+        demand(np.allclose(distances - shift, expected, rtol=0, atol=1e-9), "return the distances of the file in m")
 
 
 def _demand_trap(recording: Recording, code: str, flag: Flag | None = None, first: int = 0, stop: int = 0) -> None:
@@ -185,11 +185,11 @@ def odd_times(case: Case) -> None:
 
 def odd_distances(case: Case) -> None:
     """NaN and zeros that fill the end are missing samples, a lost target is a false echo, and steps are known."""
-    x, known = DISTANCE.copy(), case.file.offset_known
+    x, offset_known = DISTANCE.copy(), case.file.offset_known
     x[60:80] = np.nan
     recording = case.written(x=x)
-    _demand_trap(recording, "missing_samples", Flag.MISSING, 60, 80 if known else 81)
-    if not known:
+    _demand_trap(recording, "missing_samples", Flag.MISSING, 60, 80 if offset_known else 81)
+    if not offset_known:
         return
     case.demand_distances(recording, x)
     x = np.where(np.arange(EXAMPLE_TIMES_S.size) < 280, DISTANCE, 0.0)  # no rangefinder reads exactly 0 m twenty times

@@ -75,8 +75,8 @@ def jacobian_is_the_derivative(law: Law, theta: F8, t: F8) -> None:
     expected = central_differences(lambda at: law.curve(t, at)[0], theta)
     rounding = 1e-15 * theta[0] / (CENTRAL_STEP * np.maximum(np.abs(theta), CENTRAL_STEP))
     fine = (np.abs(by - expected)[plain] <= 1e-6 * np.abs(expected).max(axis=0) + rounding).all(axis=0)
-    for name, one in zip(law.parameters, fine.tolist(), strict=True):
-        demand(one, f"return the derivative of the amplitude by {name} from curve")
+    for name, correct in zip(law.parameters, fine.tolist(), strict=True):
+        demand(correct, f"return the derivative of the amplitude by {name} from curve")
 
 
 def units_do_not_matter(law: Law, theta: F8, t: F8) -> None:

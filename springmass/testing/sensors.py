@@ -83,14 +83,14 @@ def decoded_as_encoded(case: SensorCase) -> None:
     demand(off <= allowed, f"decode distances to half of resolution_m, {allowed:g} m, got an error of {off:g} m")
     demand(decoder.pending == 0, f"keep no byte after the last frame, got pending {decoder.pending}")
     demand(lead or not any(decoder.faults.values()), f"count no fault on a sound stream, got {dict(decoder.faults)}")
-    known = 0
+    timed = 0
     for name, values in (("sequence", _SEQUENCE), ("device_us", _DEVICE_US)):
         numbers = [getattr(reading, name) for reading in readings]
         if set(numbers) != {-1}:
-            known += 1
+            timed += 1
             same = [number % 2**32 for number in numbers] == (values[lead:] % 2**32).tolist()
             demand(same, f"return the {name} that the encoder wrote, or -1 in every reading")
-    demand(known or not case.family.has_device_time, "return device_us or sequence, or leave has_device_time out")
+    demand(timed or not case.family.has_device_time, "return device_us or sequence, or leave has_device_time out")
 
 
 def frames_of_the_data_sheet(case: SensorCase) -> None:
@@ -135,9 +135,9 @@ def in_step_after_garbage(case: SensorCase) -> None:
         if not case.family.self_framing:
             decoder.flush()
         after = _rows(decoder.feed(2, b"".join(frames[at:])))
-        known = max(at - N + len(clean), 0)
-        demand(before == clean[:known], f"read the frames before {noise!r} as sent")
-        sent = clean[known + 2 :]
+        before_noise = max(at - N + len(clean), 0)
+        demand(before == clean[:before_noise], f"read the frames before {noise!r} as sent")
+        sent = clean[before_noise + 2 :]
         demand(not sent or after[-len(sent) :] == sent, f"read the frames from the third after {noise!r} on as sent")
 
 

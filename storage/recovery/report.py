@@ -101,13 +101,13 @@ class LossCount:
         if samples.host_ns is not None:
             self._last_ns = int(samples.host_ns[-1])
         missing = (samples.flags & np.uint8(Flag.MISSING)) != 0
-        known = np.flatnonzero(~missing)
+        measured = np.flatnonzero(~missing)
         start = float(samples.t[0]) if self._known_t is None else self._known_t
         self._last_t = float(samples.t[-1])
-        if known.size:
+        if measured.size:
             # The time between consecutive distances, if there are readings without a distance between them.
-            t = np.concatenate(([start], samples.t[known]))
-            between = np.diff(known, prepend=-1) > 1
+            t = np.concatenate(([start], samples.t[measured]))
+            between = np.diff(measured, prepend=-1) > 1
             between[0] |= self._missing_since
             self._add(np.diff(t)[between] - self._period_s)
             self._known_t = float(t[-1])

@@ -90,7 +90,7 @@ class RunHeader(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         if missing := [name for name in ("time", "distance", "quality") if name not in header.columns]:
             raise ValueRefused("header.columns", f"expected also {missing[0]}")
         if (header.quantity, header.unit) not in {("", ""), *UNITS.items()}:
-            known = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
+            allowed = ", ".join(f"{quantity} in {unit}" for quantity, unit in UNITS.items())
             got = f"{shown(header.quantity)} in {shown(header.unit)}"
-            raise ValueRefused("header.quantity", f"expected one of {known}, got {got}")
+            raise ValueRefused("header.quantity", f"expected one of {allowed}, got {got}")
         return header

@@ -147,8 +147,8 @@ def fields(header: RunHeader) -> dict[str, Any]:
     """Return the scalar fields by path: NeXus uses fields for quantities with a unit."""
     values = {"/entry/title": header.title, "/entry/start_time": _text(header, "start_time")}
     values |= {f"{INSTRUMENT}/{name}": value for name, value in plain(header.info).items()}
-    stated = {path: value for path, value in values.items() if value not in (None, "")}
-    return {path: value if isinstance(value, str) else float(value) for path, value in stated.items()}
+    filled = {path: value for path, value in values.items() if value not in (None, "")}
+    return {path: value if isinstance(value, str) else float(value) for path, value in filled.items()}
 
 
 def _provenance(header: RunHeader) -> dict[str, Any]:

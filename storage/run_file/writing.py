@@ -113,9 +113,9 @@ class RunWriter:
         ``header`` has the fields of :class:`storage.run_file.header.RunHeader` that do not follow from the samples and
         the originals. Raises WriteFailed if one of them has a value that is not allowed.
         """
-        rest = concatenate(self._pending)
-        if not self._written or len(rest):
-            self._write(rest, growing=bool(self._written))
+        pending = concatenate(self._pending)
+        if not self._written or len(pending):
+            self._write(pending, growing=bool(self._written))
         with writing_h5(self.path):
             self._write_dimensions()
             text = RunHeader(

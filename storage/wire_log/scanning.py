@@ -197,8 +197,8 @@ class LogContents:
     def remove(self) -> bool:
         """Remove the log unless it has grown or its name leads to another file; return whether it was removed."""
         try:
-            own, there = os.fstat(self._file.fileno()), os.stat(self.path)
-            if not os.path.samestat(own, there) or there.st_size != self.size:
+            opened, there = os.fstat(self._file.fileno()), os.stat(self.path)
+            if not os.path.samestat(opened, there) or there.st_size != self.size:
                 return False
             self.close()
             self.path.unlink()

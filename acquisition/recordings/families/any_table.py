@@ -91,8 +91,8 @@ def header(lines: Sequence[str]) -> Header | None:
             return replace(heading, role="time")
         return replace(heading, role="ignored" if at in ignored else "aside" if at in asides else "channel")
 
-    known = sum(1 for each in table.headings if each.name)
-    problem = f"rows have more cells than the {known} names above them, because the times have decimal commas"
+    count = sum(1 for each in table.headings if each.name)
+    problem = f"rows have more cells than the {count} names above them, because the times have decimal commas"
     remedy = "export with semicolons between the cells, or with decimal points"
     return Header(
         why,
@@ -125,8 +125,8 @@ def _units_beside(table: Layout) -> tuple[list[Heading], set[int]]:
     """Return the headings, with units taken from columns of units to the right of the numbers, and these columns."""
     headings, words = list(table.headings), set()
     for column, cells in enumerate(zip(*table.rows, strict=True)):
-        known = measure_of(cells[0]) is not None or time_unit(cells[0]) is not None
-        if column and known and parse_number(cells[0]) is None and len(set(cells)) == 1 and not headings[column].name:
+        is_unit = measure_of(cells[0]) is not None or time_unit(cells[0]) is not None
+        if column and is_unit and parse_number(cells[0]) is None and len(set(cells)) == 1 and not headings[column].name:
             headings[column - 1] = replace(headings[column - 1], unit=headings[column - 1].unit or cells[0])
             words.add(column)
     return headings, words

@@ -92,7 +92,7 @@ def _described(path: str, above: Sequence[str], width: int) -> list[Heading]:
     ]
     if len(described) > width and described[2][2] == "Hz":
         del described[2], computed[2]
-    for at in [at for at, own in enumerate(computed) if own][::-1]:
+    for at in [at for at, is_computed in enumerate(computed) if is_computed][::-1]:
         if len(described) > width:
             del described[at]
     if len(described) != width:

@@ -72,15 +72,15 @@ def _tables(path: str, data: bytes) -> list[Table]:
         raise FormatError(path, f'expected "{_MAGIC}" in the first line', "check that this is an LVM file", line=1)
     tag = re.compile(rf"\s*{_SEPARATOR}([^\w])")
     # The separator is the character after its tag, or else after the opening words of line 1.
-    stated = (match[1] for line in lines if (match := tag.match(line)))
-    mark = next(stated, lines[0].lstrip()[len(_MAGIC) :][:1]) or "\t"
+    separators = (match[1] for line in lines if (match := tag.match(line)))
+    mark = next(separators, lines[0].lstrip()[len(_MAGIC) :][:1]) or "\t"
     top = _header(path, text, 0, mark)
     segments = list(_segments(path, text, top, mark))
     passes: list[list[Table]] = []
     for number, (segment, stop) in enumerate(segments, 1):
         run = f"Segment {number}" if len(segments) > 1 else ""
         passes.append(list(_of_segment(path, text, top, segment, stop, mark, run)))
-    tables = [*_joined(passes), *(each for own in passes for each in own)]
+    tables = [*_joined(passes), *(each for of_pass in passes for each in of_pass)]
     if not tables:
         raise FormatError(path, "expected channels below the header, got none", "export the run again")
     title = segments[0][0].first_of("Notes") or top.first_of("Description")
@@ -149,7 +149,7 @@ def _of_segment(
 
 def _joined(passes: list[list[Table]]) -> list[Table]:
     """Return the tables of all segments as one run, if they have the same channels and each segment runs on."""
-    labels = [[table.columns[0].label for table in own] for own in passes]
+    labels = [[table.columns[0].label for table in of_pass] for of_pass in passes]
     if len(passes) < 2 or any(each != labels[0] or not each for each in labels):
         return []
     if not all(_runs_on(before[0], after[0]) for before, after in pairwise(passes)):

@@ -127,13 +127,13 @@ class MotionSensor(ColumnFormat):
     ) -> Recording:
         """Join a position file and a velocity file by time; they may be given in either order."""
         files = [(self._samples(*each, Answers(rate_hz=rate_hz)), each[1]) for each in (position, velocity)]
-        (p, own), (v, others) = sorted(files, key=lambda file: file[0].column.name)
+        (p, position_data), (v, velocity_data) = sorted(files, key=lambda file: file[0].column.name)
         if p.column.name == v.column.name:
             problem = f"expected a position and a velocity file, got {p.column.name} in both ({p.name} too)"
             raise FormatError(v.path, problem, "name the other file of the pair")
-        joined = p.recording(self.name, own, *_joined(p, v))
+        joined = p.recording(self.name, position_data, *_joined(p, v))
         unread = joined.malformed_rows + int(np.count_nonzero(~v.sound))
-        return replace(joined, malformed_rows=unread, originals=(*joined.originals, Original(v.name, others)))
+        return replace(joined, malformed_rows=unread, originals=(*joined.originals, Original(v.name, velocity_data)))
 
     def _samples(self, path: str, data: bytes, answers: Answers) -> Samples:
         """Read the samples of a file, m or m/s, with the error that it states."""
@@ -227,9 +227,9 @@ def _integrate(velocity: F8, index: I8, rate_hz: float) -> tuple[F8, B1]:
     ``index`` are sample numbers, increasing; a jump is a gap, in which the velocity is interpolated linearly. The
     resulting offset is only an estimate, so the mask returned marks the first sample after each gap.
     """
-    known = np.isfinite(velocity)
-    start = velocity.size > 0 and not known[0]
-    rows = np.flatnonzero(known)
+    measured = np.isfinite(velocity)
+    start = velocity.size > 0 and not measured[0]
+    rows = np.flatnonzero(measured)
     position = np.full(velocity.size, np.nan)
     bridged = np.zeros(velocity.size, bool)
     if start:

@@ -38,8 +38,10 @@ def capstone(lines: Sequence[str]) -> Header | None:
         return Header(f'headings in line 1 end in a run, "{run}"', 1, mark, headings)
     names = [cell.lower() for cell in cells]
     # A comment mark shows that the line comes from another program.
-    known = len(names) > 1 and names[0][:1] not in "#%" and is_time(names[0]) and _QUANTITIES.issuperset(names[1:])
-    if not known:
+    is_localised = (
+        len(names) > 1 and names[0][:1] not in "#%" and is_time(names[0]) and _QUANTITIES.issuperset(names[1:])
+    )
+    if not is_localised:
         return None
     return Header(f'line 1 is the headings "{mark.join(cells)}"', 1, mark, [Heading(cell) for cell in cells])
 

@@ -95,14 +95,14 @@ def _of_group(path: str, group: Any, several: bool, size: int) -> Iterator[Table
     for each, column in zip(channels, columns, strict=True):
         if column in times and len(columns) > 1:
             continue
-        stated = "wf_increment" in each.properties
-        if stated and clocks and _number(each.properties["wf_increment"], 0.0) == 1.0:
-            stated = False  # LabVIEW's placeholder
+        has_step = "wf_increment" in each.properties
+        if has_step and clocks and _number(each.properties["wf_increment"], 0.0) == 1.0:
+            has_step = False  # LabVIEW's placeholder
         own_time = times[0] if times and times[0].values.size == column.values.size and column not in times else None
         yield Table(
             (column,),
-            times=None if stated or own_time is None else replace(own_time, unit="s"),
-            formula=_formula(each.properties) if stated else None,
+            times=None if has_step or own_time is None else replace(own_time, unit="s"),
+            formula=_formula(each.properties) if has_step else None,
             run=group.name if several else "",
             start_time=_utc(each.properties.get("wf_start_time")) or start_time,
             beside=tuple(columns),

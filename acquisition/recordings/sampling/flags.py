@@ -31,14 +31,16 @@ def place_unread(t: F8, unread: B1, grid: Grid | None) -> F8:
     out = np.where(unread, np.nan, t)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], unread.view(np.int8), [0]))))
     for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        own = t[start:stop]
+        printed_times = t[start:stop]
         before, after = t[start - 1] if start else -np.inf, t[stop] if stop < t.size else np.inf
         if grid is None:
-            out[start:stop] = np.where(np.isfinite(after - before) & (before < own) & (own < after), own, np.nan)
+            out[start:stop] = np.where(
+                np.isfinite(after - before) & (before < printed_times) & (printed_times < after), printed_times, np.nan
+            )
             continue
         # As numbers of steps of the grid: the printed time, and what the rows above and below predict.
-        first, printed, last = ((each - grid.origin_s) * grid.rate_hz for each in (before, own, after))
-        above, below = first + 1 + np.arange(own.size), last - 1 - np.arange(own.size)[::-1]
+        first, printed, last = ((each - grid.origin_s) * grid.rate_hz for each in (before, printed_times, after))
+        above, below = first + 1 + np.arange(printed_times.size), last - 1 - np.arange(printed_times.size)[::-1]
         fills = np.abs(above - below) < 0.5
         alike = (np.abs(printed - above) < 0.5) | (np.abs(printed - below) < 0.5)
         out[start:stop] = np.where(fills | alike, grid.time(np.rint(np.where(fills, above, printed))), np.nan)

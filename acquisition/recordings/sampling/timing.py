@@ -188,14 +188,14 @@ def find_timing(path: str, rows: ChannelRows, formula: Formula | None, rate_hz: 
             steps = "the header states steps of 1 s, as LabVIEW does if no rate was set"
             traps.append(FormatIssue("rate_assumed", f"{steps}; if they are not, state the rate"))
         if timing is None:
-            stated = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
+            formula_words = f"the header states the times {formula.start_s:g} s + i * {formula.step_s:g} s"
             what = "which are impossible" if rows.printed is None else "but the column of times differs and is used"
             size = 1 if rows.printed is None else rows.printed.size
-            traps.append(FormatIssue("stale_header", f"{stated}, {what}", size))
+            traps.append(FormatIssue("stale_header", f"{formula_words}, {what}", size))
     if timing is None and rows.printed is not None:
-        known = rows.printed[~rows.unread]
-        timing = _in_bursts(path, known, rows.time_resolution, rate_hz)
-        timing = timing or _by_column(path, known, rows.time_resolution, rate_hz)
+        printed = rows.printed[~rows.unread]
+        timing = _in_bursts(path, printed, rows.time_resolution, rate_hz)
+        timing = timing or _by_column(path, printed, rows.time_resolution, rate_hz)
     if timing is None:
         if rate_hz is None:
             reason = "no column of times and no sampling interval"

@@ -129,17 +129,17 @@ def read_cells(cells: Sequence[bytes]) -> tuple[F8, I1, B1]:
     comma = raw == ord(",")
     raw[comma] = ord(".")
     values[fixed] = text[fixed].astype(np.float64)
-    rest = ~fixed & (lengths > 0)
+    unfixed = ~fixed & (lengths > 0)
     # A mantissa with a mark, and an exponent of up to two digits.
     letters = kinds == _E
     exponent = lengths - letters.argmax(axis=1)  # the length of it with its letter
-    scientific = rest & (letters.sum(axis=1) == 1) & (marked == 1) & (places >= exponent) & (exponent <= len("e-99"))
-    if (scientific == rest).all() and not (kinds[rest] == _OTHER).any():
+    scientific = unfixed & (letters.sum(axis=1) == 1) & (marked == 1) & (places >= exponent) & (exponent <= len("e-99"))
+    if (scientific == unfixed).all() and not (kinds[unfixed] == _OTHER).any():
         with contextlib.suppress(ValueError):
-            values[rest] = text[rest].astype(np.float64)
-            decimals[rest] = np.minimum(places - exponent, EXPONENT - 1)[rest] + EXPONENT
-            rest &= ~np.isfinite(values)
-    for row in np.flatnonzero(rest).tolist():
+            values[unfixed] = text[unfixed].astype(np.float64)
+            decimals[unfixed] = np.minimum(places - exponent, EXPONENT - 1)[unfixed] + EXPONENT
+            unfixed &= ~np.isfinite(values)
+    for row in np.flatnonzero(unfixed).tolist():
         values[row], decimals[row] = cell(cells[row].decode("latin-1"))
     return values, decimals, comma.any(axis=1)
 

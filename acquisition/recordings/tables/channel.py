@@ -129,8 +129,8 @@ def _binary_rows(times: Column | None, column: Column, measured: Measure, second
 def _text_rows(
     path: str, table: Table, lines: Lines, column: Column, measured: Measure, seconds: Measure
 ) -> ChannelRows:
-    own, time = column.of_size(lines.rows), table.times and table.times.of_size(lines.rows)
-    form = own.forms
+    values, time = column.of_size(lines.rows), table.times and table.times.of_size(lines.rows)
+    form = values.forms
     # A row of words without a value is a remark between rows; a row of a longer channel is none of this channel's.
     remark, present, unread = lines.words & (form == EMPTY_CELL), np.ones(form.size, bool), form == UNREAD_CELL
     if time is not None:
@@ -154,7 +154,7 @@ def _text_rows(
         beyond = ~(np.abs(printed) < _LONGEST_S)  # true for a NaN
         printed[beyond] = np.nan
         unknown |= beyond
-    value = scaled(own.values, form, measured.power)[keep]
+    value = scaled(values.values, form, measured.power)[keep]
     value[unknown] = np.nan
     resolution = last_digit(value, form, measured.power) * measured.factor
     value *= measured.factor

@@ -102,14 +102,14 @@ def choose_channel(path: str, tables: Sequence[Table], answers: Answers) -> Chan
 
 def measure(path: str, column: Column, unit: str | None) -> tuple[Measure, tuple[FormatIssue, ...]]:
     """Return the measure of a channel's values, and the assumptions made for it."""
-    stated, given = column.measure, measure_of(unit or "")
-    if unit is None and stated is not None:
-        return stated, ()
+    of_file, given = column.measure, measure_of(unit or "")
+    if unit is None and of_file is not None:
+        return of_file, ()
     if given is None:
         raise FormatError(path, f'unit must be one of {", ".join(MEASURES)}, got "{unit}"', "name one of these")
-    if stated == given:
+    if of_file == given:
         return given, ()
-    if stated is not None and (stated.quantity in ("length", given.quantity)):
+    if of_file is not None and (of_file.quantity in ("length", given.quantity)):
         problem = f'unit must be {unit_words(column.unit)} as stated by "{column.label}", got "{unit}"'
         raise FormatError(path, problem, "leave the unit out")
     if not column.unit:
@@ -173,10 +173,10 @@ def _unlikely(column: Column) -> tuple[bool, bool, float]:
     plain = column.name.lower()
     named = column.is_length or bool(_POSITION.search(plain))
     derived = bool(_DERIVED.search(plain))
-    known = column.measure is not None
+    has_unit = column.measure is not None
     some = _some_of(column)
     with np.errstate(all="ignore"):  # a file may have numbers whose squares are infinite
-        spread = float(np.std(some)) if known and some.size else 0.0
+        spread = float(np.std(some)) if has_unit and some.size else 0.0
     return derived, not named, -spread
 
 
@@ -237,9 +237,9 @@ def _with_time_unit(path: str, table: Table, unit: str) -> Table:
         raise FormatError(path, f'time unit must be one of {", ".join(TIMES)}, got "{unit}"', "name one of these")
     if table.times is None:
         raise FormatError(path, f"time unit {unit} was given, but there is no column of times", "leave it out")
-    stated = unit_words(table.times.unit)
-    if time_unit(stated) is not None and stated != unit_words(unit):
-        raise FormatError(path, f'time unit must be {stated} as stated by the file, got "{unit}"', "leave it out")
+    of_file = unit_words(table.times.unit)
+    if time_unit(of_file) is not None and of_file != unit_words(unit):
+        raise FormatError(path, f'time unit must be {of_file} as stated by the file, got "{unit}"', "leave it out")
     return replace(table, times=replace(table.times, unit=unit))
 
 
@@ -297,7 +297,7 @@ def _range_of(times: Column | None) -> str:
     if times is None:
         return ""
     name = f'"{times.name or "time"}"'
-    first, known = _first_numbers(times), times.values[np.isfinite(times.values)]
+    first, finite = _first_numbers(times), times.values[np.isfinite(times.values)]
     if first.size < 2:
         return name
-    return f"{name} ({first[0]:.6g} to {known[-1]:.6g}, {median(np.diff(first)):.3g} apart)"
+    return f"{name} ({first[0]:.6g} to {finite[-1]:.6g}, {median(np.diff(first)):.3g} apart)"

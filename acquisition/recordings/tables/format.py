@@ -132,8 +132,10 @@ def text_format(
         ends = [*(begin for begin, _ in begins[1:]), len(text)]
         return [
             table
-            for (begin, own), end in zip(begins, ends, strict=True)
-            for table in _tables(path, text, begin, replace(own, title=titles, run=own.run if several else ""), end)
+            for (begin, of_table), end in zip(begins, ends, strict=True)
+            for table in _tables(
+                path, text, begin, replace(of_table, title=titles, run=of_table.run if several else ""), end
+            )
         ]
 
     return ColumnFormat(name, title, evidence, tables)
@@ -142,8 +144,8 @@ def text_format(
 def _tables(path: str, text: Text, begin: int, header: Header, stop: int) -> list[Table]:
     """Read the rows below a header that begins at a line."""
     read = read_rows(path, text, begin + header.lines, stop, header.delimiter, header.clock)
-    stated = {each.name: getattr(header, each.name) for each in fields(TableFacts)}
-    common = replace(read, **{**stated, "traps": (*header.traps, *read.traps)})
+    facts = {each.name: getattr(header, each.name) for each in fields(TableFacts)}
+    common = replace(read, **{**facts, "traps": (*header.traps, *read.traps)})
     tables = side_by_side(common, header.headings, header.run)
     if not tables:
         raise FormatError(path, "expected a column beside the times, got none", "export what was measured too")

@@ -68,8 +68,8 @@ def find_table(lines: tuple[str, ...]) -> Layout | None:
     separator gives the earliest rows; among several such separators, it is one that also fits a line of names.
     """
     candidates = []
-    stated = _SEP.match(lines[0]) if lines else None
-    for order, mark in enumerate(stated[1] if stated else _MARKS):
+    separator_line = _SEP.match(lines[0]) if lines else None
+    for order, mark in enumerate(separator_line[1] if separator_line else _MARKS):
         # Without its mark each line is a single cell, a case that the first separator has covered.
         if (not order or not mark or any(mark in each for each in lines)) and (table := _split_by(lines, mark)):
             candidates.append(((table.at, not table.named, not _is_separator(table), order), table))
@@ -99,7 +99,11 @@ def _split_by(lines: Sequence[str], mark: str) -> Layout | None:
         width = max((len(row) for row in probe if _is_row(row)), default=0) if mark else len(first)
         like = [_alike(row, first, width, mark) for row in probe]
         if sum(like[:_FEWEST]) == _FEWEST and sum(like) >= _SOUND * len(like):
-            rows = [own for own, row in zip(cells[at:], kinds[at:], strict=True) if _alike(row, first, width, mark)]
+            rows = [
+                cells_of_row
+                for cells_of_row, row in zip(cells[at:], kinds[at:], strict=True)
+                if _alike(row, first, width, mark)
+            ]
             padded = tuple(tuple(row + [""] * (width - len(row))) for row in rows)
             return _with_names(lines, filled[at], mark, width)._replace(rows=padded)
     return None
@@ -163,8 +167,8 @@ def _with_names(lines: Sequence[str], start: int, mark: str, width: int) -> Layo
         names, units = units, names  # a single line of words contains names, even if some of the words are also units
     headings = []
     for name, unit in zip(names, units, strict=True):
-        plain, own = heading_of(name)
-        headings.append(Heading(plain, own or unit.strip(" ()[]")))
+        plain, of_heading = heading_of(name)
+        headings.append(Heading(plain, of_heading or unit.strip(" ()[]")))
     preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t;,")))
     return Layout(preamble, tuple(headings), spare, start, mark)
 
@@ -188,14 +192,14 @@ def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[
 def _splits(line: str, mark: str, width: int) -> Iterator[list[str]]:
     """Yield the possible splits of a line into cells, with the most likely split first."""
     by_mark = split_heading(line) if any(each in line for each in "\t;,") else ([line], "")
-    own = [cell.strip().strip('"') for cell in line.split(mark)] if mark and '"' not in line else by_mark[0]
+    by_this_mark = [cell.strip().strip('"') for cell in line.split(mark)] if mark and '"' not in line else by_mark[0]
     if mark and mark in line:
-        if len(merged := _with_units(own)) == width < len(own):
+        if len(merged := _with_units(by_this_mark)) == width < len(by_this_mark):
             yield merged
-        while len(own) > width and not own[-1]:
-            own.pop()
-        if len(own) >= width or 2 * len(own) > width > 2:
-            yield own
+        while len(by_this_mark) > width and not by_this_mark[-1]:
+            by_this_mark.pop()
+        if len(by_this_mark) >= width or 2 * len(by_this_mark) > width > 2:
+            yield by_this_mark
         return
     if len(by_mark[0]) == width and (width > 1 or by_mark[1] == ""):
         yield by_mark[0]
@@ -237,15 +241,15 @@ def wrong_commas(table: Layout) -> bool:
 def _are_units(cells: Sequence[str]) -> bool:
     """Return whether a line contains units: at least half of its words are units or bracketed, and none means time."""
     filled = [cell for cell in cells if cell]
-    known = [
+    measures = [
         measure_of(plain) is not None or time_unit(plain) is not None or bool(_BRACKETED.fullmatch(cell))
         for cell in filled
         if parse_number(cell) is None
         for plain in (cell.strip(" ()[]"),)
     ]
     return (
-        bool(known)
-        and sum(known) * 2 >= len(known)
+        bool(measures)
+        and sum(measures) * 2 >= len(measures)
         and not any(is_time(cell) and not re.fullmatch(r"[(\[]?[mnuµμ]?s(ec)?[)\]]?", cell) for cell in filled)
     )
 
@@ -263,9 +267,11 @@ def are_row_numbers(column: F8) -> bool:
 
 def runs_forward(column: F8) -> bool:
     """Return whether a column rises in all but a few rows."""
-    known = column[np.isfinite(column)]
-    steps = np.diff(known)
-    return bool(known.size >= 3 and known[-1] > known[0] and np.mean(steps >= 0) >= 0.95 and np.mean(steps > 0) >= 0.5)
+    finite = column[np.isfinite(column)]
+    steps = np.diff(finite)
+    return bool(
+        finite.size >= 3 and finite[-1] > finite[0] and np.mean(steps >= 0) >= 0.95 and np.mean(steps > 0) >= 0.5
+    )
 
 
 def _is_even(column: F8) -> bool:

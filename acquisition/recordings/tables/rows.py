@@ -66,9 +66,9 @@ def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: in
                     raise FormatError(path, problem, _REMEDY)
         count, last = count + len(rows), rows[-1]
     columns, commas = [], []
-    for own in pieces:
-        values, decimals, comma = (np.concatenate(each) for each in zip(*own, strict=True))
-        own.clear()
+    for of_column in pieces:
+        values, decimals, comma = (np.concatenate(each) for each in zip(*of_column, strict=True))
+        of_column.clear()
         columns.append(Column("", "", values, decimals))
         commas.append(comma)
     traps = _decimal_marks(path, columns, commas)
@@ -88,11 +88,11 @@ def read_rows(path: str, text: Text, first: int, stop: int, mark: str, clock: in
 
 def count_from_first(column: Column) -> None:
     """Make times of day seconds since the first one, in place; midnight may lie between them."""
-    known = np.flatnonzero(column.forms >= 0)
-    if known.size:
-        at = column.values[known]
+    filled = np.flatnonzero(column.forms >= 0)
+    if filled.size:
+        at = column.values[filled]
         days = np.concatenate(([0.0], np.cumsum(np.diff(at) < -43200.0)))
-        column.values[known] = np.round(at - at[0] + 86400.0 * days, column.forms[known].max())
+        column.values[filled] = np.round(at - at[0] + 86400.0 * days, column.forms[filled].max())
 
 
 def _decimal_marks(path: str, columns: Sequence[Column], commas: Sequence[B1]) -> tuple[FormatIssue, ...]:

@@ -210,9 +210,13 @@ def side_by_side(table: Table, headings: Sequence[Heading], run: str = "") -> li
             channels.setdefault((each.run, times.get(each.run)), []).append(columns[at])
     return [
         replace(
-            table, columns=tuple(own), times=None if time is None else columns[time], run=own_run or run, beside=columns
+            table,
+            columns=tuple(of_channel),
+            times=None if time is None else columns[time],
+            run=own_run or run,
+            beside=columns,
         )
-        for (own_run, time), own in channels.items()
+        for (own_run, time), of_channel in channels.items()
     ]
 
 

@@ -118,10 +118,10 @@ def restated(path: str, data: bytes, delimiter: str | None, decimal: str | None)
 def in_turn(kinds: Sequence[object]) -> int | None:
     """Return the first of lines of two kinds that come in turn, given the kinds of lines (false for no row)."""
     first = next((at for at, kind in enumerate(kinds) if kind), 0)
-    one, two = kinds[first : first + 2 * _TURNS : 2], kinds[first + 1 : first + 2 * _TURNS : 2]
-    if len(two) < _TURNS or len({*one}) > 1 or len({*two}) > 1:
+    odd, even = kinds[first : first + 2 * _TURNS : 2], kinds[first + 1 : first + 2 * _TURNS : 2]
+    if len(even) < _TURNS or len({*odd}) > 1 or len({*even}) > 1:
         return None
-    return first if two[0] and one[0] != two[0] else None
+    return first if even[0] and odd[0] != even[0] else None
 
 
 def text_of(path: str, data: bytes) -> Text:

@@ -40,7 +40,7 @@ def guarded(app: ASGIApp, access: Access, hosts: Iterable[str] = ()) -> ASGIApp:
     ``auth.scopes`` of its requests contains :data:`VIEW` and, for the controller, :data:`ACT`. ``hosts`` are names
     besides those of the loopback.
     """
-    known = TrustedHostMiddleware(
+    own_hosts_only = TrustedHostMiddleware(
         AuthenticationMiddleware(app, access, access.answer), [*LOOPBACK, *hosts], www_redirect=False
     )
 
@@ -56,7 +56,7 @@ def guarded(app: ASGIApp, access: Access, hosts: Iterable[str] = ()) -> ASGIApp:
             if message["type"] != "websocket.http.response.body":
                 await send(message)
 
-        await known(scope, receive, sending)
+        await own_hosts_only(scope, receive, sending)
 
     return with_headers
 
