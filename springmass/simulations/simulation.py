@@ -24,6 +24,7 @@ from pipeline.results.effects import Effect
 from pipeline.track import F8
 from springmass.errors import ProgramError
 from springmass.result.run_json import picked, plain
+from springmass.simulations.from_run import scene_from_run
 
 DEFAULT_TOLERANCE = 1e-6
 FINE = 24.0  # states per radian; interpolation between them has an error of 1e-8 of the amplitude
@@ -63,8 +64,6 @@ def prepare(scene: Scene, seconds: float, *, analysis: Analysis | None = None, w
     """
     derived, measured = needs_drag(scene), None
     if analysis is not None:
-        from springmass.simulations.against import scene_from_run
-
         scene, measured = scene_from_run(scene, analysis, damping=not derived)
     from_run = () if measured is None else measured.names
     solved, problem, drag = scene, Problem.from_scene(scene, where=where), None
