@@ -34,7 +34,7 @@ PAGE_FILES = Path(__file__).parents[1] / "static"
 TURN_S = 0.0225
 """Time between two reads of the log: little longer than a screen frame; samples reach the screen within 40 ms."""
 MANY_VIEWERS, EVERY = 4, 4
-"""With more viewers than MANY, samples are sent after every fourth read of the log, eleven times a second."""
+"""With more viewers than MANY_VIEWERS, samples are sent after every fourth read of the log, eleven times a second."""
 STATE_S = 0.5
 LAST_S = 1.5
 """Time for which the page is still served after the end, so that viewers see that the run has ended."""
