@@ -13,7 +13,7 @@ help:
 	@echo "make golden   every output of 0.2.0 against today's: 4 minutes"
 	@echo "make trials   what many seeds, kills and long runs show: an hour"
 	@echo "make nightly  trials, docs, firmware, smallest versions, planted faults and checks of the project's files: two hours"
-	@echo "make mutants  planted faults, and whether tests and goldens notice them: an hour"
+	@echo "make mutants  planted faults, and whether tests and goldens notice them: a quarter of an hour"
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
 	@echo "make lint     ruff, mypy, import contracts, spelling"

@@ -75,9 +75,7 @@ def caught_by(fault: Fault) -> str:
         package = fault.file.partition("/")[0]
         everything = (*PYTEST, "tests", "acquisition", "pipeline", "storage", "springmass")
         near = (*PYTEST, *(each for each in FIRST[package] if (copy / each).exists()))
-        # The goldens hold estimates: they are the fastest net for the pipeline and the slowest for the others.
-        stages = (near, GOLDEN, everything) if package == "pipeline" else (near, everything, GOLDEN)
-        for stage in stages:
+        for stage in (near, GOLDEN, everything):  # in the order of their times
             if seen := _notices(stage, copy):
                 return seen
     return ""
