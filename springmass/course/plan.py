@@ -10,6 +10,7 @@ import io
 import json
 import os
 import re
+import subprocess
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -22,9 +23,10 @@ from acquisition.recordings.identify import dialect_folder
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.registry.laws import ANY_LAW, law_names
+from springmass import __version__
 from springmass.course.rows import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.layout import PACKAGES, part
+from springmass.layout import part
 from springmass.runs.inputs import InputFile, files_of
 from springmass.runs.options import HOW, How
 from springmass.runs.outputs import numbered
@@ -33,7 +35,6 @@ from springmass.runs.scenes import about_path, read_scene
 from springmass.runs.tables import Row, read_rows
 
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
-_CODE = (".py", ".toml", ".j2", ".css", ".js")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ class Job:
         """Return a digest of all on which the run's row and report depend; this reads the files."""
         files = (self.path, self.how.get("velocity"), str(about_path(Path(self.path))))
         read = [digest_of(self.whole(path)) if path else "" for path in files]
-        return _digest([*read, self.digests(), code_sha256()])
+        return _digest([*read, self.digests(), software()])
 
     def task(self) -> Task:
         """Return what every process can analyse."""
@@ -165,15 +166,25 @@ def names_of(jobs: Sequence[Job]) -> list[str]:
 
 
 @functools.cache
-def code_sha256() -> str:
-    """Return the digest of the program, the versions of its libraries and the user's dialects."""
-    # In a wheel the packages are in another place; without ``part``, rows of an older program would count as unchanged.
-    rooms = [*map(part, PACKAGES), Path(__file__).resolve().parents[1]]
-    files = [file for room in rooms for file in sorted(room.rglob("*")) if file.suffix in _CODE]
-    if (dialects := dialect_folder()).is_dir():
-        files += sorted(dialects.glob("*.toml"))
-    versions = [f"{name} {version(name)}".encode() for name in _LIBRARIES]
-    return hashlib.sha256(b"\0".join([*versions, *map(read_regular, files)])).hexdigest()
+def software() -> str:
+    """Return what a row depends on besides its run: the program, its libraries and the user's dialects."""
+    parts = [f"springmass {__version__}{_commit()}", *(f"{name} {version(name)}" for name in _LIBRARIES)]
+    if dialects := sorted(dialect_folder().glob("*.toml")):
+        parts.append(f"dialects {hashlib.sha256(b''.join(map(read_regular, dialects))).hexdigest()[:12]}")
+    return ", ".join(parts)
+
+
+def _commit() -> str:
+    """Return the commit of a checkout, with a digest of its uncommitted changes; empty elsewhere, and without git."""
+    if not part(".git").exists():  # a wheel's environment may lie in the repository of another project
+        return ""
+    git = ["git", "-C", str(part(""))]
+    try:
+        commit = subprocess.check_output([*git, "rev-parse", "--short=12", "HEAD"], stderr=subprocess.DEVNULL)
+        changes = subprocess.check_output([*git, "diff", "HEAD"], stderr=subprocess.DEVNULL)
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return f"+{commit.decode().strip()}" + (f".{hashlib.sha256(changes).hexdigest()[:12]}" if changes else "")
 
 
 def digest_of(path: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 from springmass.course.benches import compare_rows
 from springmass.course.executors import outcomes, workers
 from springmass.course.page import line_of, mark, write_groups, write_page
-from springmass.course.plan import Job, Plan, code_sha256, names_of
+from springmass.course.plan import Job, Plan, names_of, software
 from springmass.course.rows import COURSE, FAILED, write_rows
 from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
@@ -78,7 +78,7 @@ def _analysed(todo: Sequence[Job], jobs: int | None, dask: str | None) -> Iterat
     with workers(len(todo), jobs, dask) as by:
         for done in outcomes(analyse_one, todo, by):
             rows = [(job, row or blank_row(job, "ended", f"{job.path}: {_DIED}")) for job, row in done]
-            if any(row["code_sha256"] != code_sha256() for _, row in rows):
+            if any(row["software"] != software() for _, row in rows):
                 wrong = "a worker has another version of springmass or of its libraries; install the same everywhere"
                 raise ProgramError(f"{dask}: {wrong}")
             yield rows

@@ -16,7 +16,7 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
 from springmass.charts.several import LARGEST, drag_points, outline
-from springmass.course.plan import Job, code_sha256, digest_of
+from springmass.course.plan import Job, digest_of, software
 from springmass.course.rows import ESTIMATES
 from springmass.errors import internal_error, quietly
 from springmass.report.advice import Harm, harm_of, sentence
@@ -71,7 +71,7 @@ def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, An
         "errors": 0,
         "warnings": 0,
         **job.digests(),
-        "code_sha256": code_sha256(),
+        "software": software(),
         "tell": [],  # what the group should know: each harmful finding with its advice, the worst first
         "thumbnail": "",
     }
