@@ -8,7 +8,7 @@ import io
 import json
 import logging
 import socket
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from springmass.errors import SENSOR, ProgramError, complain
-from springmass.page.state import PageState
+from springmass.page.state import REQUESTS, PageState
 from springmass.page.view import View, json_of
 from springmass.page.web.security import ACT, REPORT, Access, guarded
 from springmass.session.failures import raised_at
@@ -41,22 +41,6 @@ MOST_CONNECTIONS = 256
 LONGEST_MESSAGE, LONGEST_TEXT = 4096, 500
 """Maximum size of a browser's message in bytes, and of a text in it in characters."""
 A_LINE_EVERY_S = 60.0
-Limits = tuple[float, float]
-ANY_TIME: Limits = (-1e12, 1e12)
-REQUESTS: Mapping[str, Mapping[str, Limits | None]] = {
-    "region": {"from": ANY_TIME, "to": ANY_TIME},
-    "zero": {},
-    "arm": {"threshold_m": (1e-4, 1.0), "keep_s": (0.0, 60.0)},
-    "disarm": {},
-    "record": {},
-    "mark": {"text": None},
-    "note": {"text": None},
-    "stop": {},
-    "report": {},
-    "discard": {},
-    "close": {},
-}
-"""Requests with the limits of their numbers, in m and s; None is a text. Any viewer may ask for a region."""
 
 
 class Refused(Exception):
@@ -68,7 +52,7 @@ def checked(text: str | None) -> dict[str, Any]:
     try:
         request = json.loads(text or "")
         found = {"type": request["type"]}
-        for name, limits in REQUESTS[request["type"]].items():
+        for name, limits in REQUESTS[request["type"]][0].items():
             if limits is None:
                 found[name] = " ".join(request[name].split())[:LONGEST_TEXT]
             elif limits[0] <= (number := float(request[name])) <= limits[1]:
