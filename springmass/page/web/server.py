@@ -40,7 +40,6 @@ ALONE_S = 30.0
 MOST_CONNECTIONS = 256
 LONGEST_MESSAGE, LONGEST_TEXT = 4096, 500
 """Maximum size of a browser's message in bytes, and of a text in it in characters."""
-A_LINE_EVERY_S = 60.0
 
 
 class Refused(Exception):
@@ -260,25 +259,19 @@ def serve(
 
 
 class _Lines(logging.Handler):
-    """Writes each record as one line without a traceback; of each level, at most one line a minute in all."""
+    """Writes each kind of message once, as one line without a traceback, whatever clients do and however often."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self._written_s: dict[int, float] = {}
-        self._left_out = 0
+        self._written: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
-        now_s = record.relativeCreated / 1e3
-        if now_s - self._written_s.get(record.levelno, -A_LINE_EVERY_S) < A_LINE_EVERY_S:
-            self._left_out += 1
+        if record.msg in self._written:
             return
-        self._written_s[record.levelno] = now_s
+        self._written.add(record.msg)
         text = " ".join(record.getMessage().split())[:300]
         if record.exc_info and (error := record.exc_info[1]) is not None:
             text += f": {type(error).__name__} at {raised_at(error)}: {one_line(error)[:200]}"
-        if self._left_out:
-            text += f" ({self._left_out} earlier messages were left out)"
-            self._left_out = 0
         complain(f"page: {text}")
 
 
