@@ -42,7 +42,7 @@ GROW_U = float(os.environ.get("US", TOLERANCE)) / TOLERANCE
 KEPT = ("quality", "estimates", "spring", "joint_damping", "comparison", "classic", "equation", "method", "amplitude_m")
 STANDARDISED = ("pull", "chi2", "excess_chi2")
 """Numbers in units of a standard uncertainty, or squares of such: ten thousandths of it are rounding."""
-COURSE_LEFT_OUT = ("path", "error", "messages", "correlations", "drag_points")
+COURSE_LEFT_OUT = ("path", "error", "messages", "correlations", "drag_points", "software")
 
 BENCH = {
     "--mass-kg": ("--mass-u-kg", "bob.mass_kg"),
