@@ -100,7 +100,7 @@ class Server:
         page = self._page
         page.poll()
         if page.watcher is not None:
-            self._texts |= {"motion": page.watcher.text, "now": page.watcher.now_text}
+            self._texts |= {"motion": page.watcher.text, "update": page.watcher.update}
         self._due_s -= TURN_S
         if self._due_s <= 0.0 or self._bench is not page.bench:
             self._due_s, self._bench = STATE_S, page.bench
@@ -168,7 +168,7 @@ class Server:
                         frame = self._frame(view, number, sent[number])
                         sent[number] += (len(frame) - 16) // 16
                         await browser.send_bytes(frame)
-                for kind in ("state", "motion", "now"):
+                for kind in ("state", "motion", "update"):
                     if view is not self._page.view:
                         break  # it was replaced meanwhile; texts about the next one must wait for its hello message
                     text = self._texts.get(kind, "")
