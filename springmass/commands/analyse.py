@@ -146,7 +146,7 @@ def _failed(failed: Failed) -> int:
     """Say why a recording gives no run; the remedy of a question names the command for this recording alone."""
     task, message = failed.task, failed.message
     if failed.question is not None:
-        path = f"./{task.path}" if task.path.startswith("-") else task.path
+        path = f"./{task.source}" if task.source.startswith("-") else task.source
         words = ["springmass", "analyse", path, *option_words(task.how.given())]
         message = str(failed.question.with_remedy(for_command(failed.question.question, words)))
     complain(message)

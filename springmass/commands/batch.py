@@ -51,7 +51,7 @@ def batch(
     if not inputs and options.runs is None:
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them")
     if options.template:
-        table = template([job.path for job in plan(inputs).jobs])
+        table = template([task.name for task in plan(inputs).tasks])
         # A file gets the paths unchanged, because they are read back from it.
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK

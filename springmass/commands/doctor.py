@@ -7,6 +7,7 @@ import importlib.metadata
 import importlib.util
 import json
 import platform
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -16,11 +17,8 @@ from springmass.commands.options import Json
 from springmass.errors import OK, SOME_FAILED, ProgramError, suggest
 from springmass.layout import PACKAGES, PREFIX, part
 
-LIBRARIES = (
-    *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
-    *("serial", "nptdms", "python_calamine", "rich", "cyclopts", "tomli_w", "platformdirs", "starlette", "uvicorn"),
-    *("websockets", "segno", "msgspec"),
-)
+MODULES = {"pyserial": "serial"}
+"""The modules of libraries that have another name than their distribution."""
 Check = tuple[str, bool, str, str]
 """The name of a check, whether it is met, what was found, and what to do if it is not."""
 
@@ -59,11 +57,17 @@ def _packages() -> Iterator[Check]:
 
 
 def _libraries() -> Iterator[Check]:
-    for name in LIBRARIES:
-        remedy = "install springmass again: pip install --force-reinstall"
+    """Check that each library that the distribution springmass requires can be imported."""
+    remedy = "install springmass again: pip install --force-reinstall"
+    try:
+        required = importlib.metadata.requires("springmass") or ()
+    except importlib.metadata.PackageNotFoundError:
+        yield "libraries", False, "springmass itself is not installed", "install it: pip install -e CHECKOUT"
+        return
+    for name in (re.split(r"[^\w.-]", line)[0] for line in required if "extra ==" not in line):
         try:
-            importlib.import_module(name)
-            found, ok = importlib.metadata.version({"serial": "pyserial"}.get(name, name)), True
+            importlib.import_module(MODULES.get(name, name.lower().replace("-", "_")))
+            found, ok = importlib.metadata.version(name), True
         except ImportError as error:
             found, ok = str(error), False
         yield f"library {name}", ok, found, remedy

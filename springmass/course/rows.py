@@ -31,9 +31,9 @@ DETAILS = ("findings", "messages", "correlations", "drag_points")
 """Columns that contain JSON."""
 _FIRST = ("run", "path", "status", "error")
 _LAWS = ("law", "admissible", "stated_law", "one_law", "undetermined")
-_HASHES = ("input_sha256", "scene_sha256", "parameters_sha256", "code_sha256")
+_ORIGIN = ("input_sha256", "scene_sha256", "parameters_sha256", "software")
 COLUMNS = (
-    *_FIRST, "format", "kind", "channel", "unit", "start_time", "clock", *_LAWS, *WHOLE, *NUMBERS, *_HASHES, *DETAILS,
+    *_FIRST, "format", "kind", "channel", "unit", "start_time", "clock", *_LAWS, *WHOLE, *NUMBERS, *_ORIGIN, *DETAILS,
 )  # fmt: skip
 COURSE = "course"
 """Column with the folder of the course, used when several courses are read together."""

@@ -125,9 +125,6 @@ def run_dataset(run: Run) -> xr.Dataset:
     return found.assign_coords(coordinates).assign(variables).assign_attrs(name=run.name)
 
 
-MOST_ROWS = 1_000_000
-
-
 def smoothed_or_why(analysis: Analysis) -> Smoothed | str:
     """Return the smoothed motion, or the reason in words why there is none."""
     if not isinstance(analysis.motion, Oscillation):

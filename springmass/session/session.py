@@ -365,7 +365,6 @@ class Session:
             unshown=tee.unshown,
             gone=tuple(tee.gone.values()),
             silent_s=shown.silent_s(now_ns),
-            missing_share=shown.missing_share,
             trouble=trouble_of(shown, chains, waiting=waiting),
             marks=[((host_ns - zero_ns) * 1e-9, text) for host_ns, text in self._marks],
             tick=tick,
