@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any, TypeVar
 
-from springmass.errors import SOME_FAILED, ProgramError, adopt, manner
+from springmass.errors import LOG, SOME_FAILED, ProgramError, print_messages
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -156,7 +156,7 @@ def pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     """
     others = set(active_children())
     # New processes are spawned, because a fork of a process with linear-algebra threads may hang.
-    with ProcessPoolExecutor(processes, get_context("spawn"), _begin, manner()) as executor:
+    with ProcessPoolExecutor(processes, get_context("spawn"), _begin, (LOG.getEffectiveLevel(),)) as executor:
         try:
             yield executor
         except BaseException:
@@ -165,13 +165,13 @@ def pool(processes: int) -> Iterator[ProcessPoolExecutor]:
             raise
 
 
-def _begin(quiet: bool, verbose: bool) -> None:
+def _begin(level: int) -> None:
     """Leave Ctrl-C to the parent process, and end with it.
 
     A pool's process would otherwise wait forever if its parent is killed.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    adopt(quiet, verbose)
+    print_messages(level)
     parent = parent_process()
     if parent is not None:
 

@@ -17,7 +17,7 @@ from springmass.course.plan import Job, Plan, code_sha256, names_of
 from springmass.course.rows import COURSE, FAILED, write_rows
 from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
-from springmass.errors import ProgramError, complain, manner
+from springmass.errors import LOG, ProgramError
 from springmass.report.html import SHARED, report_script
 from springmass.terminal.progress import counting
 from storage.atomic import write_whole, writing
@@ -43,7 +43,7 @@ def run_course(
             shutil.rmtree(page.parent)
     done = made_of.keys() - {job.key for job in todo}
     made, written = 0, len(done)
-    with counting("runs", len(todo), lines=True, quiet=manner()[0]) as show:
+    with counting("runs", len(todo), lines=True) as show:
         for rows in _analysed(todo, jobs, dask):
             # A run during which a worker died is tried again by the next pass.
             store.add((job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows)
@@ -54,7 +54,7 @@ def run_course(
                 written = len(done)
             for _, row in rows:
                 if row["status"] in FAILED:
-                    complain(row["error"])
+                    LOG.warning(row["error"])
             show(made)
     table = _table(course, store, done)
     write_rows(folder, table, course.tags)
@@ -99,7 +99,7 @@ def _write_pages(course: Plan, folder: Path, table: Sequence[Row], reports: int,
     tasks = [(name, job, page.parent) for name, job, page in named if not page.exists()]
     unwritten: list[str] = []
     finished = 0
-    progress = counting("reports", len(tasks), lines=True, quiet=manner()[0])
+    progress = counting("reports", len(tasks), lines=True)
     with workers(len(tasks), jobs) as by, progress as show:
         for written in outcomes(write_report_of, tasks, by):
             unwritten += [f"{job.path}: {_DIED}" if why is None else why for (_, job, _), why in written if why != ""]

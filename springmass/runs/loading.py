@@ -24,7 +24,7 @@ from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
 from pipeline.track import Track
-from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
+from springmass.errors import LOG, UNREADABLE, ProgramError
 from springmass.layout import STDIN, part
 from springmass.runs.inputs import kind_of
 from springmass.runs.options import READ, ReadOptions
@@ -101,10 +101,10 @@ def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = F
         loaded = _from_recording(where, open_recording(where, velocity_path=options.velocity, **stated))
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
-            complain(f"{where}: {trap.message}")
+            LOG.warning(f"{where}: {trap.message}")
     about = about_of(where)
     if described := about.described(scene=not scene_given):
-        tell(f"{about.path}: {described} read from the notes next to the file")
+        LOG.info(f"{about.path}: {described} read from the notes next to the file")
     if about.described():
         scene = loaded.scene if about.scene is None else about.scene.to_mapping()
         marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
@@ -113,7 +113,7 @@ def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = F
             noted["notes"] = list(about.notes)
         loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
     summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
-    detail(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
+    LOG.debug(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
     return within(loaded, options)
 
 
@@ -238,7 +238,7 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
         parts = report.parts_of(int(wanted[0]))
         longest = max(parts, key=lambda run: run.samples)
         if len(parts) > 1:
-            tell(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
+            LOG.info(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
         loaded = _load_run(longest.path)
         originals = loaded.originals  # read while the run file exists
     return replace(
