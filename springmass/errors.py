@@ -47,13 +47,10 @@ class _Stderr(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         text = record.getMessage()
         if record.levelno >= logging.WARNING:  # a file name or a library's message may contain line breaks
-            _write(f"springmass: {' '.join(text.splitlines())}")
-        elif record.levelno != HINT:
-            _write(text)
-        else:
-            with contextlib.suppress(OSError, ValueError):  # stderr is closed
-                if sys.stderr is not None and sys.stderr.isatty():
-                    _write(f"next: {text}")
+            text = f"springmass: {' '.join(text.splitlines())}"
+        elif record.levelno == HINT:
+            text = f"next: {text}"
+        _write(text, only_terminal=record.levelno == HINT)
 
 
 _STDERR = _Stderr()
@@ -107,8 +104,9 @@ def internal_error(error: BaseException) -> str:
     return f"internal error: {what}; please report it, details in {file.name}"
 
 
-def _write(message: str) -> None:
+def _write(message: str, *, only_terminal: bool = False) -> None:
     from acquisition.errors import visible  # its package imports numpy, which `--help` does not need
 
     with contextlib.suppress(OSError, ValueError):  # stderr cannot be written; the exit code still reports the error
-        print(visible(message), file=sys.stderr)
+        if not only_terminal or (sys.stderr is not None and sys.stderr.isatty()):
+            print(visible(message), file=sys.stderr)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,7 +18,7 @@ from pipeline.results.compare import SpringRun
 from springmass.charts.several import LARGEST, drag_points, outline
 from springmass.course.plan import Job, code_sha256, digest_of
 from springmass.course.rows import ESTIMATES
-from springmass.errors import at_level, internal_error
+from springmass.errors import internal_error
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.html import SHARED
 from springmass.runs.questions import for_course
@@ -35,17 +34,16 @@ def write_report_of(task: tuple[str, Job, Path]) -> str:
     from springmass.report.write import write_report
 
     name, job, folder = task
-    with at_level(logging.WARNING):
-        (run,) = analyse_all([job.task()])
-        if isinstance(run, Failed):
-            return _line(job, run)
-        try:
-            run = run.named(name, loaded=replace(run.loaded, path=Path(job.path)), time_utc=TIME)
-            write_report(folder, [run], script=f"../../{SHARED}")
-        except WriteFailed as error:
-            return str(error)
-        except Exception as error:  # a defect in the program must not stop the reports of other runs
-            return f"{job.path}: {internal_error(error)}"
+    (run,) = analyse_all([job.task()])
+    if isinstance(run, Failed):
+        return _line(job, run)
+    try:
+        run = run.named(name, loaded=replace(run.loaded, path=Path(job.path)), time_utc=TIME)
+        write_report(folder, [run], script=f"../../{SHARED}")
+    except WriteFailed as error:
+        return str(error)
+    except Exception as error:  # a defect in the program must not stop the reports of other runs
+        return f"{job.path}: {internal_error(error)}"
     return ""
 
 
@@ -53,8 +51,7 @@ def analyse_one(job: Job) -> dict[str, Any]:
     """Return the row of a run, identical on every machine and at every time; a run that fails has one as well."""
     row = blank_row(job)
     row["input_sha256"] = digest_of(job.whole(job.path)) or None
-    with at_level(logging.WARNING):  # messages about a recording go into its row
-        (run,) = analyse_all([job.task()])
+    (run,) = analyse_all([job.task()])
     if isinstance(run, Failed):
         return row | {"error": _line(job, run)}
     try:
