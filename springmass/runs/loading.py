@@ -17,6 +17,7 @@ import numpy as np
 from acquisition.block import Block, SourceInfo
 from acquisition.decoders.family import RESONATOR_PPM
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.events import Triggered, recorded_events
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.clock_fit import fit_clock
 from acquisition.recordings.identify import open_recording
@@ -285,7 +286,7 @@ def to_track(
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
     stated = provenance or {}
-    moments = [event["t_s"] for event in stated.get("events", ()) if event.get("kind") == "trigger"]
+    moments = [t_s for t_s, event in recorded_events(stated) if isinstance(event.typed, Triggered)]
     return Track(
         t=samples.t,
         y=samples.distance,
