@@ -112,6 +112,10 @@ class Calibrated(_Typed, frozen=True, tag="calibration"):
 Event = Lost | Reopened | Replaced | Continued | TimedOut | Dropped | Zeroed | Triggered | Noted | RunEnded | Calibrated
 
 
+class _OfAnyKind(Struct, frozen=True):
+    event: Event  # a field, because msgspec prepares a union anew for each conversion, which takes 0.2 ms
+
+
 class StoredEvent(Struct, frozen=True, forbid_unknown_fields=True):
     """An event as it is stored: its kind and its facts, whatever they are."""
 
@@ -126,10 +130,9 @@ class StoredEvent(Struct, frozen=True, forbid_unknown_fields=True):
 
 def _typed(kind: str, facts: Mapping[str, Any]) -> Event | None:
     try:
-        typed: Event = convert({**facts, "kind": kind}, Event)
+        return convert({"event": {**facts, "kind": kind}}, _OfAnyKind).event
     except (ValidationError, UnicodeEncodeError):  # a name may have half a surrogate pair
         return None
-    return typed
 
 
 def recorded_events(provenance: Mapping[str, Any]) -> list[tuple[float, StoredEvent]]:
