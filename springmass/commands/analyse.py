@@ -17,18 +17,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from springmass.commands.options import FURTHER, BenchOptions, Figures, File, Json, Scenes, Strict
-from springmass.errors import (
-    OK,
-    REJECTED,
-    SOME_FAILED,
-    UNREADABLE,
-    USAGE,
-    ProgramError,
-    complain,
-    manner,
-    suggest,
-    tell,
-)
+from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError
 from springmass.layout import STDIN
 from springmass.parameters import argument, flag, option, output
 from springmass.runs.inputs import files_of
@@ -81,7 +70,7 @@ def analyse(
     scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
     found, folders = files_of(inputs)
     for line in folders:
-        tell(line)
+        LOG.info(line)
     alone = len(found) == 1
     names = [""] if alone else distinct_names(["stdin" if one.path == STDIN else one.path for one in found])
     how = replace(how, method=options.method)
@@ -123,7 +112,7 @@ def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptio
 
     runs: list[Run] = []
     codes: list[int] = []
-    for run in counted(analyse_all(tasks), len(tasks), "runs", quiet=manner()[0]):
+    for run in counted(analyse_all(tasks), len(tasks), "runs"):
         if isinstance(run, Failed):
             codes.append(_failed(run))
             continue
@@ -136,7 +125,7 @@ def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptio
     written = _write(out / TOGETHER, runs, options) if runs and out is not None else OK
     if len(runs) > 1:
         named = shlex.join(inputs)
-        suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
+        LOG.log(HINT, f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(*codes, written)
@@ -149,7 +138,7 @@ def _failed(failed: Failed) -> int:
         path = f"./{task.source}" if task.source.startswith("-") else task.source
         words = ["springmass", "analyse", path, *option_words(task.how.given())]
         message = str(failed.question.with_remedy(for_command(failed.question.question, words)))
-    complain(message)
+    LOG.warning(message)
     return failed.code
 
 
@@ -157,10 +146,10 @@ def _judged(run: Run, options: AnalyseOptions) -> int:
     """Return the exit code of an analysis, and say why it is not 0."""
     path = run.result["input"]["path"]
     if not run.ok:
-        complain(f"{path}: no oscillation: {run.why}")
+        LOG.warning(f"{path}: no oscillation: {run.why}")
         return UNREADABLE
     if options.strict and (wrong := rejected(run.result["findings"])):
-        complain(f"{path}: rejected under --strict: {', '.join(wrong)}")
+        LOG.warning(f"{path}: rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
 
@@ -205,8 +194,8 @@ def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> int:
     template = options.template if len(runs) == 1 else None
     try:
         make_folder(folder.parent)
-        tell(f"report: {write_report(folder, runs, figures=options.figures, template=template)}")
+        LOG.info(f"report: {write_report(folder, runs, figures=options.figures, template=template)}")
     except (ProgramError, WriteFailed) as error:
-        complain(f"{error}; --no-report writes no files")
+        LOG.warning(f"{error}; --no-report writes no files")
         return USAGE
     return OK

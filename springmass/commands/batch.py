@@ -15,7 +15,7 @@ from springmass.course.plan import plan, template
 from springmass.course.rows import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
-from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
+from springmass.errors import HINT, LOG, OK, SOME_FAILED, UNREADABLE, ProgramError
 from springmass.parameters import Count, WholeNumber, argument, flag, option, output
 from springmass.runs.options import How
 from springmass.runs.outputs import make_folder
@@ -70,16 +70,16 @@ def batch(
             output=str(folder),
         )
         for line in course.notes:
-            tell(line)
+            LOG.info(line)
         rows, made, unwritten = run_course(
             course, store, folder, jobs=options.jobs, dask=options.dask, reports=options.reports
         )
     for line in unwritten:
-        complain(line)
+        LOG.warning(line)
     failed = sum(row["status"] in FAILED for row in rows)
-    tell(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
-    suggest(f"open {folder / PAGE} in a browser")
-    tell(f"written: {folder / PAGE}, {folder / GROUPS}, {folder / CSV}; the data are in {folder / DATABASE}")
+    LOG.info(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
+    LOG.log(HINT, f"open {folder / PAGE} in a browser")
+    LOG.info(f"written: {folder / PAGE}, {folder / GROUPS}, {folder / CSV}; the data are in {folder / DATABASE}")
     if failed and failed == len(rows):
         return UNREADABLE
     return SOME_FAILED if failed or unwritten else OK

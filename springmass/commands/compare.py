@@ -16,7 +16,7 @@ from acquisition.errors import visible
 from pipeline.findings.finding import kinds
 from springmass.commands.options import Figures, File, Json, Scenes, Strict, refuse
 from springmass.course.rows import COURSE, is_course, read_rows
-from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
+from springmass.errors import HINT, LOG, OK, REJECTED, ProgramError
 from springmass.parameters import Share, argument, option, output
 from springmass.runs.comparing import Compared, beside, compare_runs, comparison_json
 from springmass.runs.json_results import SCHEMA, plain, provenance_of, rejected
@@ -82,13 +82,13 @@ def compare(
         from springmass.report.write import write_report
 
         page = write_report(out, runs, compared=compared, summary=result, figures=options.figures)
-        tell(f"report: {page}")
-        suggest(f"open {page} in a browser")
+        LOG.info(f"report: {page}")
+        LOG.log(HINT, f"open {page} in a browser")
     else:
-        suggest("the same command with -o DIR writes the report")
+        LOG.log(HINT, "the same command with -o DIR writes the report")
     findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
     if options.strict and (wrong := rejected(findings)):
-        complain(f"rejected under --strict: {', '.join(wrong)}")
+        LOG.warning(f"rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
 
@@ -110,11 +110,11 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     )
     wrong = {one.name for one in found.suspects}.union(*(one.names for one in found.disagreements))
     if options.strict and wrong:
-        complain(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
+        LOG.warning(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
         return REJECTED
     for suspect in found.suspects[:1]:
         path = next(row["path"] for row in rows if suspect.name in (row["run"], f"{row[COURSE]}: {row['run']}"))
-        suggest(f"springmass analyse {shlex.quote(path)}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(path)}")
     return OK
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 from acquisition.clock import VirtualClock
 from acquisition.replay import Replay
 from springmass.commands.options import File
-from springmass.errors import OK, suggest
+from springmass.errors import HINT, LOG, OK
 from springmass.parameters import output
 from springmass.report.write import write_report
 from springmass.runs.comparing import compare_runs
@@ -38,7 +38,9 @@ def demo(
         print(findings_text(one.result["findings"]))
     print(f"\n{compared.comparison.message}")
     print(f"\nReport: {write_report(out / 'demo.results', runs, compared=compared)}")
-    suggest("springmass analyse YOUR_RECORDING --scene BENCH.toml; springmass scene prints such a file to fill in")
+    LOG.log(
+        HINT, "springmass analyse YOUR_RECORDING --scene BENCH.toml; springmass scene prints such a file to fill in"
+    )
     return OK
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from springmass.commands.options import Json
-from springmass.errors import OK, SOME_FAILED, ProgramError, suggest
+from springmass.errors import HINT, LOG, OK, SOME_FAILED, ProgramError
 from springmass.layout import PACKAGES, PREFIX, part
 
 MODULES = {"pyserial": "serial"}
@@ -38,7 +38,7 @@ def doctor(*, as_json: Json = False) -> int:
         if not ok:
             print(visible(f"      {remedy}"))
     if whole:
-        suggest("springmass demo")
+        LOG.log(HINT, "springmass demo")
     return OK if whole else SOME_FAILED
 
 

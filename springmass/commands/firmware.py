@@ -15,7 +15,7 @@ from acquisition.decoders.line_protocol import FAMILY, LineProtocolDecoder
 from acquisition.errors import visible
 from acquisition.live.firmware import BAUDS, HEX, VERSION, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
-from springmass.errors import OK, SENSOR, ProgramError, suggest
+from springmass.errors import HINT, LOG, OK, SENSOR, ProgramError
 from springmass.parameters import Whole, option
 from springmass.session.sensors import outdated, settings_of
 
@@ -64,7 +64,7 @@ def firmware(
     if outdated(identity):
         _show_flashing(port)
     else:
-        suggest(f"springmass record --port {shlex.quote(port)} --page")
+        LOG.log(HINT, f"springmass record --port {shlex.quote(port)} --page")
     return OK
 
 

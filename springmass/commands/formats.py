@@ -15,7 +15,7 @@ from acquisition.recordings.identify import Inspection, inspect
 from acquisition.recordings.identify import formats as every_format
 from acquisition.recordings.recording import Survey
 from springmass.commands.options import PART, File, Json, refuse
-from springmass.errors import OK, suggest
+from springmass.errors import HINT, LOG, OK
 from springmass.parameters import argument
 from springmass.runs.inputs import kind_of
 from springmass.runs.json_results import picked, plain
@@ -53,7 +53,7 @@ def formats(
     for line in _lines(facts):
         print(visible(line))
     if "needs" not in facts:
-        suggest(f"springmass analyse {shlex.quote(str(file))}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(str(file))}")
     return OK
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 import threading
 import webbrowser
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from springmass.commands.options import PART, PageOptions, Recording, refuse
-from springmass.errors import OK, ProgramError, manner, tell
+from springmass.errors import LOG, OK, ProgramError
 from springmass.page.feeds import view_of
 from springmass.page.state import PageState
 from springmass.page.web.server import address_in_network, code_for_terminal, serve
@@ -58,8 +59,8 @@ def page(
         for line in lines:
             # For the page of a recording, the recorder prints these lines, because its progress would overwrite them.
             if not recorder:
-                tell(line)
-            elif not manner()[0]:
+                LOG.info(line)
+            elif LOG.isEnabledFor(logging.INFO):
                 _to_recorder({"type": "line", "text": line})
         if not page.no_browser:
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
@@ -68,7 +69,7 @@ def page(
         STOPS.end()  # the server handles signals itself
         serve(state, port=page.page_port, network=network, opened=opened, over=over.is_set)
     except KeyboardInterrupt:
-        tell("the page is closed")
+        LOG.info("the page is closed")
     except OSError as error:
         reason = error.strerror or str(error)
         raise ProgramError(f"--page-port {page.page_port}: {reason}; name another, or 0 for any") from error

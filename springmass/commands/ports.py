@@ -10,7 +10,7 @@ from acquisition.decoders.registry import families
 from acquisition.errors import visible
 from acquisition.live.serial_port import list_ports
 from springmass.commands.options import Json
-from springmass.errors import OK, suggest
+from springmass.errors import HINT, LOG, OK
 from springmass.parameters import flag, option
 from springmass.session.finding import listen
 from springmass.terminal.printing import wrapped
@@ -40,7 +40,7 @@ def ports(
         print(f"{family.name:<18} {family.rate_hz:>9.3g} {step:>9} {reach:>13} {family.baud:>7}")
         print(wrapped(f"    {family.title}. {family.limits}", "    "))
     known = [row["device"] for row in rows if row["families"]]
-    suggest(f"springmass record --port {shlex.quote(known[0])}" if known else "springmass record --simulate")
+    LOG.log(HINT, f"springmass record --port {shlex.quote(known[0])}" if known else "springmass record --simulate")
     return OK
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from springmass.commands.options import File, Overwrite
-from springmass.errors import OK, suggest, tell
+from springmass.errors import HINT, LOG, OK
 from springmass.parameters import SpeedOfSound, argument, option, output
 from springmass.runs.outputs import made_now
 from springmass.stops import STOPS
@@ -34,6 +34,6 @@ def recover(
         provenance=made_now(),
     )
     for line in report.describe():
-        tell(line)
-    suggest(f"springmass analyse {shlex.quote(str(report.main.path))}")
+        LOG.info(line)
+    LOG.log(HINT, f"springmass analyse {shlex.quote(str(report.main.path))}")
     return OK

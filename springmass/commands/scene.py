@@ -8,7 +8,7 @@ from typing import Annotated
 
 from acquisition.errors import visible
 from springmass.commands.options import File, converted
-from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.errors import HINT, LOG, OK, ProgramError
 from springmass.parameters import argument, option
 
 TEMPLATE = """\
@@ -85,15 +85,15 @@ def scene(
         ask_about(checked, check)
         print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
         if checked == Scene():
-            suggest(f"write what you measured into {check}, and remove the # before it")
+            LOG.log(HINT, f"write what you measured into {check}, and remove the # before it")
             return OK
-        suggest(f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
+        LOG.log(HINT, f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
         return OK
     if recording is None:
         if noted:
             raise ProgramError("--scene, --note and --mark belong to a recording; name it")
         print(TEMPLATE, end="")
-        suggest("springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
+        LOG.log(HINT, "springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
         raise ProgramError(f"{recording}: nothing to save; give --scene, --note or --mark S=TEXT")
@@ -102,6 +102,6 @@ def scene(
         raise ProgramError(f"{path}: expected a recording, got none; check the name")
     given = None if scene is None else read_scene(scene)
     written = write_about(about_of(path).with_more(given, note, mark))
-    tell(f"{written}: used from now on with {path.name}")
-    suggest(f"springmass analyse {shlex.quote(str(path))}")
+    LOG.info(f"{written}: used from now on with {path.name}")
+    LOG.log(HINT, f"springmass analyse {shlex.quote(str(path))}")
     return OK

@@ -16,7 +16,7 @@ from pipeline.dynamics.strang import STRANG
 from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import Figures, File, Json, Overwrite
-from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.errors import HINT, LOG, OK, ProgramError
 from springmass.parameters import Finite, Positive, Whole, flag, option, output
 from springmass.runs.json_results import picked
 from springmass.runs.options import How, ReadOptions
@@ -89,7 +89,7 @@ def simulate(
     assert stated is not None
     ready = prepare(stated, longest_s, analysis=analysis, where=where)
     if ready.from_run:
-        tell(f"from {against}: {', '.join(ready.from_run)}")
+        LOG.info(f"from {against}: {', '.join(ready.from_run)}")
     band, of_band = band_of(ready, longest_s)
     wanted = default_tolerance(band) if tolerance is None and method == "auto" else tolerance
     wrong, limit = instability(ready.problem, method, dt if tolerance is None else None)
@@ -135,7 +135,7 @@ def simulate(
         print(f"written          {visible(str(output))}", file=say)
     for path in written[:1]:
         of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
-        suggest(f"springmass analyse {shlex.quote(str(path))}{of_scene}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(str(path))}{of_scene}")
     if as_json:
         print(json.dumps(results))
     return OK

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pipeline.analysis import Oscillation
 from springmass import __version__
 from springmass.commands.options import File, Json
-from springmass.errors import OK, UNREADABLE, ProgramError, manner
+from springmass.errors import OK, UNREADABLE, ProgramError
 from springmass.parameters import Count, Positive, argument, option
 from springmass.runs.options import How
 from springmass.runs.run import Run
@@ -48,7 +48,7 @@ def trade(
             f"expected a motion of two periods, got {motion.seconds:g} s at {motion.frequency_hz:.3g} Hz from "
             f"{motion.theta[0]:g} m; take more --seconds, or state a start in the scene"
         )
-    kinds = counted(measure_tiers(motion, seeds), len(KINDS), "kinds of records", quiet=manner()[0])
+    kinds = counted(measure_tiers(motion, seeds), len(KINDS), "kinds of records")
     tiers = [row for rows in kinds for row in rows]
     problem = motion.problem()
     solved = [] if problem is None else [*measure_integrators(problem, 1.0 / motion.rate_hz, motion.t.size)]

@@ -17,7 +17,7 @@ from springmass.course.plan import Plan, key_of, made_of, names_of, software
 from springmass.course.rows import COURSE, FAILED, write_rows
 from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
-from springmass.errors import ProgramError, complain, manner
+from springmass.errors import LOG, ProgramError
 from springmass.report.html import SHARED, report_script
 from springmass.runs.run import Task
 from springmass.terminal.progress import counting
@@ -44,7 +44,7 @@ def run_course(
             shutil.rmtree(page.parent)
     done = now.keys() - set(map(key_of, todo))
     made, written = 0, len(done)
-    with counting("runs", len(todo), lines=True, quiet=manner()[0]) as show:
+    with counting("runs", len(todo), lines=True) as show:
         for rows in _analysed(todo, jobs, dask):
             # A run during which a worker died is tried again by the next pass.
             store.add((key, "" if row["status"] == "ended" else now[key], row) for key, row in rows)
@@ -55,7 +55,7 @@ def run_course(
                 written = len(done)
             for _, row in rows:
                 if row["status"] in FAILED:
-                    complain(row["error"])
+                    LOG.warning(row["error"])
             show(made)
     table = _table(course, store, done)
     write_rows(folder, table, course.tags)
@@ -101,7 +101,7 @@ def _write_pages(course: Plan, folder: Path, table: Sequence[Row], reports: int,
     todo = [(name, task, page.parent) for name, task, page in named if not page.exists()]
     unwritten: list[str] = []
     finished = 0
-    progress = counting("reports", len(todo), lines=True, quiet=manner()[0])
+    progress = counting("reports", len(todo), lines=True)
     with workers(len(todo), jobs) as by, progress as show:
         for written in outcomes(write_report_of, todo, by):
             unwritten += [f"{task.name}: {_DIED}" if why is None else why for (_, task, _), why in written if why != ""]

@@ -18,7 +18,7 @@ from pipeline.results.compare import SpringRun
 from springmass.charts.several import LARGEST, drag_points, outline
 from springmass.course.plan import digest_of, digests_of, software
 from springmass.course.rows import ESTIMATES
-from springmass.errors import internal_error, quietly
+from springmass.errors import internal_error
 from springmass.report.advice import Harm, harm_of, sentence
 from springmass.report.html import SHARED
 from springmass.runs.questions import for_course
@@ -34,17 +34,16 @@ def write_report_of(report: tuple[str, Task, Path]) -> str:
     from springmass.report.write import write_report
 
     name, task, folder = report
-    with quietly():
-        (run,) = analyse_all([task])
-        if isinstance(run, Failed):
-            return _line(task, run)
-        try:
-            run = run.named(name, loaded=replace(run.loaded, path=Path(task.name)), time_utc=TIME)
-            write_report(folder, [run], script=f"../../{SHARED}")
-        except WriteFailed as error:
-            return str(error)
-        except Exception as error:  # a defect in the program must not stop the reports of other runs
-            return f"{task.name}: {internal_error(error)}"
+    (run,) = analyse_all([task])
+    if isinstance(run, Failed):
+        return _line(task, run)
+    try:
+        run = run.named(name, loaded=replace(run.loaded, path=Path(task.name)), time_utc=TIME)
+        write_report(folder, [run], script=f"../../{SHARED}")
+    except WriteFailed as error:
+        return str(error)
+    except Exception as error:  # a defect in the program must not stop the reports of other runs
+        return f"{task.name}: {internal_error(error)}"
     return ""
 
 
@@ -52,8 +51,7 @@ def analyse_one(task: Task) -> dict[str, Any]:
     """Return the row of a run, identical on every machine and at every time; a run that fails has one as well."""
     row = blank_row(task)
     row["input_sha256"] = digest_of(task.source) or None
-    with quietly():  # messages about a recording go into its row
-        (run,) = analyse_all([task])
+    (run,) = analyse_all([task])
     if isinstance(run, Failed):
         return row | {"error": _line(task, run)}
     try:

@@ -17,6 +17,7 @@ import numpy as np
 from acquisition.block import Block, SourceInfo
 from acquisition.decoders.family import RESONATOR_PPM
 from acquisition.errors import FormatError, NeedsAnswer
+from acquisition.events import Triggered, recorded_events
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.clock_fit import fit_clock
 from acquisition.recordings.identify import open_recording
@@ -24,7 +25,7 @@ from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import Original, Recording, Trap
 from acquisition.regular_file import open_regular
 from pipeline.track import Track
-from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
+from springmass.errors import LOG, UNREADABLE, ProgramError
 from springmass.layout import STDIN, part
 from springmass.runs.inputs import kind_of
 from springmass.runs.options import READ, ReadOptions
@@ -101,10 +102,10 @@ def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = F
         loaded = _from_recording(where, open_recording(where, velocity_path=options.velocity, **stated))
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
-            complain(f"{where}: {trap.message}")
+            LOG.warning(f"{where}: {trap.message}")
     about = about_of(where)
     if described := about.described(scene=not scene_given):
-        tell(f"{about.path}: {described} read from the notes next to the file")
+        LOG.info(f"{about.path}: {described} read from the notes next to the file")
     if about.described():
         scene = loaded.scene if about.scene is None else about.scene.to_mapping()
         marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
@@ -113,7 +114,7 @@ def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = F
             noted["notes"] = list(about.notes)
         loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
     summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
-    detail(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
+    LOG.debug(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
     return within(loaded, options)
 
 
@@ -238,7 +239,7 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
         parts = report.parts_of(int(wanted[0]))
         longest = max(parts, key=lambda run: run.samples)
         if len(parts) > 1:
-            tell(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
+            LOG.info(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
         loaded = _load_run(longest.path)
         originals = loaded.originals  # read while the run file exists
     return replace(
@@ -285,7 +286,7 @@ def to_track(
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
     stated = provenance or {}
-    moments = [event["t_s"] for event in stated.get("events", ()) if event.get("kind") == "trigger"]
+    moments = [t_s for t_s, event in recorded_events(stated) if isinstance(event.typed, Triggered)]
     return Track(
         t=samples.t,
         y=samples.distance,

@@ -18,7 +18,7 @@ from pipeline.findings.finding import Finding
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import Classic, classic
 from pipeline.track import Track
-from springmass.errors import INTERNAL, NO_MEMORY, UNREADABLE, ProgramError, detail, internal_error
+from springmass.errors import INTERNAL, LOG, NO_MEMORY, UNREADABLE, ProgramError, internal_error
 from springmass.runs.arrays import loaded_of, refuse_reading
 from springmass.runs.estimates import Value
 from springmass.runs.frames import estimates_frame, run_dataset, samples_dataset
@@ -106,7 +106,7 @@ class Run(Mapping[str, Value]):
     @cached_property
     def analysis(self) -> Analysis:
         """The analysis; its findings include those of the reader."""
-        detail(f"analysed: {self.name} at {self.how.accuracy}, with a scene that states {stated_keys(self.scene)}")
+        LOG.debug(f"analysed: {self.name} at {self.how.accuracy}, with a scene that states {stated_keys(self.scene)}")
         return analyse_track(self.loaded.track, self.scene, self.how, self.loaded.traps)
 
     @cached_property

@@ -22,7 +22,7 @@ from acquisition.errors import visible
 from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
-from springmass.errors import ProgramError, complain
+from springmass.errors import LOG, ProgramError
 from springmass.runs.inputs import is_recording
 from storage.atomic import write_whole
 
@@ -109,7 +109,7 @@ def ask_about(scene: Scene, where: str | Path) -> None:
     This is for recordings and simulations, where no finding reports such values.
     """
     for clause in scene.unusual():
-        complain(f"{where}: {clause}; check value and unit")
+        LOG.warning(f"{where}: {clause}; check value and unit")
 
 
 RUNS = (".h5", ".hdf5", ".nxs", ".wire")

@@ -19,14 +19,14 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from springmass.errors import SENSOR, ProgramError, complain
+from springmass.errors import LOG, SENSOR, ProgramError
 from springmass.page.state import REQUESTS, PageState
 from springmass.page.view import View, json_of
 from springmass.page.web.security import ACT, REPORT, Access, guarded
 from springmass.session.failures import raised_at
 from storage.errors import one_line
 
-LOG = logging.getLogger("page")  # not below "springmass", whose messages are all printed
+PAGE_LOG = logging.getLogger("page")  # not below "springmass", whose messages are all printed
 STATIC = Path(__file__).parents[1] / "static"
 TURN_S = 0.0225
 """Time between two reads of the log: little longer than a screen frame; samples reach the screen within 40 ms."""
@@ -93,7 +93,7 @@ class Server:
         try:
             self._update()
         except Exception:  # a defect; the next turn may succeed
-            LOG.exception("the page could not be brought up to date")
+            PAGE_LOG.exception("the page could not be brought up to date")
         self._polled(self._viewers)
 
     def _update(self) -> None:
@@ -130,10 +130,10 @@ class Server:
                 ends = await asyncio.gather(*tasks, return_exceptions=True)
             error = next(end for end in ends if not isinstance(end, asyncio.CancelledError))
             if isinstance(error, Refused):
-                LOG.warning("%s sent %s; its connection is closed", client, error)
+                PAGE_LOG.warning("%s sent %s; its connection is closed", client, error)
                 await browser.close(1003)
             elif not isinstance(error, WebSocketDisconnect):
-                LOG.error("a defect of the page closed the connection of %s", client, exc_info=error)
+                PAGE_LOG.error("a defect of the page closed the connection of %s", client, exc_info=error)
                 await browser.close(1011)
 
     async def _receive(self, browser: WebSocket) -> None:
@@ -272,7 +272,7 @@ class _Lines(logging.Handler):
         text = " ".join(record.getMessage().split())[:300]
         if record.exc_info and (error := record.exc_info[1]) is not None:
             text += f": {type(error).__name__} at {raised_at(error)}: {one_line(error)[:200]}"
-        complain(f"page: {text}")
+        LOG.warning(f"page: {text}")
 
 
 ELSEWHERE = ("192.0.2.1", 9)
