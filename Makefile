@@ -5,15 +5,16 @@ BIN = $(VENV)/bin
 WORKERS ?= 2
 PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
 
-.PHONY: help demo test golden trials nightly mutants accuracy bench lint docs docs-figures docs-trade firmware clean
+.PHONY: help demo test golden golden-freeze trials nightly mutants accuracy bench lint docs docs-figures docs-trade firmware clean
 
 help:
 	@echo "make demo     from two old recordings to Table 1 and a report"
 	@echo "make test     the tests, in two processes (WORKERS=n for others): 4 minutes on two cores"
-	@echo "make golden   every output of 0.2.0 against today's: 4 minutes"
+	@echo "make golden   every frozen output against today's, as a table of what moved: 3 minutes"
+	@echo "make golden-freeze  freeze the outputs that moved; the commit's message says what moved and why"
 	@echo "make trials   what many seeds, kills and long runs show: an hour"
-	@echo "make nightly  trials, docs, firmware, smallest versions and checks of the project's files: two hours"
-	@echo "make mutants  planted faults, and whether tests and goldens notice them: an hour"
+	@echo "make nightly  trials, docs, firmware, smallest versions, planted faults and checks of the project's files: two hours"
+	@echo "make mutants  planted faults, and whether tests and goldens notice them: a quarter of an hour"
 	@echo "make accuracy what the estimates must reach, over 2000 seeds (SEEDS=n for others)"
 	@echo "make bench    speed, as ratios to named references"
 	@echo "make lint     ruff, mypy, import contracts, names, spelling"
@@ -43,6 +44,9 @@ test: $(VENV)/.installed-dev
 
 golden: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.golden
+
+golden-freeze: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.golden --freeze
 
 trials: $(VENV)/.installed-dev
 	SPRINGMASS_TRIALS=2000 SPRINGMASS_KILLS=500 SPRINGMASS_EXAMPLES=nightly \

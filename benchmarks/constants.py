@@ -1,10 +1,9 @@
 """Count the numeric constants of the code: `python benchmarks/constants.py [--list] [ROOM ...]`.
 
-The count covers module-level assignments of numbers, including tuples and arrays of numbers, and numeric defaults of
-classes named ``Params``, in acquisition, pipeline, storage and springmass. A table counts as one constant,
-``A, B = 1, 2`` as two. A constant has a source if its comment, or its entry in the docstring of ``Params``, names a
-publication, a probability, a standard or a measurement. ``--list`` prints the constants without a source. A ROOM such
-as pipeline/motion limits count and list to that folder.
+The count covers module-level assignments of numbers, including tuples and arrays of numbers, in acquisition, pipeline,
+storage and springmass. A table counts as one constant, ``A, B = 1, 2`` as two. A constant has a source if its comment
+names a publication, a probability, a standard or a measurement. ``--list`` prints the constants without a source. A
+ROOM such as pipeline/motion limits count and list to that folder.
 """
 
 from __future__ import annotations
@@ -28,13 +27,12 @@ SOURCE = re.compile(
 
 
 class Constant(NamedTuple):
-    """A numeric constant in the code, with its comments and documentation."""
+    """A numeric constant in the code, with its comments."""
 
     path: Path
     line: int
     name: str
     value: str
-    of_params: bool
     words: str
 
     @property
@@ -45,7 +43,7 @@ class Constant(NamedTuple):
 
     @property
     def sourced(self) -> bool:
-        """Whether the documentation names a source, a probability or a measurement."""
+        """Whether the comments name a source, a probability or a measurement."""
         return SOURCE.search(self.words) is not None
 
 
@@ -55,14 +53,7 @@ def constants(path: Path) -> Iterator[Constant]:
     comments = _comments(path)
     for node in tree.body:
         for name, value in _assigned(node):
-            words = _beside(node, comments)
-            yield Constant(path, node.lineno, name, ast.unparse(value), False, words)
-        if isinstance(node, ast.ClassDef) and node.name == "Params":
-            entries = _entries(ast.get_docstring(node) or "")
-            for field in node.body:
-                for name, value in _assigned(field):
-                    words = f"{entries.get(name, '')} {_beside(field, comments)}"
-                    yield Constant(path, field.lineno, name, ast.unparse(value), True, words)
+            yield Constant(path, node.lineno, name, ast.unparse(value), _beside(node, comments))
 
 
 def _assigned(node: ast.stmt) -> Iterator[tuple[str, ast.expr]]:
@@ -125,18 +116,6 @@ def _beside(node: ast.stmt, comments: dict[int, str]) -> str:
     return " ".join(comments.get(line, "") for line in lines)
 
 
-def _entries(docstring: str) -> dict[str, str]:
-    """Return the text of a docstring for each parameter."""
-    entries: dict[str, str] = {}
-    names: list[str] = []
-    for line in docstring.splitlines():
-        if head := re.match(r"(\w+(?:, \w+)*) : ", line):
-            names = head[1].split(", ")
-        for name in names:
-            entries[name] = f"{entries.get(name, '')} {line.strip()}"
-    return entries
-
-
 def main() -> None:
     """Print the counts by folder, and the total."""
     parser = argparse.ArgumentParser(description="Count the numbers that decide something.")
@@ -151,11 +130,9 @@ def main() -> None:
                 print(f"{each.path.relative_to(ROOT)}:{each.line}: {each.name} = {each.value}")
     rows = {room: [each for each in found if each.room == room] for room in dict.fromkeys(each.room for each in found)}
     rows["total"] = found
-    print(f"{'room':<28}{'module':>8}{'Params':>8}{'no source':>11}")
+    print(f"{'room':<28}{'numbers':>8}{'no source':>11}")
     for room, numbers in rows.items():
-        of_params = sum(number.of_params for number in numbers)
-        missing = sum(not number.sourced for number in numbers)
-        print(f"{room:<28}{len(numbers) - of_params:>8}{of_params:>8}{missing:>11}")
+        print(f"{room:<28}{len(numbers):>8}{sum(not number.sourced for number in numbers):>11}")
 
 
 if __name__ == "__main__":

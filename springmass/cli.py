@@ -32,13 +32,13 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         return _call(words)
     except KeyboardInterrupt:
-        errors.complain("interrupted")
+        errors.LOG.warning("interrupted")
         return errors.INTERRUPTED
     except ImportError as error:
-        errors.complain(f"{error}; this installation is not whole, springmass doctor says what is wrong with it")
+        errors.LOG.warning(f"{error}; this installation is not whole, springmass doctor says what is wrong with it")
         return errors.SOME_FAILED
     except MemoryError:
-        errors.complain(errors.NO_MEMORY)
+        errors.LOG.warning(errors.NO_MEMORY)
         return errors.UNREADABLE
     except BrokenPipeError:
         # The reader of the output has closed the pipe (`| head`): print nothing more, not even at exit.
@@ -46,17 +46,17 @@ def _run(arguments: Sequence[str] | None) -> int:
         return errors.OK
     except Exception as error:
         if isinstance(error, RuntimeError) and "start new thread" in str(error):
-            errors.complain("no memory for another thread; end other programs, or raise the limit")
+            errors.LOG.warning("no memory for another thread; end other programs, or raise the limit")
             return errors.UNREADABLE
         if isinstance(error, OSError) and error.filename is None and error.errno in _OUTPUT_FULL:
             _abandon_output()
-            errors.complain(f"standard output cannot be written: {error.strerror}; write to another disk")
+            errors.LOG.warning(f"standard output cannot be written: {error.strerror}; write to another disk")
             return errors.USAGE
         code = _exit_code(error)
         if code is None:
-            errors.complain(errors.internal_error(error))
+            errors.LOG.warning(errors.internal_error(error))
             return errors.INTERNAL
-        errors.complain(error)
+        errors.LOG.warning(error)
         return code
 
 
@@ -72,7 +72,7 @@ def _call(words: Sequence[str]) -> int:
     except CycloptsError as error:
         what = " ".join(str(error).split()).rstrip(".")
         called = " ".join(("springmass", *(error.command_chain or ())))
-        errors.complain(f"{what}{' ' if what.endswith('?') else '; '}{called} --help shows what it takes")
+        errors.LOG.warning(f"{what}{' ' if what.endswith('?') else '; '}{called} --help shows what it takes")
         return errors.USAGE
     except Exception as error:
         from acquisition.errors import NeedsAnswer

@@ -1,4 +1,4 @@
-"""Exit codes of the program and the errors that lead to them.
+"""Exit codes of the program, the errors that lead to them, and its messages on stderr.
 
 ====  ================================================================
 0     everything done
@@ -22,7 +22,10 @@ from collections.abc import Iterator
 from failure import Error as Error
 
 OK, SOME_FAILED, USAGE, UNREADABLE, SENSOR, REJECTED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 4, 5, 70, 130
-_log = logging.getLogger("springmass")
+LOG = logging.getLogger("springmass")
+"""What was done is of level INFO, steps that only ``-v`` prints are DEBUG, and problems that ``-q`` prints, WARNING."""
+HINT = logging.INFO + 1
+"""Level of the next command to type, which only a terminal shows."""
 NO_MEMORY = "there is not enough memory; end other programs, or raise the limit"
 
 
@@ -38,68 +41,49 @@ class ProgramError(Error):
         return type(self), (str(self), self.exit_code)
 
 
-def complain(message: object) -> None:
-    """Report a problem as one line, even if a file name or a library's message contains line breaks."""
-    _log.warning("%s", " ".join(str(message).splitlines()))
-
-
-def tell(message: str) -> None:
-    """Report what was done, which ``-q`` leaves out."""
-    _log.info("%s", message)
-
-
-def detail(message: str) -> None:
-    """Report the current step, which only ``-v`` prints."""
-    _log.debug("%s", message)
-
-
 class _Stderr(logging.Handler):
-    """Prints messages on stderr, whatever it is at the moment, with control characters made visible."""
+    """Prints each message as one line on stderr, whatever it is at the moment; a problem begins with the program."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print a line; a problem begins with the name of the program."""
-        _write(f"{'springmass: ' if record.levelno >= logging.WARNING else ''}{record.getMessage()}")
+        text = record.getMessage()
+        if record.levelno >= logging.WARNING:  # a file name or a library's message may contain line breaks
+            text = f"springmass: {' '.join(text.splitlines())}"
+        elif record.levelno == HINT:
+            text = f"next: {text}"
+        _write(text, only_terminal=record.levelno == HINT)
 
 
-_PRINTS = _Stderr()
+_STDERR = _Stderr()
 
 
-def manner() -> tuple[bool, bool]:
-    """Return whether this process prints only errors and warnings, and whether it also prints details."""
-    return not _log.isEnabledFor(logging.INFO), _log.isEnabledFor(logging.DEBUG)
-
-
-def adopt(quiet: bool, verbose: bool) -> None:
-    """Print messages from now on: problems alone, or details too."""
-    if _PRINTS not in _log.handlers:
-        _log.addHandler(_PRINTS)
-    _log.propagate = False
-    _log.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
+def print_messages(level: int) -> None:
+    """Print messages of this level and above from now on, as a program does; a library leaves them to ``logging``."""
+    LOG.addHandler(_STDERR)
+    LOG.propagate = False
+    LOG.setLevel(level)
 
 
 @contextlib.contextmanager
 def printing() -> Iterator[None]:
-    """Print messages until the ``with`` block ends, as a program does; a library leaves them to ``logging``."""
-    before, printed = _log.level, _PRINTS in _log.handlers
-    adopt(quiet=False, verbose=False)
-    try:
-        yield
-    finally:
-        _log.setLevel(before)
-        if not printed:
-            _log.removeHandler(_PRINTS)
-            _log.propagate = True
+    """Print messages until the ``with`` block ends."""
+    with at_level(logging.INFO):
+        print_messages(logging.INFO)
+        try:
+            yield
+        finally:
+            LOG.removeHandler(_STDERR)
+            LOG.propagate = True
 
 
 @contextlib.contextmanager
-def quietly() -> Iterator[None]:
-    """Report only problems until the ``with`` block ends."""
-    before = _log.level
-    _log.setLevel(logging.WARNING)
+def at_level(level: int) -> Iterator[None]:
+    """Leave out messages below a level until the ``with`` block ends."""
+    before = LOG.level
+    LOG.setLevel(level)
     try:
         yield
     finally:
-        _log.setLevel(before)
+        LOG.setLevel(before)
 
 
 def internal_error(error: BaseException) -> str:
@@ -120,15 +104,9 @@ def internal_error(error: BaseException) -> str:
     return f"internal error: {what}; please report it, details in {file.name}"
 
 
-def suggest(command: str) -> None:
-    """Print the next command to type, if stderr is a terminal."""
-    with contextlib.suppress(OSError, ValueError):
-        if sys.stderr is not None and sys.stderr.isatty():
-            tell(f"next: {command}")
-
-
-def _write(message: str) -> None:
+def _write(message: str, *, only_terminal: bool = False) -> None:
     from acquisition.errors import visible  # its package imports numpy, which `--help` does not need
 
     with contextlib.suppress(OSError, ValueError):  # stderr cannot be written; the exit code still reports the error
-        print(visible(message), file=sys.stderr)
+        if not only_terminal or (sys.stderr is not None and sys.stderr.isatty()):
+            print(visible(message), file=sys.stderr)

@@ -52,7 +52,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = True) -> Itera
     """
     target = Path(path)
     if not overwrite and os.path.lexists(target):
-        raise _exists(target)
+        raise already_exists(target)
     temporary = part_of(target)
     with writing(target):
         descriptor = lock_new(temporary, _open_file)
@@ -139,10 +139,10 @@ def _place(temporary: Path, target: Path, *, overwrite: bool) -> None:
         os.link(temporary, target)
         temporary.unlink()
     except FileExistsError as error:
-        raise _exists(target) from error
+        raise already_exists(target) from error
     except OSError:  # a file system without hard links, such as FAT
         if os.path.lexists(target):
-            raise _exists(target) from None
+            raise already_exists(target) from None
         os.replace(temporary, target)
 
 
@@ -163,7 +163,8 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def _exists(target: Path) -> RunExists:
+def already_exists(target: Path) -> RunExists:
+    """Return the error for a file that may not be replaced."""
     return RunExists(target, "already exists", "choose another name or allow overwriting")
 
 

@@ -13,12 +13,13 @@ import os
 import queue
 import shutil
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from acquisition.clock import Clock
+from acquisition.events import Dropped, Event, StoredEvent
 from acquisition.readings import Read
 from storage.errors import DiskNearlyFull, NotALog, WriteFailed, one_line
 from storage.wire_log.appending import LogFile, LogItem, WireLogWriter, open_log_file
@@ -138,9 +139,9 @@ class Recorder:
         now = self._clock.now_ns() if host_ns is None else host_ns
         self._offer(RecordKind.MARK, ((channel, now, text.encode("utf-8", "replace")),))
 
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Record "lost", "continues", "timeout", "trigger", "calibration" or another event, with facts about it."""
-        self._offer(RecordKind.EVENT, ((channel, host_ns, event_payload(kind, facts)),))
+    def event(self, channel: int, host_ns: int, event: StoredEvent | Event) -> None:
+        """Record an event."""
+        self._offer(RecordKind.EVENT, ((channel, host_ns, event_payload(event)),))
 
     def drain(self, *, sync: bool = False) -> RecorderStatus:
         """Wait until everything received so far is in the log (with ``sync``: on the disk) or the recording stops."""
@@ -222,7 +223,7 @@ class Recorder:
             with self._lock:
                 items, self._queue, self._queued_bytes = self._queue, [], 0
                 items += [
-                    (RecordKind.EVENT, channel, mono_ns, event_payload("overflow", lost))
+                    (RecordKind.EVENT, channel, mono_ns, event_payload(Dropped(**lost)))
                     for channel, (mono_ns, lost) in self._overflows.items()
                 ]
                 self._overflows.clear()

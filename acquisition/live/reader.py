@@ -7,13 +7,14 @@ again when it comes back.
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 from acquisition.clock import Clock
 from acquisition.decoders.sensor import Poll
 from acquisition.errors import PortError
+from acquisition.events import Event, Lost, Reopened, TimedOut
 from acquisition.live.serial_port import SerialPort
 from acquisition.readings import Read
 
@@ -29,8 +30,8 @@ class Sink(Protocol):
     def reads(self, reads: Sequence[Read]) -> None:
         """Receive reads of one port."""
 
-    def event(self, channel: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
-        """Receive the event "lost", "reopened" or "timeout"."""
+    def event(self, channel: int, host_ns: int, event: Event) -> None:
+        """Receive an event: a port is lost or came back, or a polled sensor did not answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +90,15 @@ class PortReader:
         """Read a port until the end, over all of its losses."""
         while (why := self._read_until_lost(line)) is not None:
             lost_ns = self._clock.now_ns()
-            self._sink.event(line.channel, lost_ns, "lost", {"port": line.port.name, "why": why})
+            self._sink.event(line.channel, lost_ns, Lost(port=line.port.name, why=why))
             sensor = None
             while sensor is None:
                 if self._stop.wait(REOPEN_EVERY_S):
                     return
                 sensor = self._reopened(line)
             now_ns = self._clock.now_ns()
-            facts = {"port": line.port.name, "gap_s": (now_ns - lost_ns) * 1e-9, "sensor": sensor}
-            self._sink.event(line.channel, now_ns, "reopened", facts)
+            gap_s = (now_ns - lost_ns) * 1e-9
+            self._sink.event(line.channel, now_ns, Reopened(port=line.port.name, gap_s=gap_s, sensor=sensor))
 
     def _read_until_lost(self, line: PortLine) -> str | None:
         """Pass on what a port sends until it is lost; return the reason, or None at the end."""
@@ -106,7 +107,7 @@ class PortReader:
         while not self._stop.is_set():
             try:
                 if asker is not None and asker.ask(now_ns := self._clock.now_ns()):
-                    self._sink.event(line.channel, now_ns, "timeout", {"after_s": asker.poll.timeout_s})
+                    self._sink.event(line.channel, now_ns, TimedOut(after_s=asker.poll.timeout_s))
                 data = line.port.read(wait_s)
             except PortError as error:
                 return str(error)

@@ -8,14 +8,19 @@ from concurrent.futures import Executor
 from functools import partial
 from typing import TYPE_CHECKING, Any, Unpack
 
-from failure import Error
-from springmass.api.analysing import AnalysisKeywords, AnyScene, analyse
+from springmass.api.analysing import AnalysisKeywords, AnyScene
+from springmass.api.questions import for_python
 from springmass.course.results_csv import NUMERIC_COLUMNS, WHOLE, columns_of, read_rows
 from springmass.course.worker import row_of
+from springmass.loading.options import AnalysisOptions
+from springmass.loading.scenes import scene_from
+from springmass.runs.run import Run
+from springmass.runs.tasks import Task, analyse_all
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pipeline.bench.scene import Scene
     from springmass.api.analysing import AnySource
 
 
@@ -52,20 +57,22 @@ def batch(
     >>> [round(period, 4) for period in frame["period"]]
     [0.7901, 0.7585]
     """
-    work = partial(_row, scene=scene, how=how)
+    work = partial(_row, scene=scene_from(scene), how=AnalysisOptions.of(how))
     rows = list((map if executor is None else executor.map)(work, sources))
     frame = _frame(rows, ())
     return frame.loc[:, frame.notna().any() | (frame.columns == "error")]
 
 
-def _row(source: Any, *, scene: Any, how: Any) -> dict[str, Any]:
-    path = os.fspath(source) if isinstance(source, str | os.PathLike) else getattr(source, "name", "")
+def _row(source: Any, *, scene: Scene | None, how: AnalysisOptions) -> dict[str, Any]:
+    path = os.fspath(source) if isinstance(source, str | os.PathLike) else str(getattr(source, "name", None) or "")
     row: dict[str, Any] = {"run": os.path.basename(path), "path": path, "status": "failed", "error": ""}
-    try:
-        row |= row_of(analyse(source, scene, **how), path)
-    except (Error, OSError, MemoryError) as error:
-        row["error"] = " ".join(str(error).split())
-    return row
+    (run,) = analyse_all([Task(source, path, scene, how)])
+    if isinstance(run, Run):
+        return row | row_of(run, path)
+    message = run.message
+    if (asked := run.question) is not None:
+        message = str(asked.with_remedy(for_python(asked.question, "springmass.analyse", how.given())))
+    return row | {"error": " ".join(message.split())}
 
 
 def results(folder: str | os.PathLike[str]) -> pd.DataFrame:

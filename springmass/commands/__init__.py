@@ -6,13 +6,14 @@ of `springmass.errors`. Free to change: what one command prints. A new command i
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, Group, Parameter
 
 from springmass import __version__
-from springmass.errors import OK, ProgramError, adopt
+from springmass.errors import LOG, OK, ProgramError
 from springmass.layout import STDIN
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def _begin(
         ),
     ] = False,
 ) -> int:
-    adopt(quiet, verbose)
+    LOG.setLevel(logging.WARNING if quiet else logging.DEBUG if verbose else logging.INFO)
     if not words:
         raise ProgramError("no command; try springmass demo or springmass --help")
     end = words.index("--") if "--" in words else len(words)

@@ -28,18 +28,7 @@ from springmass.commands.options import (
 )
 from springmass.commands.parameters import argument, flag, option, output
 from springmass.commands.questions import for_command, option_words
-from springmass.errors import (
-    OK,
-    REJECTED,
-    SOME_FAILED,
-    UNREADABLE,
-    USAGE,
-    ProgramError,
-    complain,
-    manner,
-    suggest,
-    tell,
-)
+from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, USAGE, ProgramError
 from springmass.layout import STDIN
 from springmass.loading.inputs import files_of
 from springmass.loading.scenes import read_scenes
@@ -93,7 +82,7 @@ def analyse(
     scenes, values = read_scenes(options.scene, len(inputs)), bench.values()
     files, folders = files_of(inputs)
     for line in folders:
-        tell(line)
+        LOG.info(line)
     alone = len(files) == 1
     names = [""] if alone else distinct_names(["stdin" if file.path == STDIN else file.path for file in files])
     how = replace(how, method=options.method)
@@ -136,7 +125,7 @@ def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptio
 
     runs: list[Run] = []
     codes: list[int] = []
-    for run in counted(analyse_all(tasks), len(tasks), "runs", quiet=manner()[0]):
+    for run in counted(analyse_all(tasks), len(tasks), "runs"):
         if isinstance(run, Failed):
             codes.append(_failed(run))
             continue
@@ -149,7 +138,7 @@ def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptio
     written = _write(out / TOGETHER, runs, options) if runs and out is not None else OK
     if len(runs) > 1:
         named = shlex.join(inputs)
-        suggest(f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
+        LOG.log(HINT, f"springmass compare {named if len(named) <= LONGEST_INPUTS else '...'}")
     if len(set(codes)) > 1 and any(code not in (OK, REJECTED) for code in codes):
         return SOME_FAILED
     return max(*codes, written)
@@ -159,10 +148,10 @@ def _failed(failed: Failed) -> int:
     """Say why a recording gives no run; the remedy of a question names the command for this recording alone."""
     task, message = failed.task, failed.message
     if failed.question is not None:
-        path = f"./{task.path}" if task.path.startswith("-") else task.path
+        path = f"./{task.source}" if task.source.startswith("-") else task.source
         words = ["springmass", "analyse", path, *option_words(task.how.given())]
         message = str(failed.question.with_remedy(for_command(failed.question.question, words)))
-    complain(message)
+    LOG.warning(message)
     return failed.code
 
 
@@ -170,10 +159,10 @@ def _judged(run: Run, options: AnalyseOptions) -> int:
     """Return the exit code of an analysis, and say why it is not 0."""
     path = run.result["input"]["path"]
     if not run.ok:
-        complain(f"{path}: no oscillation: {run.why}")
+        LOG.warning(f"{path}: no oscillation: {run.why}")
         return UNREADABLE
     if options.strict and (wrong := rejected(run.result["findings"])):
-        complain(f"{path}: rejected under --strict: {', '.join(wrong)}")
+        LOG.warning(f"{path}: rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
 
@@ -218,8 +207,8 @@ def _write(folder: Path, runs: Sequence[Run], options: AnalyseOptions) -> int:
     template = options.template if len(runs) == 1 else None
     try:
         make_folder(folder.parent)
-        tell(f"report: {write_report(folder, runs, figures=options.figures, template=template)}")
+        LOG.info(f"report: {write_report(folder, runs, figures=options.figures, template=template)}")
     except (ProgramError, WriteFailed) as error:
-        complain(f"{error}; --no-report writes no files")
+        LOG.warning(f"{error}; --no-report writes no files")
         return USAGE
     return OK

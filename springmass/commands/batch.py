@@ -17,7 +17,7 @@ from springmass.course.plan import plan, template
 from springmass.course.results_csv import CSV, FAILED
 from springmass.course.running import run_course
 from springmass.course.store import DATABASE, opened
-from springmass.errors import OK, SOME_FAILED, UNREADABLE, ProgramError, complain, suggest, tell
+from springmass.errors import HINT, LOG, OK, SOME_FAILED, UNREADABLE, ProgramError
 from springmass.result.output_names import make_folder
 from springmass.terminal.printing import visible_lines
 
@@ -53,7 +53,7 @@ def batch(
     if not inputs and options.runs is None:
         raise ProgramError("batch needs recordings, folders or --runs FILE, got none of them")
     if options.template:
-        table = template([job.path for job in plan(inputs).jobs])
+        table = template([task.name for task in plan(inputs).tasks])
         # A file gets the paths unchanged, because they are read back from it.
         print(visible_lines(table) if sys.stdout.isatty() else table.removesuffix("\n"))
         return OK
@@ -72,16 +72,16 @@ def batch(
             output=str(folder),
         )
         for line in course.notes:
-            tell(line)
+            LOG.info(line)
         rows, made, unwritten = run_course(
             course, store, folder, jobs=options.jobs, dask=options.dask, reports=options.reports, remedy=for_course
         )
     for line in unwritten:
-        complain(line)
+        LOG.warning(line)
     failed = sum(row["status"] in FAILED for row in rows)
-    tell(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
-    suggest(f"open {folder / COURSE_PAGE} in a browser")
-    tell(
+    LOG.info(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
+    LOG.log(HINT, f"open {folder / COURSE_PAGE} in a browser")
+    LOG.info(
         f"written: {folder / COURSE_PAGE}, {folder / GROUPS_FILE}, {folder / CSV}; the data are in {folder / DATABASE}"
     )
     if failed and failed == len(rows):

@@ -18,7 +18,7 @@ from springmass.commands.options import AnalysisArguments, FiguresOption, FileAr
 from springmass.commands.parameters import Share, argument, option, output
 from springmass.comparing.comparison import SpringComparison, compare_runs, comparison_json, line_and_hooke_words
 from springmass.course.results_csv import COURSE, is_course, read_rows
-from springmass.errors import OK, REJECTED, ProgramError, complain, suggest, tell
+from springmass.errors import HINT, LOG, OK, REJECTED, ProgramError
 from springmass.loading.save import now_utc
 from springmass.loading.scenes import read_scenes
 from springmass.result.output_names import distinct_names, make_folder
@@ -84,13 +84,13 @@ def compare(
         from springmass.report.write import write_report
 
         page = write_report(out, runs, compared=compared, summary=result, figures=options.figures)
-        tell(f"report: {page}")
-        suggest(f"open {page} in a browser")
+        LOG.info(f"report: {page}")
+        LOG.log(HINT, f"open {page} in a browser")
     else:
-        suggest("the same command with -o DIR writes the report")
+        LOG.log(HINT, "the same command with -o DIR writes the report")
     findings = [*result["findings"], *(f for run in runs for f in run.result["findings"])]
     if options.strict and (wrong := rejected(findings)):
-        complain(f"rejected under --strict: {', '.join(wrong)}")
+        LOG.warning(f"rejected under --strict: {', '.join(wrong)}")
         return REJECTED
     return OK
 
@@ -112,11 +112,11 @@ def _run_courses(inputs: Sequence[str], options: CompareOptions) -> int:
     )
     wrong = {group.name for group in compared.suspects}.union(*(group.names for group in compared.disagreements))
     if options.strict and wrong:
-        complain(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
+        LOG.warning(f"rejected under --strict: {len(wrong)} runs differ from their course or bench")
         return REJECTED
     for suspect in compared.suspects[:1]:
         path = next(row["path"] for row in rows if suspect.name in (row["run"], f"{row[COURSE]}: {row['run']}"))
-        suggest(f"springmass analyse {shlex.quote(path)}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(path)}")
     return OK
 
 

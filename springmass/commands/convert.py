@@ -10,7 +10,7 @@ from typing import Annotated
 from acquisition.recordings.writers import WRITERS
 from springmass.commands.options import PART, FileArgument, Overwrite, ReadArguments, refuse
 from springmass.commands.parameters import argument, option, output
-from springmass.errors import OK, UNREADABLE, ProgramError, suggest, tell
+from springmass.errors import HINT, LOG, OK, UNREADABLE, ProgramError
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
 from springmass.loading.save import save_run
@@ -44,13 +44,13 @@ def convert(
     out = Path(output)
     if out.suffix.lower() in RUN_SUFFIXES:
         written = save_run(out, loaded, scene=given_scene, overwrite=overwrite)
-        tell(f"{written}: {len(loaded.samples)} samples from {loaded.path}")
-        suggest(f"springmass analyse {shlex.quote(str(written))}")
+        LOG.info(f"{written}: {len(loaded.samples)} samples from {loaded.path}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(str(written))}")
         return OK
     if not _holds(loaded, out):
         return _write_form(loaded, out, overwrite=overwrite)
     for path in _give_back(loaded, out, overwrite):
-        tell(f"{path}: the original inside {loaded.path}, bit for bit")
+        LOG.info(f"{path}: the original inside {loaded.path}, bit for bit")
     return OK
 
 
@@ -82,9 +82,9 @@ def _write_form(loaded: Loaded, out: Path, *, overwrite: bool) -> int:
     _demand_free(targets, overwrite)
     for target, (_, data) in zip(targets, written.files, strict=True):
         write_whole(target, data, overwrite=overwrite)
-        tell(f"{target}: {len(loaded.samples)} samples from {loaded.path}")
+        LOG.info(f"{target}: {len(loaded.samples)} samples from {loaded.path}")
     for sentence in written.lost:
-        tell(f"{out}: {sentence}")
+        LOG.info(f"{out}: {sentence}")
     return OK
 
 

@@ -11,7 +11,7 @@ from acquisition.replay import Replay
 from springmass.commands.options import FileArgument
 from springmass.commands.parameters import output
 from springmass.comparing.comparison import compare_runs
-from springmass.errors import OK, suggest
+from springmass.errors import HINT, LOG, OK
 from springmass.loading.load import load, sample_data
 from springmass.loading.options import ReadOptions
 from springmass.loading.save import save_run
@@ -40,7 +40,9 @@ def demo(
         print(findings_text(run.result["findings"]))
     print(f"\n{compared.comparison.message}")
     print(f"\nReport: {write_report(out / 'demo.results', runs, compared=compared)}")
-    suggest("springmass analyse YOUR_RECORDING --scene BENCH.toml; springmass scene prints such a file to fill in")
+    LOG.log(
+        HINT, "springmass analyse YOUR_RECORDING --scene BENCH.toml; springmass scene prints such a file to fill in"
+    )
     return OK
 
 

@@ -7,20 +7,18 @@ import importlib.metadata
 import importlib.util
 import json
 import platform
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from springmass.commands.options import Json
-from springmass.errors import OK, SOME_FAILED, ProgramError, suggest
+from springmass.errors import HINT, LOG, OK, SOME_FAILED, ProgramError
 from springmass.layout import PACKAGES, PREFIX, part
 
-LIBRARIES = (
-    *("numpy", "scipy", "threadpoolctl", "h5py", "xarray", "h5netcdf", "uncertainties", "matplotlib", "jinja2"),
-    *("serial", "nptdms", "python_calamine", "rich", "cyclopts", "tomli_w", "platformdirs", "starlette", "uvicorn"),
-    *("websockets", "segno", "msgspec"),
-)
+MODULES = {"pyserial": "serial"}
+"""The modules of libraries that have another name than their distribution."""
 InstallationCheck = tuple[str, bool, str, str]
 """The name of a check, whether it is met, what was found, and what to do if it is not."""
 
@@ -40,7 +38,7 @@ def doctor(*, as_json: Json = False) -> int:
         if not ok:
             print(visible(f"      {remedy}"))
     if whole:
-        suggest("springmass demo")
+        LOG.log(HINT, "springmass demo")
     return OK if whole else SOME_FAILED
 
 
@@ -59,11 +57,17 @@ def _packages() -> Iterator[InstallationCheck]:
 
 
 def _libraries() -> Iterator[InstallationCheck]:
-    for name in LIBRARIES:
-        remedy = "install springmass again: pip install --force-reinstall"
+    """Check that each library that the distribution springmass requires can be imported."""
+    remedy = "install springmass again: pip install --force-reinstall"
+    try:
+        required = importlib.metadata.requires("springmass") or ()
+    except importlib.metadata.PackageNotFoundError:
+        yield "libraries", False, "springmass itself is not installed", "install it: pip install -e CHECKOUT"
+        return
+    for name in (re.split(r"[^\w.-]", line)[0] for line in required if "extra ==" not in line):
         try:
-            importlib.import_module(name)
-            state, ok = importlib.metadata.version({"serial": "pyserial"}.get(name, name)), True
+            importlib.import_module(MODULES.get(name, name.lower().replace("-", "_")))
+            state, ok = importlib.metadata.version(name), True
         except ImportError as error:
             state, ok = str(error), False
         yield f"library {name}", ok, state, remedy

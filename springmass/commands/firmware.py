@@ -16,7 +16,7 @@ from acquisition.errors import visible
 from acquisition.live.firmware import BOOTLOADER_BAUDS, FIRMWARE_VERSION, HEX, WIRING, avrdude_arguments
 from acquisition.live.serial_port import SerialPort
 from springmass.commands.parameters import Whole, option
-from springmass.errors import OK, SENSOR, ProgramError, suggest
+from springmass.errors import HINT, LOG, OK, SENSOR, ProgramError
 from springmass.session.sensors import outdated, settings_of
 
 ANSWER_S = 5.0
@@ -64,7 +64,7 @@ def firmware(
     if outdated(identity):
         _show_flashing(port)
     else:
-        suggest(f"springmass record --port {shlex.quote(port)} --page")
+        LOG.log(HINT, f"springmass record --port {shlex.quote(port)} --page")
     return OK
 
 

@@ -17,7 +17,7 @@ from acquisition.recordings.recording import Survey
 from springmass.commands.options import PART, FileArgument, Json, ReadArguments, refuse
 from springmass.commands.parameters import argument
 from springmass.commands.questions import for_command, option_words
-from springmass.errors import OK, suggest
+from springmass.errors import HINT, LOG, OK
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
@@ -54,7 +54,7 @@ def formats(
     for line in _lines(facts):
         print(visible(line))
     if "needs" not in facts:
-        suggest(f"springmass analyse {shlex.quote(str(file))}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(str(file))}")
     return OK
 
 

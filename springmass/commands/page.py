@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 import threading
 import webbrowser
@@ -12,7 +13,7 @@ from typing import Annotated, Any
 
 from springmass.commands.options import PART, PageOptions, ReadArguments, RecordingArgument, refuse
 from springmass.commands.parameters import flag
-from springmass.errors import OK, ProgramError, manner, tell
+from springmass.errors import LOG, OK, ProgramError
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
 from springmass.page.feeds import view_of
@@ -57,8 +58,8 @@ def page(
         for line in lines:
             # For the page of a recording, the recorder prints these lines, because its progress would overwrite them.
             if not recorder:
-                tell(line)
-            elif not manner()[0]:
+                LOG.info(line)
+            elif LOG.isEnabledFor(logging.INFO):
                 _to_recorder({"type": "line", "text": line})
         if not page.no_browser:
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
@@ -67,7 +68,7 @@ def page(
         STOPS.end()  # the server handles signals itself
         serve(state, port=page.page_port, network=network, opened=opened, over=over.is_set)
     except KeyboardInterrupt:
-        tell("the page is closed")
+        LOG.info("the page is closed")
     except OSError as error:
         reason = error.strerror or str(error)
         raise ProgramError(f"--page-port {page.page_port}: {reason}; name another, or 0 for any") from error

@@ -11,7 +11,7 @@ from acquisition.errors import visible
 from acquisition.live.serial_port import list_ports
 from springmass.commands.options import Json
 from springmass.commands.parameters import flag, option
-from springmass.errors import OK, suggest
+from springmass.errors import HINT, LOG, OK
 from springmass.session.detect import listen
 from springmass.terminal.printing import wrapped
 
@@ -40,7 +40,9 @@ def ports(
         print(f"{family.name:<18} {family.rate_hz:>9.3g} {step:>9} {reach:>13} {family.baud:>7}")
         print(wrapped(f"    {family.title}. {family.limits}", "    "))
     recognised = [row["device"] for row in rows if row["families"]]
-    suggest(f"springmass record --port {shlex.quote(recognised[0])}" if recognised else "springmass record --simulate")
+    LOG.log(
+        HINT, f"springmass record --port {shlex.quote(recognised[0])}" if recognised else "springmass record --simulate"
+    )
     return OK
 
 

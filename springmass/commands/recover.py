@@ -8,7 +8,7 @@ from typing import Annotated
 
 from springmass.commands.options import FileArgument, Overwrite
 from springmass.commands.parameters import SpeedOfSound, argument, option, output
-from springmass.errors import OK, suggest, tell
+from springmass.errors import HINT, LOG, OK
 from springmass.loading.save import made_now
 from springmass.stops import STOPS
 from storage.recovery.recover import recover as build
@@ -34,6 +34,6 @@ def recover(
         provenance=made_now(),
     )
     for line in report.describe():
-        tell(line)
-    suggest(f"springmass analyse {shlex.quote(str(report.main.path))}")
+        LOG.info(line)
+    LOG.log(HINT, f"springmass analyse {shlex.quote(str(report.main.path))}")
     return OK

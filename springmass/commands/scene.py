@@ -9,7 +9,7 @@ from typing import Annotated
 from acquisition.errors import visible
 from springmass.commands.options import FileArgument, converted
 from springmass.commands.parameters import argument, option
-from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.errors import HINT, LOG, OK, ProgramError
 
 SCENE_TEMPLATE = """\
 # What was at the bench. Remove the # before what you measured, and put your numbers for the dots.
@@ -88,15 +88,15 @@ def scene(
         ask_about(checked, check)
         print(visible(f"{check}: a scene that states {stated_keys(checked)}"))
         if checked == Scene():
-            suggest(f"write what you measured into {check}, and remove the # before it")
+            LOG.log(HINT, f"write what you measured into {check}, and remove the # before it")
             return OK
-        suggest(f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
+        LOG.log(HINT, f"springmass analyse RECORDING --scene {shlex.quote(str(check))}")
         return OK
     if recording is None:
         if noted:
             raise ProgramError("--scene, --note and --mark belong to a recording; name it")
         print(SCENE_TEMPLATE, end="")
-        suggest("springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
+        LOG.log(HINT, "springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
         raise ProgramError(f"{recording}: nothing to save; give --scene, --note or --mark S=TEXT")
@@ -105,6 +105,6 @@ def scene(
         raise ProgramError(f"{path}: expected a recording, got none; check the name")
     given = None if scene is None else read_scene(scene)
     written = write_about(about_of(path).with_more(given, note, mark))
-    tell(f"{written}: used from now on with {path.name}")
-    suggest(f"springmass analyse {shlex.quote(str(path))}")
+    LOG.info(f"{written}: used from now on with {path.name}")
+    LOG.log(HINT, f"springmass analyse {shlex.quote(str(path))}")
     return OK

@@ -17,7 +17,7 @@ from pipeline.errors import DynamicsError
 from pipeline.results.effects import Effect, simulated_effects
 from springmass.commands.options import FiguresOption, FileArgument, Json, Overwrite, ReadArguments
 from springmass.commands.parameters import Finite, Positive, Whole, flag, option, output
-from springmass.errors import OK, ProgramError, suggest, tell
+from springmass.errors import HINT, LOG, OK, ProgramError
 from springmass.loading.options import AnalysisOptions
 from springmass.loading.scenes import ask_about, read_scene
 from springmass.result.run_json import picked
@@ -89,7 +89,7 @@ def simulate(
     assert stated is not None
     ready = prepare(stated, longest_s, analysis=analysis, where=where)
     if ready.from_run:
-        tell(f"from {against}: {', '.join(ready.from_run)}")
+        LOG.info(f"from {against}: {', '.join(ready.from_run)}")
     band, of_band = band_of(ready, longest_s)
     wanted = default_tolerance(band) if tolerance is None and method == "auto" else tolerance
     wrong, limit = instability(ready.problem, method, dt if tolerance is None else None)
@@ -135,7 +135,7 @@ def simulate(
         print(f"written          {visible(str(output))}", file=say)
     for path in written[:1]:
         of_scene = "" if scene is None else f" --scene {shlex.quote(where)}"
-        suggest(f"springmass analyse {shlex.quote(str(path))}{of_scene}")
+        LOG.log(HINT, f"springmass analyse {shlex.quote(str(path))}{of_scene}")
     if as_json:
         print(json.dumps(results))
     return OK

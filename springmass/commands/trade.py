@@ -10,7 +10,7 @@ from pipeline.analysis import Oscillation
 from springmass import __version__
 from springmass.commands.options import AnalysisArguments, FileArgument, Json
 from springmass.commands.parameters import Positive, PositiveCount, argument, option
-from springmass.errors import OK, UNREADABLE, ProgramError, manner
+from springmass.errors import OK, UNREADABLE, ProgramError
 from springmass.loading.scenes import read_scene
 from springmass.runs.run import Run
 from springmass.terminal.progress import counted
@@ -55,7 +55,7 @@ def trade(
             f"expected a motion of two periods, got {motion.seconds:g} s at {motion.frequency_hz:.3g} Hz from "
             f"{motion.theta[0]:g} m; take more --seconds, or state a start in the scene"
         )
-    kinds = counted(measure_tiers(motion, seeds), len(RECORD_DEFECTS), "kinds of records", quiet=manner()[0])
+    kinds = counted(measure_tiers(motion, seeds), len(RECORD_DEFECTS), "kinds of records")
     tiers = [row for rows in kinds for row in rows]
     problem = motion.problem()
     solved = [] if problem is None else [*measure_integrators(problem, 1.0 / motion.rate_hz, motion.t.size)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import signal
 import threading
@@ -22,7 +23,7 @@ from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any, TypeVar
 
-from springmass.errors import SOME_FAILED, ProgramError, adopt, manner
+from springmass.errors import SOME_FAILED, ProgramError, at_level, print_messages
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -49,7 +50,8 @@ class _ThisProcess(Executor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future: Future[Any] = Future()
-        future.set_result(fn(*args, **kwargs))
+        with at_level(logging.WARNING):  # as in the processes of a pool
+            future.set_result(fn(*args, **kwargs))
         return future
 
 
@@ -150,13 +152,13 @@ def cores() -> int:
 
 @contextlib.contextmanager
 def pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of new processes that share this one's output settings, leave Ctrl-C to it and end with it.
+    """Yield a pool of new processes that print only problems, leave Ctrl-C to this one and end with it.
 
     After an error or Ctrl-C they are terminated, because a task may take minutes.
     """
     others = set(active_children())
     # New processes are spawned, because a fork of a process with linear-algebra threads may hang.
-    with ProcessPoolExecutor(processes, get_context("spawn"), _begin, manner()) as executor:
+    with ProcessPoolExecutor(processes, get_context("spawn"), _begin) as executor:
         try:
             yield executor
         except BaseException:
@@ -165,13 +167,13 @@ def pool(processes: int) -> Iterator[ProcessPoolExecutor]:
             raise
 
 
-def _begin(quiet: bool, verbose: bool) -> None:
-    """Leave Ctrl-C to the parent process, and end with it.
+def _begin() -> None:
+    """Print only problems, because messages about a recording go into its row; leave Ctrl-C to the parent process.
 
-    A pool's process would otherwise wait forever if its parent is killed.
+    The process ends with its parent; it would otherwise wait forever if the parent is killed.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    adopt(quiet, verbose)
+    print_messages(logging.WARNING)
     parent = parent_process()
     if parent is not None:
 

@@ -1,4 +1,4 @@
-"""Turn inputs, and the table of runs with the known values of each, into jobs; and what a row depends on."""
+"""Turn inputs, and the table of runs with the known values of each, into tasks; and what a row depends on."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import io
 import json
 import os
 import re
+import subprocess
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -22,10 +23,11 @@ from acquisition.recordings.identify import dialect_folder
 from acquisition.regular_file import open_regular, read_regular
 from pipeline.bench.scene import PLACES, Scene
 from pipeline.registry.laws import ANY_LAW, law_names
+from springmass import __version__
 from springmass.comparing.user_table import Row, read_rows
 from springmass.course.results_csv import RESERVED
 from springmass.errors import UNREADABLE, ProgramError
-from springmass.layout import PACKAGES, part
+from springmass.layout import part
 from springmass.loading.inputs import InputFile, files_of
 from springmass.loading.notes import about_path
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
@@ -34,56 +36,37 @@ from springmass.result.output_names import numbered
 from springmass.runs.tasks import Task
 
 _LIBRARIES = ("numpy", "scipy", "uncertainties")
-_CODE = (".py", ".toml", ".j2", ".css", ".js")
 
 
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One run to analyse: its path as the inputs name it, the given options by name, the given scene, and its tags.
+def key_of(task: Task) -> str:
+    """Return what distinguishes a run from others: its path as the inputs name it, and the run and channel in it."""
+    return json.dumps([task.name, task.how.run, task.how.channel])
 
-    Relative paths start from ``folder``.
-    """
 
-    path: str
-    folder: str
-    how: Mapping[str, Any]
-    scene: Scene | None
-    tags: Mapping[str, str]
+def digests_of(task: Task) -> dict[str, str]:
+    """Return the digests of the given scene, empty if there is none, and of the options but the velocity file."""
+    scene = "" if task.scene is None else _digest(task.scene.to_mapping())
+    # A path would differ between folders that hold the same course; made_of reads the file.
+    return {"scene_sha256": scene, "parameters_sha256": _digest(replace(task.how, velocity=None).given())}
 
-    @property
-    def key(self) -> str:
-        """What distinguishes this run from others: its path, and the run and channel within the file."""
-        return json.dumps([self.path, self.how.get("run"), self.how.get("channel")])
 
-    def digests(self) -> dict[str, str]:
-        """Return the digests of the given scene, empty if there is none, and of the options."""
-        scene = "" if self.scene is None else _digest(self.scene.to_mapping())
-        return {"scene_sha256": scene, "parameters_sha256": _digest(self.how)}
-
-    def made_of(self) -> str:
-        """Return a digest of all on which the run's row and report depend; this reads the files."""
-        files = (self.path, self.how.get("velocity"), str(about_path(Path(self.path))))
-        read = [digest_of(self.whole(path)) if path else "" for path in files]
-        return _digest([*read, self.digests(), code_sha256()])
-
-    def task(self) -> Task:
-        """Return what every process can analyse."""
-        how = AnalysisOptions.of(self.how)
-        if how.velocity is not None:
-            how = replace(how, velocity=self.whole(str(how.velocity)))
-        return Task(self.whole(self.path), self.path, self.scene, how)
-
-    def whole(self, path: str) -> str:
-        """Return a path that every process can find."""
-        return os.path.join(self.folder, path)
+def made_of(task: Task) -> str:
+    """Return a digest of all on which the run's row and report depend; this reads the files."""
+    files = (task.source, task.how.velocity, about_path(Path(task.source)))
+    read = [digest_of(str(path)) if path else "" for path in files]
+    return _digest([*read, digests_of(task), software()])
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The jobs of a course sorted by path, the course's own columns, and lines for the user."""
+    """The runs of a course sorted by path, its own columns with the values of each run, and lines for the user.
 
-    jobs: tuple[Job, ...]
+    A task has an absolute path, which every process can find, and is named by the path as the inputs name it.
+    """
+
+    tasks: tuple[Task, ...]
     tags: tuple[str, ...]
+    tagged: tuple[Mapping[str, str], ...]
     notes: tuple[str, ...]
 
 
@@ -121,14 +104,15 @@ def plan(
     shared = None if scene is None else read_scene(scene)
     if shared is not None and shared.damping_law is not None and how.law is None:
         notes.insert(0, f"damping law {shared.damping_law}: stated in {scene}")
-    jobs = []
+    tasks = []
     for file, line, values in joined:
-        velocity = {} if file.velocity is None else {"velocity": file.velocity}
-        answers = how.given() | velocity | {name: values[name] for name in ANSWERS if name in values}
+        answers = {"velocity": file.velocity} | {name: values[name] for name in ANSWERS if name in values}
+        if answers["velocity"] is not None:
+            answers["velocity"] = os.path.abspath(answers["velocity"])
         of_run = _scene(values, shared, f"{runs_csv}, line {line}")
-        of_tags = {name: values[name] for name in tags if name in values}
-        jobs.append(Job(file.path, os.getcwd(), answers, of_run, of_tags))
-    return Plan(tuple(jobs), tags, tuple(notes))
+        tasks.append(Task(os.path.abspath(file.path), file.path, of_run, replace(how, **answers)))
+    tagged = tuple({name: values[name] for name in tags if name in values} for _, _, values in joined)
+    return Plan(tuple(tasks), tags, tagged, tuple(notes))
 
 
 def _expanded(inputs: Sequence[str]) -> list[str]:
@@ -156,25 +140,35 @@ def _scene(values: Values, shared: Scene | None, where: str) -> Scene | None:
     return Scene.from_mapping(tables, where=where) if tables else None
 
 
-def names_of(jobs: Sequence[Job]) -> list[str]:
+def names_of(tasks: Sequence[Task]) -> list[str]:
     """Return a name per run: its path below the common folder, without suffix, with repeated names numbered."""
-    if not jobs:
+    if not tasks:
         return []
-    whole = [os.path.abspath(job.whole(job.path)) for job in jobs]
+    whole = [task.source for task in tasks]
     above = os.path.commonpath([os.path.dirname(path) for path in whole])
     return numbered([os.path.splitext(os.path.relpath(path, above))[0].replace(os.sep, "/") for path in whole])
 
 
 @functools.cache
-def code_sha256() -> str:
-    """Return the digest of the program, the versions of its libraries and the user's dialects."""
-    # In a wheel the packages are in another place; without ``part``, rows of an older program would count as unchanged.
-    rooms = [*map(part, PACKAGES), Path(__file__).resolve().parents[1]]
-    files = [file for room in rooms for file in sorted(room.rglob("*")) if file.suffix in _CODE]
-    if (dialects := dialect_folder()).is_dir():
-        files += sorted(dialects.glob("*.toml"))
-    versions = [f"{name} {version(name)}".encode() for name in _LIBRARIES]
-    return hashlib.sha256(b"\0".join([*versions, *map(read_regular, files)])).hexdigest()
+def software() -> str:
+    """Return what a row depends on besides its run: the program, its libraries and the user's dialects."""
+    parts = [f"springmass {__version__}{_commit()}", *(f"{name} {version(name)}" for name in _LIBRARIES)]
+    if dialects := sorted(dialect_folder().glob("*.toml")):
+        parts.append(f"dialects {hashlib.sha256(b''.join(map(read_regular, dialects))).hexdigest()[:12]}")
+    return ", ".join(parts)
+
+
+def _commit() -> str:
+    """Return the commit of a checkout, with a digest of its uncommitted changes; empty elsewhere, and without git."""
+    if not part(".git").exists():  # a wheel's environment may lie in the repository of another project
+        return ""
+    git = ["git", "-C", str(part(""))]
+    try:
+        commit = subprocess.check_output([*git, "rev-parse", "--short=12", "HEAD"], stderr=subprocess.DEVNULL)
+        changes = subprocess.check_output([*git, "diff", "HEAD"], stderr=subprocess.DEVNULL)
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return f"+{commit.decode().strip()}" + (f".{hashlib.sha256(changes).hexdigest()[:12]}" if changes else "")
 
 
 def digest_of(path: str) -> str:

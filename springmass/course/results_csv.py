@@ -31,9 +31,9 @@ DETAILS = ("findings", "messages", "correlations", "drag_points")
 """Columns that contain JSON."""
 _FIRST = ("run", "path", "status", "error")
 _LAWS = ("law", "admissible", "stated_law", "one_law", "undetermined")
-_HASHES = ("input_sha256", "scene_sha256", "parameters_sha256", "code_sha256")
+_ORIGIN = ("input_sha256", "scene_sha256", "parameters_sha256", "software")
 COURSE_COLUMNS = (
-    *_FIRST, "format", "kind", "channel", "unit", "start_time", "clock", *_LAWS, *WHOLE, *NUMERIC_COLUMNS, *_HASHES,
+    *_FIRST, "format", "kind", "channel", "unit", "start_time", "clock", *_LAWS, *WHOLE, *NUMERIC_COLUMNS, *_ORIGIN,
     *DETAILS,
 )  # fmt: skip
 COURSE = "course"

@@ -14,12 +14,13 @@ from typing import Any
 from springmass.course.benches import compare_rows
 from springmass.course.executors import outcomes, workers
 from springmass.course.page import line_of, mark, write_groups, write_page
-from springmass.course.plan import Job, Plan, code_sha256, names_of
+from springmass.course.plan import Plan, key_of, made_of, names_of, software
 from springmass.course.results_csv import COURSE, FAILED, write_rows
 from springmass.course.store import Store
 from springmass.course.worker import Remedy, analyse_one, blank_row, write_report_of
-from springmass.errors import ProgramError, complain, manner
+from springmass.errors import LOG, ProgramError
 from springmass.report.html import SHARED, report_script
+from springmass.runs.tasks import Task
 from springmass.terminal.progress import counting
 from storage.atomic import write_whole, writing
 
@@ -37,26 +38,26 @@ def run_course(
     ``remedy`` words how to answer what a recording leaves open. Runs that fail are reported as they do. Return all
     rows, how many were made, and a line for each unwritten report.
     """
-    made_of = {job.key: job.made_of() for job in course.jobs}
+    now = {key_of(task): made_of(task) for task in course.tasks}
     stored = store.made_of()
-    todo = [job for job in course.jobs if stored.get(job.key) != made_of[job.key]]
+    todo = [task for task in course.tasks if stored.get(key_of(task)) != now[key_of(task)]]
     for page in (folder / REPORTS).glob("*.results/report.html") if todo else ():
         with writing(page.parent):  # it may show a run that has changed; an interrupted pass leaves none of these
             shutil.rmtree(page.parent)
-    done = made_of.keys() - {job.key for job in todo}
+    done = now.keys() - set(map(key_of, todo))
     made, written = 0, len(done)
-    with counting("runs", len(todo), lines=True, quiet=manner()[0]) as show:
+    with counting("runs", len(todo), lines=True) as show:
         for rows in _analysed(todo, jobs, dask, remedy):
             # A run during which a worker died is tried again by the next pass.
-            store.add((job.key, "" if row["status"] == "ended" else made_of[job.key], row) for job, row in rows)
-            done |= {job.key for job, _ in rows}
+            store.add((key, "" if row["status"] == "ended" else now[key], row) for key, row in rows)
+            done |= {key for key, _ in rows}
             made += len(rows)
             if len(done) >= ROWS_RATIO * written:
                 write_rows(folder, _table(course, store, done), course.tags)
                 written = len(done)
             for _, row in rows:
                 if row["status"] in FAILED:
-                    complain(row["error"])
+                    LOG.warning(row["error"])
             show(made)
     table = _table(course, store, done)
     write_rows(folder, table, course.tags)
@@ -65,24 +66,25 @@ def run_course(
 
 def _table(course: Plan, store: Store, done: set[str]) -> list[CourseRow]:
     """Return the rows of the runs that have one, in the order of the runs, with their names and tags."""
-    named = [pair for pair in zip(course.jobs, names_of(course.jobs), strict=True) if pair[0].key in done]
-    rows = store.rows([job.key for job, _ in named])
+    runs = zip(map(key_of, course.tasks), names_of(course.tasks), course.tagged, strict=True)
+    named = [run for run in runs if run[0] in done]
+    rows = store.rows([key for key, _, _ in named])
     return [
-        {**row, "run": name, COURSE: "", **{tag: job.tags.get(tag) for tag in course.tags}}
-        for (job, name), row in zip(named, rows, strict=True)
+        {**row, "run": name, COURSE: "", **{tag: tags.get(tag) for tag in course.tags}}
+        for (_, name, tags), row in zip(named, rows, strict=True)
     ]
 
 
 def _analysed(
-    todo: Sequence[Job], jobs: int | None, dask: str | None, remedy: Remedy
-) -> Iterator[list[tuple[Job, CourseRow]]]:
-    """Yield jobs with their rows; a run during which worker processes die gets a row stating this."""
+    todo: Sequence[Task], jobs: int | None, dask: str | None, remedy: Remedy
+) -> Iterator[list[tuple[str, CourseRow]]]:
+    """Yield keys with their rows; a run during which worker processes die gets a row stating this."""
     if not todo:
         return
     with workers(len(todo), jobs, dask) as by:
         for done in outcomes(partial(analyse_one, remedy=remedy), todo, by):
-            rows = [(job, row or blank_row(job, "ended", f"{job.path}: {_DIED}")) for job, row in done]
-            if any(row["code_sha256"] != code_sha256() for _, row in rows):
+            rows = [(key_of(task), row or blank_row(task, "ended", f"{task.name}: {_DIED}")) for task, row in done]
+            if any(row["software"] != software() for _, row in rows):
                 wrong = "a worker has another version of springmass or of its libraries; install the same everywhere"
                 raise ProgramError(f"{dask}: {wrong}")
             yield rows
@@ -97,18 +99,18 @@ def _write_pages(
     if sum(row["status"] == "ok" for row in table) > 1:
         mark(lines, compare_rows(table))
     write_groups(folder, lines, course.tags)
-    for line, job in zip(lines, course.jobs, strict=True):
-        line["link"] = _report_of(line, job)
-    drawn = [(line, job) for line, job in zip(lines, course.jobs, strict=True) if line["need"][0] < 2]
+    for line, task in zip(lines, course.tasks, strict=True):
+        line["link"] = _report_of(line, task)
+    drawn = [(line, task) for line, task in zip(lines, course.tasks, strict=True) if line["need"][0] < 2]
     worst = heapq.nlargest(reports, drawn, key=lambda pair: (pair[0]["need"], pair[0]["name"]))
-    named = [(line["name"], job, folder / line["link"]) for line, job in worst]
-    tasks = [(name, job, page.parent) for name, job, page in named if not page.exists()]
+    named = [(line["name"], task, folder / line["link"]) for line, task in worst]
+    todo = [(name, task, page.parent) for name, task, page in named if not page.exists()]
     unwritten: list[str] = []
     finished = 0
-    progress = counting("reports", len(tasks), lines=True, quiet=manner()[0])
-    with workers(len(tasks), jobs) as by, progress as show:
-        for written in outcomes(partial(write_report_of, remedy=remedy), tasks, by):
-            unwritten += [f"{job.path}: {_DIED}" if why is None else why for (_, job, _), why in written if why != ""]
+    progress = counting("reports", len(todo), lines=True)
+    with workers(len(todo), jobs) as by, progress as show:
+        for written in outcomes(partial(write_report_of, remedy=remedy), todo, by):
+            unwritten += [f"{task.name}: {_DIED}" if why is None else why for (_, task, _), why in written if why != ""]
             finished += len(written)
             show(finished)
     for line in lines:
@@ -117,7 +119,7 @@ def _write_pages(
     return sorted(unwritten)
 
 
-def _report_of(line: Mapping[str, Any], job: Job) -> str:
+def _report_of(line: Mapping[str, Any], task: Task) -> str:
     """Return the path of a run's report in the folder; names are numbered anew if a run is removed, keys are not."""
     safe = re.sub(r"[^A-Za-z0-9.+_-]+", "_", line["name"]).strip("._")[:100]
-    return f"{REPORTS}/{safe}-{hashlib.sha256(job.key.encode()).hexdigest()[:8]}.results/report.html"
+    return f"{REPORTS}/{safe}-{hashlib.sha256(key_of(task).encode()).hexdigest()[:8]}.results/report.html"

@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from springmass.errors import UNREADABLE, ProgramError, tell
+from springmass.errors import LOG, UNREADABLE, ProgramError
 from storage.atomic import writing
 from storage.errors import WriteFailed
 
@@ -93,7 +93,7 @@ def opened(folder: Path) -> Iterator[Store]:
             holder = file.read(200).decode("utf-8", "replace") or "another process"
             raise ProgramError(f"{folder}: in use by {holder}; wait for its end") from error
         except OSError:
-            tell(f"{folder}: this disk has no locks; let only one batch at a time write there")
+            LOG.info(f"{folder}: this disk has no locks; let only one batch at a time write there")
         with writing(path):
             file.truncate(0)
             since = datetime.now(UTC).isoformat(timespec="seconds")

@@ -17,13 +17,13 @@ from pipeline.errors import AnalysisError
 from pipeline.numerics.estimate import Estimate, UpperLimit
 from pipeline.results.compare import SpringRun
 from springmass.charts.several import LARGEST_DRAWN, drag_points, outline
-from springmass.course.plan import Job, code_sha256, digest_of
+from springmass.course.plan import digest_of, digests_of, software
 from springmass.course.results_csv import ESTIMATES
-from springmass.errors import internal_error, quietly
+from springmass.errors import internal_error
 from springmass.report.html import SHARED
 from springmass.result.advice import Harm, harm_of, sentence
 from springmass.runs.run import Run
-from springmass.runs.tasks import Failed, analyse_all
+from springmass.runs.tasks import Failed, Task, analyse_all
 from storage.errors import WriteFailed
 
 Remedy = Callable[[Question], str]
@@ -32,60 +32,58 @@ DIGITS = 6  # decimal places of a correlation
 TIME = "by springmass batch"  # in place of a time, so that a pass at any time gives the same bytes
 
 
-def write_report_of(task: tuple[str, Job, Path], remedy: Remedy) -> str:
-    """Write the report of a run, given by name, job and folder; return why it cannot be written, or nothing."""
+def write_report_of(report: tuple[str, Task, Path], remedy: Remedy) -> str:
+    """Write the report of a run, given by name, task and folder; return why it cannot be written, or nothing."""
     from springmass.report.write import write_report
 
-    name, job, folder = task
-    with quietly():
-        (run,) = analyse_all([job.task()])
-        if isinstance(run, Failed):
-            return _line(job, run, remedy)
-        try:
-            run = run.named(name, loaded=replace(run.loaded, path=Path(job.path)), time_utc=TIME)
-            write_report(folder, [run], script=f"../../{SHARED}")
-        except WriteFailed as error:
-            return str(error)
-        except Exception as error:  # a defect in the program must not stop the reports of other runs
-            return f"{job.path}: {internal_error(error)}"
+    name, task, folder = report
+    (run,) = analyse_all([task])
+    if isinstance(run, Failed):
+        return _line(task, run, remedy)
+    try:
+        run = run.named(name, loaded=replace(run.loaded, path=Path(task.name)), time_utc=TIME)
+        write_report(folder, [run], script=f"../../{SHARED}")
+    except WriteFailed as error:
+        return str(error)
+    except Exception as error:  # a defect in the program must not stop the reports of other runs
+        return f"{task.name}: {internal_error(error)}"
     return ""
 
 
-def analyse_one(job: Job, remedy: Remedy) -> dict[str, Any]:
+def analyse_one(task: Task, remedy: Remedy) -> dict[str, Any]:
     """Return the row of a run, identical on every machine and at every time; a run that fails has one as well."""
-    row = blank_row(job)
-    row["input_sha256"] = digest_of(job.whole(job.path)) or None
-    with quietly():  # messages about a recording go into its row
-        (run,) = analyse_all([job.task()])
+    row = blank_row(task)
+    row["input_sha256"] = digest_of(task.source) or None
+    (run,) = analyse_all([task])
     if isinstance(run, Failed):
-        return row | {"error": _line(job, run, remedy)}
+        return row | {"error": _line(task, run, remedy)}
     try:
-        return row | row_of(run, job.path)
+        return row | row_of(run, task.name)
     except Exception as error:  # a defect in the program must not stop the other runs
-        return row | {"error": f"{job.path}: {internal_error(error)}"}
+        return row | {"error": f"{task.name}: {internal_error(error)}"}
 
 
-def blank_row(job: Job, status: str = "failed", error: str = "") -> dict[str, Any]:
-    """Return the row of a run for which only the job is known."""
+def blank_row(task: Task, status: str = "failed", error: str = "") -> dict[str, Any]:
+    """Return the row of a run for which only the task is known."""
     return {
-        "path": job.path,
+        "path": task.name,
         "status": status,
         "error": error,
         "errors": 0,
         "warnings": 0,
-        **job.digests(),
-        "code_sha256": code_sha256(),
+        **digests_of(task),
+        "software": software(),
         "tell": [],  # what the group should know: each harmful finding with its advice, the worst first
         "thumbnail": "",
     }
 
 
-def _line(job: Job, failed: Failed, remedy: Remedy) -> str:
+def _line(task: Task, failed: Failed, remedy: Remedy) -> str:
     """Return why there is no run, in one line that names it as the inputs do."""
     asked = failed.question
     message = failed.message if asked is None else str(asked.with_remedy(remedy(asked.question)))
-    line = " ".join(message.replace(job.whole(job.path), job.path).split())
-    return line if job.path in line else f"{job.path}: {line}"
+    line = " ".join(message.replace(task.source, task.name).split())
+    return line if task.name in line else f"{task.name}: {line}"
 
 
 def row_of(run: Run, path: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
 from acquisition.recordings.recording import FormatIssue, Recording
-from springmass.errors import UNREADABLE, ProgramError, complain, detail, tell
+from springmass.errors import LOG, UNREADABLE, ProgramError
 from springmass.layout import STDIN, part
 from springmass.loading.inputs import kind_of
 from springmass.loading.loaded import UNVERIFIED, Loaded, sha256_of
@@ -51,10 +51,10 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
         loaded = _from_recording(where, open_recording(where, velocity_path=options.velocity, **answers))
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
-            complain(f"{where}: {trap.message}")
+            LOG.warning(f"{where}: {trap.message}")
     about = about_of(where)
     if described := about.described(scene=not scene_given):
-        tell(f"{about.path}: {described} read from the notes next to the file")
+        LOG.info(f"{about.path}: {described} read from the notes next to the file")
     if about.described():
         scene = loaded.scene if about.scene is None else about.scene.to_mapping()
         marks = [*loaded.provenance.get("marks", ()), *({"t_s": t_s, "text": text} for t_s, text in about.marks)]
@@ -63,7 +63,7 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
             noted["notes"] = list(about.notes)
         loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
     summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
-    detail(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
+    LOG.debug(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
     return within(loaded, options)
 
 
@@ -175,7 +175,7 @@ def _load_wire(path: Path, channel: str | None) -> Loaded:
         parts = report.parts_of(int(wanted[0]))
         longest = max(parts, key=lambda run: run.samples)
         if len(parts) > 1:
-            tell(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
+            LOG.info(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
         loaded = _load_run(longest.path)
         originals = loaded.originals  # read while the run file exists
     return replace(

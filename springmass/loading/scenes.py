@@ -14,7 +14,7 @@ from acquisition.errors import visible
 from acquisition.regular_file import open_regular
 from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
-from springmass.errors import ProgramError, complain
+from springmass.errors import LOG, ProgramError
 
 Amendments = Mapping[tuple[str, str], Any]
 """Mapping of a scene's (table, key) to a value as a scene file states it."""
@@ -99,4 +99,4 @@ def ask_about(scene: Scene, where: str | Path) -> None:
     This is for recordings and simulations, where no finding reports such values.
     """
     for clause in scene.unusual():
-        complain(f"{where}: {clause}; check value and unit")
+        LOG.warning(f"{where}: {clause}; check value and unit")

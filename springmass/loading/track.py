@@ -7,6 +7,7 @@ from typing import Any
 
 from acquisition.block import Block, SourceInfo
 from acquisition.decoders.sensor import RESONATOR_PPM
+from acquisition.events import Triggered, recorded_events
 from acquisition.live.calibration import SPEED_OF_SOUND_M_PER_S, Calibration
 from acquisition.live.clock_fit import fit_clock
 from pipeline.track import Track
@@ -28,7 +29,7 @@ def to_track(
     The noise stated by a source is passed on. The error column of a file is not noise and is passed on separately.
     """
     facts = provenance or {}
-    moments = [event["t_s"] for event in facts.get("events", ()) if event.get("kind") == "trigger"]
+    moments = [t_s for t_s, event in recorded_events(facts) if isinstance(event.typed, Triggered)]
     return Track(
         t=samples.t,
         y=samples.distance,

@@ -9,6 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from acquisition.events import Calibrated, RunEnded, StoredEvent, Triggered, Zeroed, recorded_events
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from springmass.loading.loaded import Loaded
@@ -16,15 +17,15 @@ from springmass.page.view import SampleBuffer, View
 from springmass.report.recorded import event_words
 from storage.errors import NotALog, StorageError
 from storage.schema import plain
-from storage.wire_log.records import Record, RecordKind, event_content
+from storage.wire_log.records import Record, RecordKind, event_of
 from storage.wire_log.scanning import read_log
 from storage.wire_log.survey import Part
 from storage.wire_log.wire_samples import LogDecoder, chain_of
 
 AT_ONCE = 10_000
 """Maximum number of records per call: 100 s of a sensor at 100 Hz. A long log is therefore shown piece by piece."""
-NOT_LISTED = frozenset({"calibration", "ended"})
-"""Kinds of events that the page does not list, because a person at the bench need not read them."""
+NOT_LISTED = (Calibrated, RunEnded)
+"""Events that the page does not list, because a person at the bench need not read them."""
 
 
 class LogFeed:
@@ -92,16 +93,14 @@ class LogFeed:
             self.view = replace(self.view, series=series, session=secrets.token_hex(8))
         return chain_of(self._sensors[part.sensor])
 
-    def _note(self, record: Record, content: dict[str, Any]) -> None:
-        if record.kind is RecordKind.MARK:
+    def _note(self, record: Record, event: StoredEvent | None) -> None:
+        typed = None if event is None else event.typed
+        if record.kind is RecordKind.MARK or isinstance(typed, Triggered):
             self._timed.append(record)
-        elif record.kind is RecordKind.EVENT:
-            if content["kind"] == "trigger":
-                self._timed.append(record)
-            if content["kind"] == "still":
-                self.view.zero = _zero_of(content)
-            if content["kind"] not in NOT_LISTED:
-                self.view.notes.append(event_words(content["kind"], content["facts"], named=True))
+        if isinstance(typed, Zeroed):
+            self.view.zero = typed.facts
+        if event is not None and not isinstance(typed, NOT_LISTED):
+            self.view.notes.append(event_words(event, named=True))
 
     def _place_marks(self) -> None:
         """Give marks and triggers the times that the run file will give them, which the first samples improve."""
@@ -111,14 +110,9 @@ class LogFeed:
         timed = [((record.mono_ns - origin_ns) * 1e-9, record) for record in self._timed]
         self.view.marks = [(t_s, record.text()) for t_s, record in timed if record.kind is RecordKind.MARK]
         events = [
-            {"t_s": t_s, **event_content(record.payload)} for t_s, record in timed if record.kind is RecordKind.EVENT
+            {"t_s": t_s, **plain(event_of(record.payload))} for t_s, record in timed if record.kind is RecordKind.EVENT
         ]
         self.view.provenance = {**self.view.provenance, "events": events}
-
-
-def _zero_of(event: Mapping[str, Any]) -> dict[str, float]:
-    """Return rest position and noise in m, as far as an event of kind still states them."""
-    return {name: x for name in ("rest_m", "noise_m") if isinstance(x := event["facts"].get(name), float)}
 
 
 def _calibration(numbers: Mapping[str, Any] | None) -> str:
@@ -149,7 +143,7 @@ def view_of(loaded: Loaded) -> View:
     view.series[0].push(loaded.samples)
     view.marks += [(float(mark["t_s"]), str(mark["text"])) for mark in loaded.provenance.get("marks", ())]
     view.notes += [trap.message for trap in loaded.traps]
-    for event in loaded.provenance.get("events", ()):
-        if event.get("kind") == "still":
-            view.zero = _zero_of(event)
+    for _, event in recorded_events(loaded.provenance):
+        if isinstance(typed := event.typed, Zeroed):
+            view.zero = typed.facts
     return view

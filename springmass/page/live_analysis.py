@@ -29,8 +29,8 @@ from springmass.runs.run import Run, analyse_track
 LIVE_TIER: Accuracy = "fast"
 WHOLE_TIER: Accuracy = "standard"
 """Tiers of the analysis during a recording, and of a complete run; the latter is the default of every command."""
-ANALYSIS_SHARE, NOW_SHARE = 0.03, 0.02
-"""Maximum fraction of a core for analyses of all samples, and for those of the last seconds; together 5 %."""
+ANALYSIS_SHARE = 0.025
+"""Maximum fraction of a core for analyses of all samples, and as much for those of the last seconds; together 5 %."""
 NOW_S, NOW_SWINGS = 10.0, 8.0
 """Duration of the samples for the current amplitude, in seconds and in swings; the longer duration counts."""
 LEAST_WAIT_S = 1.0
@@ -181,7 +181,8 @@ class Watcher:
 
     While a recording goes on, the fast tier analyses all samples so far and, in between, only the latest seconds for
     the amplitude. A complete run is analysed once, as by ``springmass analyse``. ``text`` is the latest message about
-    all samples, ``now_text`` that about the last seconds, both as JSON encoded in this thread.
+    all samples; ``update`` is the same with a newer amplitude and without charts, or empty. Both are JSON encoded in
+    this thread.
     """
 
     def __init__(
@@ -195,7 +196,7 @@ class Watcher:
         self._complete: Path | None = None
         self._run: Run | None = None
         self.text = json_of({"type": "motion", "count": 0, "why": "no analysis so far"})
-        self.now_text = ""
+        self.update = ""
         threading.Thread(target=self._loop, name="springmass-page-analysis", daemon=True).start()
 
     def close(self) -> None:
@@ -232,16 +233,18 @@ class Watcher:
         self._run = run
         return _message(run.analysis, WHOLE_TIER, self._wanted_u_s, charts=True)
 
-    def _now(self, swing_s: float) -> dict[str, Any]:
-        """Analyse only the last seconds, and return the message about their amplitude."""
+    def _updated(self, message: dict[str, Any], swing_s: float) -> dict[str, Any]:
+        """Analyse only the last seconds, and return a message with their amplitude and without its charts."""
         last_s = float(self._view.series[0].block().t[-1])
         estimates = self._between(last_s - max(NOW_S, NOW_SWINGS * swing_s)).get("estimates", {})
-        amplitude = {name: each for name, each in estimates.items() if name == "amplitude_now"}
-        return {"type": "now", "t_s": last_s, "accuracy": LIVE_TIER, "estimates": amplitude}
+        newer = {name: {**x, "t_s": last_s} for name, x in estimates.items() if name == "amplitude_now"}
+        fields = {name: x for name, x in message.items() if name != "charts"}
+        return {**fields, "estimates": {**message["estimates"], **newer}}
 
     def _loop(self) -> None:
         count, seen, is_complete, due_s, swing_s = 0, 0, False, 0.0, 0.0
         wait_s, last_cost_s = 0.0, 0.0
+        message: dict[str, Any] = {}
         while not self._closed:
             self._wake.wait(wait_s)
             self._wake.clear()
@@ -255,13 +258,13 @@ class Watcher:
                     seen, is_complete, count = samples, complete, count + 1
                     message = {**self._motion(), "count": count}
                     swing_s = message.get("estimates", {}).get("period", {}).get("value", 0.0)
-                    self.text = json_of(message)
+                    self.update, self.text = "", json_of(message)
                     cost_s = time.thread_time() - start_s
                     # An analysis that first loads a library takes longer; the next one need not wait for that.
                     due_s = time.monotonic() + min(cost_s, last_cost_s) / ANALYSIS_SHARE
                     last_cost_s = cost_s
                 elif swing_s:
-                    self.now_text = json_of(self._now(swing_s))
-                    wait_s = max(wait_s, (time.thread_time() - start_s) / NOW_SHARE)
+                    self.update = json_of(self._updated(message, swing_s))
+                    wait_s = max(wait_s, (time.thread_time() - start_s) / ANALYSIS_SHARE)
             except Exception as error:  # a defect of the analysis is shown, and the samples are still displayed
                 self.text = json_of({"type": "motion", "count": count, "why": f"{type(error).__name__}: {error}"})

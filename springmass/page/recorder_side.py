@@ -17,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
+from acquisition.events import Noted
 from springmass.session.failures import Failures
 from springmass.stops import EndReason, Stops
 
@@ -114,7 +115,7 @@ class PageProcess:
         elif kind == "note":
             # A note becomes an event of the log, which exists only during the recording.
             if message["text"] and (tell := self._failures.tell) is not None:
-                tell("note", {"text": message["text"]})
+                tell(Noted(text=message["text"]))
         elif kind == "line":
             self._say(message["text"])
         else:

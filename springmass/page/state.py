@@ -32,12 +32,12 @@ class RunActions:
         self.report: Path | None = None
         self._making = False
         self._notes: list[str] = []
-        self._aside = self._failed = ""
+        self.discarded = self._failed = ""  # where the run was moved, and why an action failed
 
     def state(self) -> dict[str, Any]:
         """Return the state of the actions for the page."""
         report = "making" if self._making else "" if self.report is None else "ready"
-        return {"report": report, "noted": self._notes, "discarded": self._aside, "failed": self._failed}
+        return {"report": report, "noted": self._notes, "discarded": self.discarded, "failed": self._failed}
 
     def note(self, text: str) -> None:
         """Add a note to the file next to the run."""
@@ -49,7 +49,7 @@ class RunActions:
 
     def discard(self) -> None:
         """Move the run and its notes to the folder of discarded runs, without replacing any file there."""
-        if self._making or self._aside:
+        if self._making or self.discarded:
             return
         folder = self._run.parent / ASIDE
         try:
@@ -62,7 +62,7 @@ class RunActions:
             self._run.rename(aside)
             if notes.exists():
                 notes.rename(folder / f"{aside.stem}.about.toml")
-            self._run, self._aside = aside, f"{ASIDE}/{name}"
+            self._run, self.discarded = aside, f"{ASIDE}/{name}"
         except OSError as error:
             self._failed = f"not set aside ({error.strerror or error})"
 
@@ -89,12 +89,23 @@ class RunActions:
             self._making = False
 
 
-POSSIBLE: Mapping[str, tuple[str, ...]] = {
-    "ready": ("zero", "arm", "record", "close"),
-    "armed": ("arm", "disarm", "record", "close"),
-    "recording": ("mark", "note", "stop"),
+Limits = tuple[float, float]
+ANY_TIME: Limits = (-1e12, 1e12)
+REQUESTS: Mapping[str, tuple[Mapping[str, Limits | None], tuple[str, ...]]] = {
+    "region": ({"from": ANY_TIME, "to": ANY_TIME}, ()),
+    "zero": ({}, ("ready",)),
+    "arm": ({"threshold_m": (1e-4, 1.0), "keep_s": (0.0, 60.0)}, ("ready", "armed")),
+    "disarm": ({}, ("armed",)),
+    "record": ({}, ("ready", "armed")),
+    "mark": ({"text": None}, ("recording",)),
+    "note": ({"text": None}, ("recording", "built", "replay")),
+    "stop": ({}, ("recording",)),
+    "report": ({}, ("built", "replay")),
+    "discard": ({}, ("built",)),
+    "close": ({}, ("ready", "armed", "built")),
 }
-"""Requests that a recorder accepts in each phase."""
+"""Requests with the limits of their numbers, in m and s, None for a text, and the phases in which a controller may send
+them. Any viewer may ask for a region at any time."""
 
 
 class PageState:
@@ -156,21 +167,32 @@ class PageState:
         zero = {} if self.view is None else self.view.zero
         after = {} if self.after is None else self.after.state()
         free = None if self._folder is None else free_bytes(self._folder)
-        return {**state, "bench": {**zero, **self.bench, **after}, "disk_free_bytes": free}
+        bench = {**zero, **self.bench, **after, "requests": self.requests()}
+        return {**state, "bench": bench, "disk_free_bytes": free}
+
+    def requests(self) -> list[str]:
+        """Return the requests of a controller that are possible now."""
+        phase, after = self.bench["phase"], self.after
+        if phase == "replay" and after is None:  # a log that another program records
+            return []
+        possible = [name for name, (_, phases) in REQUESTS.items() if phase in phases]
+        return [name for name in possible if name != "discard" or after is None or not after.discarded]
 
     def ask(self, request: Mapping[str, Any]) -> None:
         """Carry out a controller's request that is possible now, and ignore others; the page shows the state."""
         kind, after = request["type"], self.after
+        if kind not in self.requests():
+            return
         if after is None:
-            if self.controls is not None and kind in POSSIBLE.get(self.bench["phase"], ()):
+            if self.controls is not None:
                 self.controls(request)
         elif kind == "report":
             after.make_report()
         elif kind == "note":
             after.note(request["text"])
-        elif kind == "discard" and after.ours:
+        elif kind == "discard":
             after.discard()
-        elif kind == "close" and after.ours:
+        elif kind == "close":
             self.closed = True
 
     def close(self) -> None:

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from acquisition.errors import visible
+from acquisition.events import Noted, StoredEvent, Triggered, Zeroed, recorded_events
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from springmass.charts.chart import ChartNote
@@ -31,27 +32,22 @@ _CALIBRATED = {
 def notes_of(recorded: Mapping[str, Any]) -> tuple[ChartNote, ...]:
     """Return marks and events of a recording in the order of their times."""
     marks = [ChartNote(mark["t_s"], visible(str(mark["text"])), "mark") for mark in recorded.get("marks", ())]
-    events = [
-        ChartNote(event["t_s"], visible(event_words(event["kind"], event.get("facts", {}))), str(event["kind"]))
-        for event in recorded.get("events", ())
-    ]
+    events = [ChartNote(t_s, visible(event_words(event)), event.kind) for t_s, event in recorded_events(recorded)]
     return tuple(sorted([*marks, *events], key=lambda note: note.t_s))
 
 
-def event_words(kind: str, facts: Mapping[str, Any], *, named: bool = False) -> str:
+def event_words(event: StoredEvent, *, named: bool = False) -> str:
     """Return an event in words; of most kinds the names and values of its facts, ``named`` by the kind."""
-    try:
-        if kind == "still":
-            return f"Zero {1e3 * facts['rest_m']:.1f} mm, noise {1e3 * facts['noise_m']:.2f} mm"
-        if kind == "trigger":
-            return f"Trigger at {1e3 * facts['threshold_m']:.0f} mm, {facts['keep_s']:g} s kept"
-        if kind == "note":
-            return f"Note: {facts['text']}"
-    except (KeyError, TypeError, ValueError):  # a log by another program may state other facts
-        pass
-    shown = {name.replace("_", " "): value for name, value in facts.items() if value is not None}
-    words = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in shown.items())
-    return ": ".join(filter(None, (kind, words))) if named else words
+    match event.typed:  # a log by another program may state other facts
+        case Zeroed(rest_m=float() as rest_m, noise_m=float() as noise_m):
+            return f"Zero {1e3 * rest_m:.1f} mm, noise {1e3 * noise_m:.2f} mm"
+        case Triggered(threshold_m=float() as threshold_m, keep_s=float() as keep_s):
+            return f"Trigger at {1e3 * threshold_m:.0f} mm, {keep_s:g} s kept"
+        case Noted(text=str() as text):
+            return f"Note: {text}"
+    facts = {name.replace("_", " "): value for name, value in event.facts.items() if value is not None}
+    words = ", ".join(f"{name} {x:.4g}" if isinstance(x, float) else f"{name} {x}" for name, x in facts.items())
+    return ": ".join(filter(None, (event.kind, words))) if named else words
 
 
 def calibration_of(recorded: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:

@@ -12,7 +12,7 @@ from springmass.charts.draw import PictureFormat, save
 from springmass.charts.run import CHARTS, charts_of
 from springmass.charts.several import comparison, masses, overlay, static
 from springmass.comparing.comparison import SpringComparison
-from springmass.errors import detail
+from springmass.errors import LOG
 from springmass.report.html import render_html
 from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import amplitude_csv, motion_csv
@@ -108,7 +108,7 @@ def write_report(
             captions = {name: charts[0][name].caption for name in OF_LAB_REPORT if name in charts[0]}
             sentences = [text for title, text in in_words(analyses[0]) if title != "What to do"]
             write_whole(folder / LAB_REPORT, lab_report_tex(runs[0], captions, sentences))
-    detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
+    LOG.debug(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
     return directory / REPORT_PAGE
 
 

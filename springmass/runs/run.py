@@ -16,7 +16,7 @@ from pipeline.errors import AnalysisError
 from pipeline.findings.finding import Finding
 from pipeline.results.classic import Classic, classic
 from pipeline.track import Track
-from springmass.errors import detail
+from springmass.errors import LOG
 from springmass.loading.arrays import loaded_of, refuse_reading
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
@@ -105,7 +105,7 @@ class Run(Mapping[str, Value]):
     @cached_property
     def analysis(self) -> Analysis:
         """The analysis; its findings include those of the reader."""
-        detail(f"analysed: {self.name} at {self.how.accuracy}, with a scene that states {stated_keys(self.scene)}")
+        LOG.debug(f"analysed: {self.name} at {self.how.accuracy}, with a scene that states {stated_keys(self.scene)}")
         return analyse_track(self.loaded.track, self.scene, self.how, self.loaded.traps)
 
     @cached_property

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from acquisition.errors import AcquisitionError, NeedsAnswer
 from pipeline.bench.scene import Scene
@@ -17,9 +19,9 @@ from storage.errors import StorageError
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A recording to analyse, under a name; ``values`` replace those of its scene."""
+    """A recording to analyse, under a name: its path, arrays or a run; ``values`` replace those of its scene."""
 
-    path: str
+    source: Any
     name: str
     scene: Scene | None = None
     how: AnalysisOptions = ANALYSIS_DEFAULTS
@@ -39,8 +41,9 @@ class Failed:
 def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
     """Yield the analysed run of each recording, or why there is none; a failure does not stop the others."""
     for task in tasks:
+        where = task.source if isinstance(task.source, str | os.PathLike) else task.name or type(task.source).__name__
         try:
-            run = Run.of(task.path, task.scene, task.how, task.name)
+            run = Run.of(task.source, task.scene, task.how, task.name)
             if task.values:
                 run = replace(run, stated=amended(run.scene, task.values, where="the command line"))
             _ = run.analysis
@@ -52,11 +55,11 @@ def analyse_all(tasks: Iterable[Task]) -> Iterator[Run | Failed]:
         except (AcquisitionError, StorageError) as error:
             yield Failed(task, UNREADABLE, str(error))
         except (PipelineError, OSError) as error:
-            yield Failed(task, UNREADABLE, f"{task.path}: {error}")
+            yield Failed(task, UNREADABLE, f"{where}: {error}")
         except MemoryError:
-            yield Failed(task, UNREADABLE, f"{task.path}: {NO_MEMORY}")
+            yield Failed(task, UNREADABLE, f"{where}: {NO_MEMORY}")
         except Exception as error:  # a defect that one recording meets must not keep the others from their results
-            yield Failed(task, INTERNAL, f"{task.path}: {internal_error(error)}")
+            yield Failed(task, INTERNAL, f"{where}: {internal_error(error)}")
 
 
 def analysed(tasks: Iterable[Task]) -> list[Run]:

@@ -9,7 +9,7 @@ from acquisition.clock import SystemClock
 from acquisition.decoders.registry import describe_bytes, probe
 from acquisition.errors import PortError
 from acquisition.live.serial_port import SerialPort, list_ports
-from springmass.errors import SENSOR, ProgramError, tell
+from springmass.errors import LOG, SENSOR, ProgramError
 
 PROBE_S = 1.0
 PROBED_BAUDS = (115200, 9600)
@@ -37,7 +37,7 @@ def name_sensors(
         listed = "; ".join(descriptions) or "this machine has no serial port"
         raise ProgramError(f"record looked for a rangefinder: {demand}: {listed}", SENSOR)
     for address, name, speed in named:
-        tell(f"{address}: a {name} sensor at {speed} baud")
+        LOG.info(f"{address}: a {name} sensor at {speed} baud")
     measured = named[0][2] if len(named) == 1 else None
     return tuple(each[0] for each in named), tuple(each[1] for each in named), baud or measured
 

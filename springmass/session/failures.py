@@ -10,8 +10,8 @@ import threading
 import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
+from acquisition.events import Event, StoredEvent
 from storage.errors import one_line
 
 LAST_STEP_S = 1.0
@@ -25,7 +25,7 @@ class Failures:
     """
 
     def __init__(self) -> None:
-        self.tell: Callable[[str, Mapping[str, Any]], None] | None = None
+        self.tell: Callable[[StoredEvent | Event], None] | None = None
         self._lock = threading.Lock()
         self._counts: dict[str, int] = {}
 
@@ -37,7 +37,7 @@ class Failures:
             tell = None if name in self._counts else self.tell
             self._counts[name] = self._counts.get(name, 0) + 1
         if tell is not None:
-            tell(f"{what}_failed", {"error": type(error).__name__, "why": one_line(error), "where": where})
+            tell(StoredEvent(f"{what}_failed", {"error": type(error).__name__, "why": one_line(error), "where": where}))
 
     @property
     def counts(self) -> Mapping[str, int]:

@@ -61,7 +61,6 @@ class Progress:
     unshown: int  # samples that arrived too fast to be shown; they are in the run file
     gone: Sequence[str]  # why ports were lost that have not come back
     silent_s: float  # since the first sensor's last reading
-    missing_share: float  # of the first sensor's latest block
     trouble: Trouble | None
     marks: Sequence[tuple[float, str]]  # on the run's time scale, as in the run file and on the page
     tick: bool = True  # whether this is the regular update, and not the start or a new mark
@@ -126,7 +125,6 @@ class LiveState:
         self._motion = MotionAccumulator(self._rate_hz, options=options_for("fast"))
         self._found: LiveMotion | NotYet = NotYet("no samples so far")
         self._found_ns = 0
-        self.missing_share = 0.0
         self._stamps: deque[I8] = deque()
         self._last_ns: int | None = None
 
@@ -139,12 +137,10 @@ class LiveState:
     def push(self, blocks: Iterable[tuple[int, Block]]) -> None:
         """Take blocks of samples by channel."""
         for channel, block in blocks:
-            missing = int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
-            self.missing += missing
+            self.missing += int(np.count_nonzero(block.flags & np.uint8(Flag.MISSING)))
             self.useful.setdefault(channel, Usefulness()).push(block)
             if channel != self._channel or not len(block):
                 continue
-            self.missing_share = missing / len(block)
             self._motion.push(block.t, block.distance, block.flags)
             if channel == 0:
                 self.origin.push(block)
@@ -176,8 +172,9 @@ class LiveState:
 def demand_room() -> None:
     """Raise MemoryError if the libraries of the analysis would not find memory, which would block or end the process.
 
-    The memory is requested as one private block, because a limit on a program's data ignores shared memory, and
-    released untouched.
+    Under ``ulimit -v`` of 500, 600 and 800 MiB a recording without this check hangs when the libraries are loaded, and
+    with it ends with its run file. The memory is requested as one private block, because a limit on a program's data
+    ignores shared memory, and released untouched.
     """
     private = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_PRIVATE") else {}
     try:

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+
+from msgspec.structs import replace
 
 from acquisition.block import Block
 from acquisition.decoders.decoder import Decoder
+from acquisition.events import Continued, Event, Lost, Reopened, Replaced
 from acquisition.live.decoding import SensorChain
 from acquisition.readings import NO_READINGS, Read, Reading
 from springmass.session.failures import Failures
@@ -36,7 +38,7 @@ class Return:
     """A port that came back and has not sent enough to decide where its bytes go, with those bytes."""
 
     host_ns: int
-    facts: Mapping[str, Any]
+    event: Reopened
     decoder: Decoder
     reads: list[Read] = field(default_factory=list)
 
@@ -104,13 +106,13 @@ class Tee:
         except Exception as error:  # the bytes are recorded, and a display error must not end the run
             self._failures.note("decoder", error)
 
-    def event(self, port: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
+    def event(self, port: int, host_ns: int, event: Event) -> None:
         """Take an event; called on the reading thread."""
         with self._lock:
-            if kind == "lost":
+            if isinstance(event, Lost):
                 self._settle(port)
-                self.gone[port] = str(facts.get("why", ""))
-            elif kind == "reopened":
+                self.gone[port] = event.why or ""
+            elif isinstance(event, Reopened):
                 self.gone.pop(port, None)
                 if self._kept is not None:
                     # The coming run must not contain earlier reads, for they may be from another sensor.
@@ -118,14 +120,14 @@ class Tee:
                 if self._parts:
                     if port in self._begun:  # else what it sends is the first part
                         sensor = self._sensors[port]
-                        self._returns[port] = Return(host_ns, facts, sensor.family.decoder(**sensor.options))
+                        self._returns[port] = Return(host_ns, event, sensor.family.decoder(**sensor.options))
                     return
-            self._interrupt(port, host_ns, kind, facts)
+            self._interrupt(port, host_ns, event)
 
-    def _interrupt(self, port: int, host_ns: int, kind: str, facts: Mapping[str, Any]) -> None:
+    def _interrupt(self, port: int, host_ns: int, event: Event) -> None:
         channel = self._channels[port]
         if self._recorder is not None:
-            self._recorder.event(channel, host_ns, kind, facts)
+            self._recorder.event(channel, host_ns, event)
         try:
             self._chains[channel].lost()
         except Exception as error:
@@ -147,7 +149,7 @@ class Tee:
             if not readings and sum(len(data) for _, _, data in back.reads) < UNDECIDED_BYTES:
                 return False
             if readings and sensor.runs_on(last, readings[0]):
-                self._interrupt(port, back.host_ns, "reopened", {**back.facts, "sensor": "continued"})
+                self._interrupt(port, back.host_ns, replace(back.event, sensor="continued"))
                 return True
         self._begin_part(port, back)
         return True
@@ -162,10 +164,10 @@ class Tee:
         """Record a port's further data in the next free channel; without one, in the same channel after an event."""
         before, channel = self._channels[port], len(self._chains)
         if self._recorder is None or channel > HIGHEST_CHANNEL:
-            self._interrupt(port, back.host_ns, "reopened", back.facts)
+            self._interrupt(port, back.host_ns, back.event)
             return
-        self._recorder.event(before, back.host_ns, "replaced", {**back.facts, "channel": channel})
-        self._recorder.event(channel, back.host_ns, "continues", {**back.facts, "of": before})
+        self._recorder.event(before, back.host_ns, Replaced(**back.event.facts, channel=channel))
+        self._recorder.event(channel, back.host_ns, Continued(**back.event.facts, of=before))
         self._channels[port] = channel
         self._chains.append(self._sensors[port].chain())
         self.readings.append(0)

@@ -21,6 +21,7 @@ import numpy as np
 
 from acquisition.block import Block
 from acquisition.clock import Clock
+from acquisition.events import RunEnded, Triggered, Zeroed
 from acquisition.live.calibration import StillPoint, against_ruler, from_still
 from acquisition.live.reader import PortLine, PortReader
 from pipeline.streaming import LiveMotion, NotYet
@@ -206,23 +207,22 @@ class Session:
         with self.stops.raising(False):
             recorder = self.recorder = Recorder(log, self._header(), self._clock)
             start_ns = self._clock.now_ns()
-            self.failures.tell = lambda kind, facts: recorder.event(0, self._clock.now_ns(), kind, facts)
+            self.failures.tell = lambda event: recorder.event(0, self._clock.now_ns(), event)
             with self._display(listeners, start_ns, recorder) as show:
                 try:
                     self._tee.start(recorder, self._chains, since_ns)
                     listeners.begun(recorder.path)
                     if rest is not None:
-                        recorder.event(0, start_ns, "still", {"rest_m": rest.rest_m, "noise_m": rest.noise_m})
+                        recorder.event(0, start_ns, Zeroed(rest_m=rest.rest_m, noise_m=rest.noise_m))
                     if trigger is not None:
-                        facts = {"threshold_m": trigger.threshold_m, "keep_s": trigger.keep_s}
+                        event = Triggered(threshold_m=trigger.threshold_m, keep_s=trigger.keep_s)
                         # The time of the sample itself, because an analysis leaves out the rest before it.
-                        recorder.event(0, moment_ns, "trigger", facts)
+                        recorder.event(0, moment_ns, event)
                     by = self._loop(recorder, show, start_ns, limits.seconds, listeners.marks)
                 finally:
                     self._tee.stop()
                     end_ns = self._clock.now_ns()
-            counts = self.failures.counts
-            recorder.event(0, end_ns, "ended", {"by": by, **({"failures": counts} if counts else {})})
+            recorder.event(0, end_ns, RunEnded(by=by, failures=self.failures.counts or None))
             with contextlib.suppress(WriteFailed):  # the status states the error
                 recorder.close()
         status = recorder.status
@@ -365,7 +365,6 @@ class Session:
             unshown=tee.unshown,
             gone=tuple(tee.gone.values()),
             silent_s=shown.silent_s(now_ns),
-            missing_share=shown.missing_share,
             trouble=trouble_of(shown, chains, waiting=waiting),
             marks=[((host_ns - zero_ns) * 1e-9, text) for host_ns, text in self._marks],
             tick=tick,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from datetime import timedelta
 from typing import TypeVar
 
-from springmass.errors import tell
+from springmass.errors import LOG
 from springmass.terminal.style import watched
 
 EVERY_S = 10.0
@@ -19,22 +20,22 @@ Item = TypeVar("Item")
 
 
 @contextlib.contextmanager
-def counting(what: str, total: int, *, lines: bool = False, quiet: bool = False) -> Iterator[Callable[[int], None]]:
+def counting(what: str, total: int, *, lines: bool = False) -> Iterator[Callable[[int], None]]:
     """Yield a function that shows how many of the items, named by a plural noun, are done, and the time left.
 
     Where no terminal shows the bar, ``lines`` writes ``reports 12/300, 0:00:40 left`` every ten seconds, by the average
     time per finished item.
     """
-    if quiet or not watched(sys.stderr):
+    if not (LOG.isEnabledFor(logging.INFO) and watched(sys.stderr)):
         began_s = shown_s = time.monotonic()
 
         def write(done: int) -> None:
             nonlocal shown_s
             now_s = time.monotonic()
-            if lines and not quiet and 0 < done < total and now_s - shown_s >= EVERY_S:
+            if lines and 0 < done < total and now_s - shown_s >= EVERY_S:
                 shown_s = now_s
                 left_s = (now_s - began_s) * (total - done) / done
-                tell(f"{what} {done}/{total}, {timedelta(seconds=round(left_s))} left")
+                LOG.info(f"{what} {done}/{total}, {timedelta(seconds=round(left_s))} left")
 
         yield write
         return
@@ -47,9 +48,12 @@ def counting(what: str, total: int, *, lines: bool = False, quiet: bool = False)
         yield lambda done: bar.update(task, completed=done)
 
 
-def counted(items: Iterable[Item], total: int, what: str, *, quiet: bool = False) -> Iterator[Item]:
+def counted(items: Iterable[Item], total: int, what: str) -> Iterator[Item]:
     """Yield items, and show on a terminal how many are done if there are at least two."""
-    with counting(what, total, quiet=quiet or total < 2) as update:
+    if total < 2:
+        yield from items
+        return
+    with counting(what, total) as update:
         for done, item in enumerate(items, 1):
             yield item
             update(done)

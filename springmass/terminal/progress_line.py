@@ -12,8 +12,6 @@ UNWATCHED_LINES = 30
 READER_WAIT_S = 0.5  # output not written within this time has no reader, which is noted in the run
 FIRST_MOTION_S = 1.5
 SILENT_S = 1.5  # silence of a sensor that the progress line reports
-GOOD, FAIR = (1.0, 0.05), (10.0, 1 / 3)
-"""Limits of the relative uncertainty, in 1/1000 of the period and 1/50 of the amplitude, and of the missing share."""
 
 
 class ProgressLine:
@@ -58,7 +56,7 @@ class ProgressLine:
 
 
 def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
-    """Return time, motion and its reliability, rate, missing values, gaps, and bytes safe on disk."""
+    """Return time, motion, rate, missing values, gaps, and bytes safe on disk."""
     parts = ["waiting for the bob" if progress.waiting else f"{progress.seconds:.0f} s"]
     # On a terminal the first analysis, which loads its libraries, must not delay troubles and keys.
     listening = style.terminal and progress.seconds < FIRST_MOTION_S
@@ -66,7 +64,6 @@ def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
     if isinstance(motion, LiveMotion):
         form = concise if style.terminal else shown
         parts += [f"T {form(motion.period, style)}", f"A {form(motion.amplitude, style)}"]
-        parts.append(f"trust {_trust_in(motion, progress.missing_share)}")
     else:
         parts.append(motion.why)
     parts.append(f"{progress.rate_hz:.0f} Hz")
@@ -76,16 +73,6 @@ def _parts(progress: Progress, style: TerminalStyle) -> list[str]:
         if progress.disk_free_bytes is not None:
             parts.append(f"{progress.disk_free_bytes / 1e9:.1f} GB left")
     return parts
-
-
-def _trust_in(motion: LiveMotion, missing_share: float) -> str:
-    """Return how reliable the displayed motion is: good, fair or poor, by its uncertainty and its missing readings."""
-    period, amplitude = motion.period, motion.amplitude
-    off = max(period.u / period.value / 1e-3, amplitude.u / max(abs(amplitude.value), 1e-12) / 2e-2)
-    for word, (most_off, most_missing) in (("good", GOOD), ("fair", FAIR)):
-        if off <= most_off and missing_share <= most_missing:
-            return word
-    return "poor"
 
 
 def _troubles(progress: Progress) -> list[str]:

@@ -21,7 +21,8 @@ from acquisition.errors import AcquisitionError
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from acquisition.recordings.recording import FormatIssue
-from storage.errors import LogGrowing, NotALog, RunDamaged, RunExists, StorageError
+from storage.atomic import already_exists
+from storage.errors import LogGrowing, NotALog, RunDamaged, StorageError
 from storage.recovery.report import LossCount, Losses, RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
 from storage.run_file.writing import RunWriter, run_writer
@@ -137,7 +138,7 @@ def recover(
             occupied.remove(path)
             runs[path] = existing
     if occupied and occupied[0] == next(iter(paths.values())):
-        raise _already_exists(occupied[0])
+        raise already_exists(occupied[0])
     missing = [(part, path) for part, path in paths.items() if path not in (*runs, *occupied)]
     for start in range(0, len(missing), RUNS_PER_PASS):
         targets = dict(missing[start : start + RUNS_PER_PASS])
@@ -145,7 +146,7 @@ def recover(
             _check_log_inside(run.path, contents, sha256)
             runs[run.path] = run
     if occupied:  # by now the other run files exist
-        raise _already_exists(occupied[0])
+        raise already_exists(occupied[0])
     return RecoverReport(
         contents.path,
         tuple(runs[path] for path in paths.values()),
@@ -240,7 +241,3 @@ def _existing_run(path: Path, contents: LogContents, sha256: str) -> RecoveredRu
             return RecoveredRun(sensor, part.number, path, len(run), noted["decoding"], losses, existed=True)
     except (StorageError, KeyError, TypeError, ValueError):
         return None
-
-
-def _already_exists(path: Path) -> RunExists:
-    return RunExists(path, "already exists", "choose another name or allow overwriting")

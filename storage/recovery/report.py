@@ -14,18 +14,15 @@ from typing import Any
 import numpy as np
 
 from acquisition.block import Block, Flag
+from acquisition.events import Continued, Dropped, Event, Lost, Reopened
 from acquisition.recordings.recording import FormatIssue
 from storage.wire_log.records import SensorEntry
 from storage.wire_log.scanning import Damage
-from storage.wire_log.survey import goes_on
 
 SILENCE_S, SILENT_PERIODS = 1.5, 5.0
 """A sensor counts as gone if it was silent at the end for longer than this time, s, and this many sample periods."""
 NO_TARGET_S = 1.0
 """Minimum duration of a reported loss of the target, s; shorter ones appear only as missing samples."""
-
-Event = tuple[int, str, Mapping[str, Any]]
-"""Time of an event on the host's monotonic clock, ns, its kind and its facts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +112,7 @@ class LossCount:
         else:
             self._known_t, self._missing_since = start, True
 
-    def losses(self, events: Sequence[Event], start_ns: int, end_ns: int, *, last: bool) -> Losses:
+    def losses(self, events: Sequence[tuple[int, Event]], start_ns: int, end_ns: int, *, last: bool) -> Losses:
         """Return the losses of a part between two times of the host's clock; ``last`` if no later part follows."""
         if self._missing_since and self._known_t is not None:
             self._add(np.array([self._last_t - self._known_t]))
@@ -123,33 +120,27 @@ class LossCount:
         last_ns = start_ns if self._last_ns is None else self._last_ns
         gone_s = (end_ns - last_ns) * 1e-9
         # A port that was lost before the first reading of a run may return without an event.
-        why = [str(facts.get("why", "")) for mono_ns, kind, facts in events if kind == "lost" and mono_ns >= last_ns]
+        why = [event.why or "" for ns, event in events if isinstance(event, Lost) and ns >= last_ns]
         gone = bool(why) or gone_s > max(SILENCE_S, SILENT_PERIODS * self._period_s)
-        begins = [facts for _, kind, facts in events if kind in ("continues", "reopened")]
-        another = [facts for facts in begins if facts.get("sensor") == "another"]
-        overflows = [facts for _, kind, facts in events if kind == "overflow"]
+        returns = [event for _, event in events if isinstance(event, Reopened | Continued)]
+        another = [event.why or "by its serial number" for event in returns if event.sensor == "another"]
+        overflows = [event for _, event in events if isinstance(event, Dropped)]
         return Losses(
             seconds=(end_ns - start_ns) * 1e-9,
             gone_s=max(gone_s, 0.0) if last and gone else None,
             why=why[-1] if last and why else "",
-            away=tuple(_number(facts, "gap_s") for _, kind, facts in events if kind == "reopened" and goes_on(facts)),
-            another=str(another[0].get("why") or "by its serial number") if another else "",
+            away=tuple(event.gap_s or 0.0 for _, event in events if isinstance(event, Reopened) and event.goes_on),
+            another=another[0] if another else "",
             no_target_s=self._total,
             longest_no_target_s=self._longest,
-            dropped_reads=sum(int(_number(facts, "records")) for facts in overflows),
-            dropped_bytes=sum(int(_number(facts, "bytes")) for facts in overflows),
+            dropped_reads=sum(event.records or 0 for event in overflows),
+            dropped_bytes=sum(event.bytes or 0 for event in overflows),
         )
 
     def _add(self, stretches: np.ndarray[Any, Any]) -> None:
         if stretches.size:
             self._total += float(stretches.clip(0.0).sum())
             self._longest = max(self._longest, float(stretches.max()))
-
-
-def _number(facts: Mapping[str, Any], name: str) -> float:
-    """Return a number from an event's facts; 0 if a damaged or foreign log has no number there."""
-    value = facts.get(name)
-    return float(value) if isinstance(value, int | float) else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,7 @@ from msgspec import Meta, Struct, field
 
 from acquisition.block import SourceKind
 from acquisition.errors import CalibrationError
+from acquisition.events import Event, StoredEvent
 from acquisition.live.calibration import Calibration
 from storage.schema import ValueRefused, decoded, json_text, parsed, plain, shown
 
@@ -195,26 +196,21 @@ def demand_calibration(numbers: object, key: str) -> None:
         raise ValueRefused(key, str(error)) from error
 
 
-class _Event(Struct, frozen=True, forbid_unknown_fields=True):
-    kind: _Word
-    facts: dict[str, Any] = field(default_factory=dict)
-
-
-def event_payload(kind: str, facts: Mapping[str, Any]) -> bytes:
+def event_payload(event: StoredEvent | Event) -> bytes:
     """Return the payload of an event. Facts that JSON cannot store become text, so that no event is lost."""
     try:
-        text = json_text({"kind": kind, "facts": facts})
+        text = json_text({"kind": event.kind, "facts": event.facts})
     except (TypeError, ValueError):
-        text = json_text({"kind": kind, "facts": {name: repr(value) for name, value in facts.items()}})
+        text = json_text({"kind": event.kind, "facts": {name: repr(value) for name, value in event.facts.items()}})
     return text.encode("ascii")
 
 
-def event_content(payload: bytes) -> dict[str, Any]:
-    """Return the kind and the facts of an event record.
+def event_of(payload: bytes) -> StoredEvent:
+    """Return the event of a record.
 
-    If they cannot be read, the kind is "unreadable", and the facts contain the reason and the record's first bytes.
+    If it cannot be read, its kind is "unreadable", and its facts contain the reason and the record's first bytes.
     """
     try:
-        return plain(decoded(parsed(payload, "event"), _Event, "event"))
+        return decoded(parsed(payload, "event"), StoredEvent, "event")
     except ValueRefused as error:
-        return {"kind": "unreadable", "facts": {"why": str(error), "bytes": payload[:200].decode("ascii", "replace")}}
+        return StoredEvent("unreadable", {"why": str(error), "bytes": payload[:200].decode("ascii", "replace")})

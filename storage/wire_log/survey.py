@@ -10,9 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from acquisition.events import Calibrated, Continued, Event, Reopened, Replaced, RunEnded
 from storage.errors import NotALog
-from storage.schema import ValueRefused
-from storage.wire_log.records import HIGHEST_CHANNEL, LogHeader, Record, RecordKind, demand_calibration, event_content
+from storage.schema import ValueRefused, plain
+from storage.wire_log.records import HIGHEST_CHANNEL, LogHeader, Record, RecordKind, demand_calibration, event_of
 from storage.wire_log.scanning import FOREIGN, LogContents
 
 FIRST_NOTES, LAST_NOTES = 10_000, 100
@@ -39,24 +40,22 @@ class Parts:
         self.now = {channel: Part(channel, 1) for channel in channels}
         self._count = Counter(self.now.keys())
 
-    def event(self, channel: int, content: Mapping[str, Any]) -> Part | None:
+    def event(self, channel: int, event: Event | None) -> Part | None:
         """Take an event of the log; return the part that it begins, if any."""
-        kind, facts = content["kind"], content["facts"]
-        if kind == "reopened" and channel in self.now and not goes_on(facts):
+        if isinstance(event, Reopened) and channel in self.now and not event.goes_on:
             return self._begin(channel, self.now[channel].sensor)
-        if kind == "continues":
-            return self._open(channel, facts.get("of"))
-        return self._open(facts.get("channel"), channel) if kind == "replaced" else None
+        if isinstance(event, Continued):
+            return self._open(channel, event.of)
+        return self._open(event.channel, channel) if isinstance(event, Replaced) else None
 
     def unknown(self, channel: int) -> Part | None:
         """Take data of a channel that no intact event has opened: they are of the log's sensor, if it has only one."""
         return self._begin(channel, *self._count) if len(self._count) == 1 else None
 
-    def _open(self, channel: object, of: object) -> Part | None:
-        if not (isinstance(channel, int) and 0 <= channel <= HIGHEST_CHANNEL and isinstance(of, int)):
+    def _open(self, channel: int | None, of: int | None) -> Part | None:
+        if channel is None or channel in self.now or not 0 <= channel <= HIGHEST_CHANNEL or of not in self.now:
             return None
-        before = self.now.get(of)
-        return None if before is None or channel in self.now else self._begin(channel, before.sensor)
+        return self._begin(channel, self.now[of].sensor)
 
     def _begin(self, channel: int, sensor: int) -> Part:
         self._count[sensor] += 1
@@ -64,19 +63,15 @@ class Parts:
         return self.now[channel]
 
 
-def goes_on(facts: Mapping[str, Any]) -> bool:
-    """Return whether the part goes on after an event "reopened"."""
-    return facts.get("sensor") == "continued" and "://" in str(facts.get("port", ""))
-
-
 class LogNote(NamedTuple):
-    """A mark or an event, and the part to which its channel belongs after it."""
+    """A mark or an event, and the part to which its channel belongs after it; ``event`` is one of a known kind."""
 
     kind: RecordKind
     mono_ns: int
     channel: int
     part: Part | None
     content: dict[str, Any]
+    event: Event | None
 
 
 @dataclass(slots=True)
@@ -112,39 +107,40 @@ class LogSurvey:
                     first_ns.setdefault(part, mono_ns)
                     self.spans[part].last_ns = mono_ns
             elif kind is RecordKind.MARK or kind is RecordKind.EVENT:
-                content = {"text": record.text()} if kind is RecordKind.MARK else self._event(log, record)
-                (first if count < FIRST_NOTES else last).append(
-                    LogNote(kind, mono_ns, channel, now.get(channel), content)
+                content, event = (
+                    self._event(log, record) if kind is RecordKind.EVENT else ({"text": record.text()}, None)
                 )
+                note = LogNote(kind, mono_ns, channel, now.get(channel), content, event)
+                (first if count < FIRST_NOTES else last).append(note)
                 count += 1
             self.end_ns = max(self.end_ns, mono_ns)
         for part, ns in first_ns.items():
             self.spans[part].seconds = (self.spans[part].last_ns - ns) * 1e-9
         self._notes = [*first, *last]
         self._left_out = count - len(self._notes)
-        # The event "ended" states the end; after a crash, it is the last record.
-        self.end_ns = next((note.mono_ns for note in self._notes if note.content.get("kind") == "ended"), self.end_ns)
+        # An event states the end; after a crash, it is the last record.
+        self.end_ns = next((note.mono_ns for note in self._notes if isinstance(note.event, RunEnded)), self.end_ns)
 
     def _begin(self, part: Part | None, mono_ns: int) -> Part | None:
         if part is not None:
             self.spans[part] = PartSpan(mono_ns, 0)
         return part
 
-    def _event(self, log: LogContents, record: Record) -> dict[str, Any]:
-        content = event_content(record.payload)
-        self._begin(self._parts.event(record.channel, content), record.mono_ns)
-        if content["kind"] == "calibration":
+    def _event(self, log: LogContents, record: Record) -> tuple[dict[str, Any], Event | None]:
+        stored = event_of(record.payload)
+        event = stored.typed
+        self._begin(self._parts.event(record.channel, event), record.mono_ns)
+        if isinstance(event, Calibrated):
             try:
-                demand_calibration(content["facts"], "calibration event")
+                demand_calibration(stored.facts, "calibration event")
             except ValueRefused as error:
                 raise NotALog(log.path, str(error), FOREIGN) from error
-            self.calibrations[record.channel] = content["facts"]
-        return content
+            self.calibrations[record.channel] = stored.facts
+        return plain(stored), event
 
-    def events_of(self, part: Part) -> list[tuple[int, str, Mapping[str, Any]]]:
-        """Return time, kind and facts of a part's events."""
-        events = [note for note in self._notes if note.kind is RecordKind.EVENT and note.part == part]
-        return [(note.mono_ns, note.content["kind"], note.content["facts"]) for note in events]
+    def events_of(self, part: Part) -> list[tuple[int, Event]]:
+        """Return times and events of the known kinds in a part."""
+        return [(note.mono_ns, note.event) for note in self._notes if note.event is not None and note.part == part]
 
     def parts_of(self, sensor: int) -> list[Part]:
         """Return the parts of a sensor in order."""
@@ -153,7 +149,7 @@ class LogSurvey:
     def provenance(self, origin_ns: int) -> dict[str, Any]:
         """Return marks and events as plain numbers and texts, with their times relative to ``origin_ns``."""
         by_kind: dict[RecordKind, list[dict[str, Any]]] = {RecordKind.MARK: [], RecordKind.EVENT: []}
-        for kind, mono_ns, channel, _, content in self._notes:
+        for kind, mono_ns, channel, _, content, _ in self._notes:
             t_s = (mono_ns - origin_ns) * 1e-9
             by_kind[kind].append({"mono_ns": mono_ns, "t_s": t_s, "channel": channel, **content})
         provenance: dict[str, Any] = {"marks": by_kind[RecordKind.MARK], "events": by_kind[RecordKind.EVENT]}

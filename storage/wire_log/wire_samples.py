@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
 
 import numpy as np
 
 from acquisition.block import Block
 from acquisition.decoders.registry import get_family
+from acquisition.events import Dropped, Lost, Reopened, StoredEvent, TimedOut
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from storage.wire_log.records import Record, RecordKind, SensorEntry, event_content
+from storage.wire_log.records import Record, RecordKind, SensorEntry, event_of
 from storage.wire_log.survey import Part, Parts
 
-BREAKS = frozenset({"lost", "reopened", "timeout", "overflow"})
+BREAKS = (Lost, Reopened, TimedOut, Dropped)
 """Events that interrupt the bytes of a channel."""
 HELD_READS = 4096
 """Number of reads decoded at a time; more would take more memory, fewer would give many small arrays."""
@@ -58,15 +58,15 @@ class LogDecoder:
 
     If records are missing or a port was lost, no frame spans the gap, and the first sample after it is flagged.
     ``channels`` are those of the sensors. ``chain_for`` returns the chain of a part that begins, or None if the part is
-    not decoded. ``noted`` is called with every record that is not data, and with the content of an event. ``chains``
-    has the chain of each part so far, and ``reads`` the number of its reads.
+    not decoded. ``noted`` is called with every record that is not data, and with its event. ``chains`` has the chain of
+    each part so far, and ``reads`` the number of its reads.
     """
 
     def __init__(
         self,
         channels: Iterable[int],
         chain_for: Callable[[Part], SensorChain | None],
-        noted: Callable[[Record, dict[str, Any]], object] = lambda *_: None,
+        noted: Callable[[Record, StoredEvent | None], object] = lambda *_: None,
     ) -> None:
         self._chain_for, self._noted = chain_for, noted
         self._parts = Parts(channels)
@@ -98,13 +98,13 @@ class LogDecoder:
         yield from self._samples()
 
     def _note(self, record: Record) -> None:
-        content: dict[str, Any] = {}
-        if record.kind is RecordKind.EVENT:
-            content = event_content(record.payload)
-            if content["kind"] in BREAKS and record.channel in self._parts.now:
+        event = event_of(record.payload) if record.kind is RecordKind.EVENT else None
+        if event is not None:
+            typed = event.typed
+            if isinstance(typed, BREAKS) and record.channel in self._parts.now:
                 self._break(self._parts.now[record.channel])
-            self._begin(self._parts.event(record.channel, content))
-        self._noted(record, content)
+            self._begin(self._parts.event(record.channel, typed))
+        self._noted(record, event)
 
     def _begin(self, part: Part | None) -> list[tuple[int, bytes]] | None:
         """Begin a part, and return the list of its held reads; None if it is not decoded."""

@@ -15,9 +15,11 @@ from pathlib import Path
 import pytest
 
 import springmass
+from springmass.layout import PACKAGES
 from tests.courses import bad_files, contents, short_course
 from tests.sampling import sampled
 
+ROOT = Path(__file__).parents[2]
 LIMIT_S = 300
 MANY = 2600 if os.environ.get("SPRINGMASS_TRIALS") else 26  # a hundred for each bad one
 QUICK = ("--reports", "0", "--accuracy", "fast")
@@ -81,6 +83,43 @@ def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli
     (runs / "run003.about.toml").write_text("[scene.bob]\nmass_kg = 0.2\n")
     assert "5 unchanged, 1 analysed" in cli(*command[:-1], "standard").err
     assert rows("out")[3]["bob_mass_kg"] == "0.2"
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="a change of a checkout is noticed by git")
+def test_a_changed_program_analyses_all_runs(runs, tmp_path):
+    """In a checkout the table names the commit and an uncommitted change, and either makes the rows old."""
+    checkout = tmp_path / "checkout"
+    for package in ("springmass", *PACKAGES):
+        shutil.copytree(ROOT / package, checkout / package, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def git(*words: str) -> None:
+        who = ("-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false")
+        subprocess.run(["git", "-C", checkout, *who, *words], check=True, capture_output=True)
+
+    def done() -> tuple[str, str]:
+        command = [sys.executable, "-m", "springmass", "batch", runs / "run000.txt", "-o", "out", *QUICK]
+        environment = {**os.environ, "PYTHONPATH": str(checkout)}
+        program = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+        (row,) = rows("out")
+        return re.findall(r"\d un.*analysed", program.stderr)[0], row["software"]
+
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-q", "-m", "first")
+    said, first = done()
+    assert said == "0 unchanged, 1 analysed"
+    assert first.startswith(f"springmass {springmass.__version__}+")
+    assert done() == ("1 unchanged, 0 analysed", first)
+    with (checkout / "pipeline/analyse.py").open("a") as file:
+        file.write("# a change\n")
+    said, changed = done()
+    assert said == "0 unchanged, 1 analysed"
+    assert changed.startswith(f"{first.partition(',')[0]}.")
+    assert done() == ("1 unchanged, 0 analysed", changed)
+    git("commit", "-q", "-a", "-m", "second")
+    said, second = done()
+    assert said == "0 unchanged, 1 analysed"
+    assert len({first, changed, second}) == 3
 
 
 @pytest.mark.parametrize("reports", sampled(["0", "1"], 1))

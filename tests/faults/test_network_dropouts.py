@@ -12,6 +12,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 import pytest
 
 from acquisition.clock import VirtualClock
+from acquisition.events import Lost, Reopened
 from springmass.cli import main
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
@@ -103,12 +105,14 @@ def deliver(plan: Plan, recorder: Recorder, rng: np.random.Generator) -> None:
         arrival[silent] = stop + 2e-4 * (sizes[silent] // 1400)
     arrival = np.maximum.accumulate(arrival)
     broken_off = [(start, stop) for start, stop, broken in plan.dropouts if broken]
-    events = sorted([(start, "lost") for start, _ in broken_off] + [(stop, "reopened") for _, stop in broken_off])
+    events = sorted(
+        [(start, Lost) for start, _ in broken_off] + [(stop, Reopened) for _, stop in broken_off], key=itemgetter(0)
+    )
     here = 0
     while here < n:
         while events and events[0][0] <= arrival[here]:
             at, kind = events.pop(0)
-            recorder.event(0, START_NS + round(at * 1e9), kind, {"port": "socket://bench:4001"})
+            recorder.event(0, START_NS + round(at * 1e9), kind(port="socket://bench:4001"))
         there, data = here, b""
         while there < n and arrival[there] - arrival[here] < 1e-4 and len(data) < READ_BYTES:
             data += b"" if lost[there] else sent[there]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -104,6 +105,48 @@ def test_a_file_is_whole_or_absent_after_a_signal(tmp_path: Path) -> None:
         assert len(of_command) == TRIALS
         assert set(of_command) <= {("130", "absent"), ("130", "whole"), ("0", "whole")}
         assert ("130", "absent") in of_command, "no signal came in time"
+
+
+@pytest.mark.trials
+@pytest.mark.parametrize("command", ["analyse", "batch"])
+def test_a_command_ends_after_a_signal_at_any_moment(tmp_path: Path, command: str) -> None:
+    """A new process, so most moments lie in imports: exit code 130, or 0 with all files; no defect, no half file."""
+    rng = np.random.default_rng(TRIALS)
+    inputs(tmp_path, 2000)
+    out = tmp_path / "out"
+    words = {
+        "analyse": ["analyse", str(tmp_path / "run.csv"), "-o", str(out)],
+        "batch": ["batch", str(tmp_path / "run.csv"), "--jobs", "1", "-o", str(out)],
+    }[command]
+    start = time.monotonic()
+    program = started(words, "")
+    took_s = time.monotonic() - start
+    assert program.communicate(timeout=LIMIT_S)[1]
+    took_s, whole = time.monotonic() - start - took_s, written(out)
+    for number in itertools.islice(itertools.cycle(SIGNALS), TRIALS):
+        shutil.rmtree(out)
+        program = started(words, "")
+        time.sleep(took_s * rng.random())
+        program.send_signal(number)
+        said = program.communicate(timeout=LIMIT_S)[1]
+        out.mkdir(exist_ok=True)
+        assert program.returncode in (0, 130), said
+        assert ("interrupted" in said) == (program.returncode == 130)
+        assert "error" not in said
+        left = written(out)
+        assert left.items() <= whole.items() or command == "batch", sorted(left.keys() - whole.keys())
+        assert program.returncode == 130 or left == whole
+
+
+def written(folder: Path) -> dict[str, int]:
+    """Return the finished files with their sizes; a folder or file that is being made has a name with a dot first."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    names = {path: path.relative_to(folder) for path in files}
+    return {
+        name.as_posix(): path.stat().st_size
+        for path, name in names.items()
+        if not any(part.startswith(".") for part in name.parts) and name.suffix not in (".db", ".lock")
+    }
 
 
 IMPORTING = """

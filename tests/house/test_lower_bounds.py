@@ -1,4 +1,4 @@
-"""The versions that one step of .ci/run installs are the smallest that pyproject.toml declares."""
+"""The versions that one step of .ci/nightly installs are the smallest that pyproject.toml declares."""
 
 from __future__ import annotations
 

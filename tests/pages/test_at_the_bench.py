@@ -18,7 +18,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from storage.run_file.reading import open_run
-from tests.pages.bench import MOVES, PHASE, SEEN, STAGES, Client, answer, opened, press
+from tests.pages.bench import LIMIT_S, MOVES, PHASE, SEEN, STAGES, Client, answer, opened, press
 
 LOST_ONCE = """() => {
   const trouble = document.getElementById('trouble');
@@ -185,6 +185,27 @@ def test_messages_are_the_samples(record: Callable[..., Any]) -> None:
         while not (isinstance(message, str) and json.loads(message).get("marks")):
             message = run.recv()
         assert json.loads(message)["marks"][0][1] == "from a script"
+    program.end()
+
+
+def test_the_amplitude_is_newer_than_the_analysis(record: Callable[..., Any]) -> None:
+    """Between two analyses the motion is sent again: with the amplitude of the last seconds, and without charts."""
+    program = record()
+    of_count: dict[int, dict[str, Any]] = {}
+    with Client(program.address).socket() as run:
+        while True:
+            message = run.recv(timeout=LIMIT_S)
+            if not isinstance(message, str) or (motion := json.loads(message))["type"] != "motion":
+                continue
+            first = of_count.setdefault(motion["count"], motion)
+            if motion is not first and "charts" in first:
+                break
+    assert "charts" not in motion
+    assert motion["estimates"]["amplitude_now"].pop("t_s") > motion["t_s"] == first["t_s"]
+    for sent in (first, motion):
+        assert sent["estimates"].pop("amplitude_now")["u"] > 0.0
+    del first["charts"]
+    assert motion == first
     program.end()
 
 

@@ -37,7 +37,7 @@ def lines_after(program: Any) -> list[str]:
 
 
 def test_what_means_nothing_is_refused_and_the_page_goes_on(start: Callable[..., Any]) -> None:
-    """A message closes its socket with 1003, a request gets its status; one short line, and viewers go on seeing."""
+    """A message closes its socket with 1003, a request gets its status; a few short lines, and viewers go on seeing."""
     program = start("page", str(OLD_RUN))
     client = Client(program.address)
     with client.socket() as looking:
@@ -53,7 +53,7 @@ def test_what_means_nothing_is_refused_and_the_page_goes_on(start: Callable[...,
         assert fit_of(looking)["estimates"]
     assert client.get("/").status == 200
     lines = lines_after(program)
-    assert len(lines) == 1
+    assert 1 <= len(lines) == len({line.partition(" sent ")[2] or line for line in lines}) <= 3
     assert all(len(line) < 300 for line in lines)
     assert "Traceback" not in "".join(lines)
 

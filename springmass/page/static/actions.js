@@ -4,14 +4,12 @@ function press(button, on) { $(button).setAttribute("aria-pressed", String(on));
 function label(button, text) { $(button).firstChild.textContent = `${text} `; }
 function show_window() { const s = WINDOWS[window_index]; label("window", s === Infinity ? "all" : `${s} s`); }
 
-// Requests that the controller can make in each phase of the recorder; viewers can make none.
-const ALLOWED = { ready: ["zero", "arm", "record", "close"], armed: ["arm", "record", "close"], recording: ["mark", "note", "stop"], built: ["report", "note", "discard", "close"], replay: ["report", "note"] };
+// The requests that the server accepts now, by the id of their button; viewers can make none.
+const allowed = () => (run.role === "controller" && bench().requests) || [];
 
 function show_actions() {
-  const allowed = run.role === "controller" ? ALLOWED[bench().phase] || [] : [];
-  for (const id of ["zero", "arm", "record", "mark", "note", "stop", "report", "discard", "close"]) $(id).hidden = !allowed.includes(id);
-  if (bench().phase === "replay" && run.source !== "REPLAY") $("report").hidden = $("note").hidden = true;
-  if (bench().discarded) $("discard").hidden = true;
+  const possible = allowed();
+  for (const id of ["zero", "arm", "record", "mark", "note", "stop", "report", "discard", "close"]) $(id).hidden = !possible.includes(id);
   $("report").classList.toggle("primary", bench().phase === "built");
   label("arm", bench().phase === "armed" ? "Disarm" : "Arm trigger");
   $("share").hidden = !run.share;
@@ -21,7 +19,7 @@ function show_actions() {
 // The recorder may change its phase while a dialog is open; a request that it no longer accepts is reported.
 let refused = "", refused_until = 0;
 function request(id, message) {
-  if ((ALLOWED[bench().phase] || []).includes(id)) { ask_server(message); return; }
+  if (allowed().includes(id)) { ask_server(message); return; }
   refused = `Not done: the recorder was at "${PHASES[bench().phase] || bench().phase}"; try again.`;
   refused_until = performance.now() + 6000;
   show_state();

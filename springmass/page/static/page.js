@@ -2,8 +2,7 @@
 // The page shows only samples in the recording's log, and only states that the recorder has acknowledged.
 const $ = (id) => document.getElementById(id);
 let run = null, samples = [], state = null, socket = null, wait_ms = 250, dirty = true, came_at = 0;
-// The last messages about all samples and about the last seconds.
-let motion = null, now = null;
+let motion = null;
 
 const scale = () => (run.unit === "m" ? 1e3 : 1);
 const unit = () => (run.unit === "m" ? "mm" : run.unit);
@@ -40,10 +39,16 @@ function lost() {
 function receive(message) {
   if (message.type === "hello") hello(message);
   else if (message.type === "state") { state = message; show_state(); }
-  else if (message.type === "motion") { motion = message; Object.values(motion.charts || {}).forEach(decoded); show_motion(); }
-  else if (message.type === "now") { now = message; show_motion(); }
+  else if (message.type === "motion") { receive_motion(message); show_motion(); }
   else if (message.type === "region") show_region(message);
   dirty = true;
+}
+
+function receive_motion(message) {
+  Object.values(message.charts || {}).forEach(decoded);
+  // A message of the same analysis has a newer amplitude and no charts, because these are the same.
+  if (motion && motion.count === message.count && !message.charts) message.charts = motion.charts;
+  motion = message;
 }
 
 function hello(message) {
@@ -53,7 +58,7 @@ function hello(message) {
   const other = !run || run.session !== message.session;
   run = message;
   came_at = performance.now();
-  if (other) { motion = now = null; begin_anew(); }
+  if (other) { motion = null; begin_anew(); }
   document.title = `${run.title || run.name} · springmass`;
   $("name").textContent = run.title ? `${run.title} (${run.name})` : run.name;
   $("source").textContent = run.simulated ? `SIMULATED${run.source === "REPLAY" ? " · REPLAY" : ""}` : run.source;

@@ -56,13 +56,12 @@ const label_of = (name) => (name === "amplitude_now" && is_over() ? "amplitude a
 function show_motion() {
   if (!motion) return;
   $("why").textContent = motion.why || "";
-  const fresher = now && !is_over() && now.t_s > (motion.t_s || 0) ? now.estimates : {};
-  const estimates = { ...motion.estimates, ...(motion.estimates ? fresher : {}) };
+  const estimates = motion.estimates || {};
   $("estimates").replaceChildren(...Object.keys(LABELS).filter((name) => estimates[name]).map((name) => {
     const group = pair(label_of(name) + (OF_LAW.has(name) && motion.stated_law ? `, law ${motion.stated_law}` : ""), short(estimates[name])), detail = group.lastChild, age = document.createElement("span");
     detail.title = estimates[name].text;
     group.dataset.name = name;
-    group.dataset.t = fresher[name] ? now.t_s : motion.t_s;
+    group.dataset.t = estimates[name].t_s || motion.t_s;
     age.className = "age";
     detail.append(age);
     return group;

@@ -8,7 +8,7 @@ import io
 import json
 import logging
 import socket
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +21,14 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from springmass import charts
 from springmass.charts.looks import looks_script
-from springmass.errors import SENSOR, ProgramError, complain
-from springmass.page.state import PageState
+from springmass.errors import LOG, SENSOR, ProgramError
+from springmass.page.state import REQUESTS, PageState
 from springmass.page.view import View, json_of
 from springmass.page.web.security import ACT, REPORT, Access, guarded
 from springmass.session.failures import raised_at
 from storage.errors import one_line
 
-LOG = logging.getLogger("page")  # not below "springmass", whose messages are all printed
+PAGE_LOG = logging.getLogger("page")  # not below "springmass", whose messages are all printed
 PAGE_FILES = Path(__file__).parents[1] / "static"
 """The files of this page alone; those of all charts are in the room of charts."""
 TURN_S = 0.0225
@@ -43,23 +43,6 @@ ALONE_S = 30.0
 MOST_CONNECTIONS = 256
 LONGEST_MESSAGE, LONGEST_TEXT = 4096, 500
 """Maximum size of a browser's message in bytes, and of a text in it in characters."""
-A_LINE_EVERY_S = 60.0
-Limits = tuple[float, float]
-ANY_TIME: Limits = (-1e12, 1e12)
-REQUESTS: Mapping[str, Mapping[str, Limits | None]] = {
-    "region": {"from": ANY_TIME, "to": ANY_TIME},
-    "zero": {},
-    "arm": {"threshold_m": (1e-4, 1.0), "keep_s": (0.0, 60.0)},
-    "disarm": {},
-    "record": {},
-    "mark": {"text": None},
-    "note": {"text": None},
-    "stop": {},
-    "report": {},
-    "discard": {},
-    "close": {},
-}
-"""Requests with the limits of their numbers, in m and s; None is a text. Any viewer may ask for a region."""
 
 
 class Refused(Exception):
@@ -71,7 +54,7 @@ def checked(text: str | None) -> dict[str, Any]:
     try:
         request = json.loads(text or "")
         accepted = {"type": request["type"]}
-        for name, limits in REQUESTS[request["type"]].items():
+        for name, limits in REQUESTS[request["type"]][0].items():
             if limits is None:
                 accepted[name] = " ".join(request[name].split())[:LONGEST_TEXT]
             elif limits[0] <= (number := float(request[name])) <= limits[1]:
@@ -113,14 +96,14 @@ class Server:
         try:
             self._update()
         except Exception:  # a defect; the next turn may succeed
-            LOG.exception("the page could not be brought up to date")
+            PAGE_LOG.exception("the page could not be brought up to date")
         self._polled(self._viewers)
 
     def _update(self) -> None:
         page = self._page
         page.poll()
         if page.watcher is not None:
-            self._texts |= {"motion": page.watcher.text, "now": page.watcher.now_text}
+            self._texts |= {"motion": page.watcher.text, "update": page.watcher.update}
         self._due_s -= TURN_S
         if self._due_s <= 0.0 or self._bench is not page.bench:
             self._due_s, self._bench = STATE_S, page.bench
@@ -150,10 +133,10 @@ class Server:
                 ends = await asyncio.gather(*tasks, return_exceptions=True)
             error = next(end for end in ends if not isinstance(end, asyncio.CancelledError))
             if isinstance(error, Refused):
-                LOG.warning("%s sent %s; its connection is closed", client, error)
+                PAGE_LOG.warning("%s sent %s; its connection is closed", client, error)
                 await browser.close(1003)
             elif not isinstance(error, WebSocketDisconnect):
-                LOG.error("a defect of the page closed the connection of %s", client, exc_info=error)
+                PAGE_LOG.error("a defect of the page closed the connection of %s", client, exc_info=error)
                 await browser.close(1011)
 
     async def _receive(self, browser: WebSocket) -> None:
@@ -188,7 +171,7 @@ class Server:
                         frame = self._frame(view, number, sent[number])
                         sent[number] += (len(frame) - 16) // 16
                         await browser.send_bytes(frame)
-                for kind in ("state", "motion", "now"):
+                for kind in ("state", "motion", "update"):
                     if view is not self._page.view:
                         break  # it was replaced meanwhile; texts about the next one must wait for its hello message
                     text = self._texts.get(kind, "")
@@ -283,26 +266,20 @@ def serve(
 
 
 class _Lines(logging.Handler):
-    """Writes each record as one line without a traceback; of each level, at most one line a minute in all."""
+    """Writes each kind of message once, as one line without a traceback, whatever clients do and however often."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self._written_s: dict[int, float] = {}
-        self._left_out = 0
+        self._written: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
-        now_s = record.relativeCreated / 1e3
-        if now_s - self._written_s.get(record.levelno, -A_LINE_EVERY_S) < A_LINE_EVERY_S:
-            self._left_out += 1
+        if record.msg in self._written:
             return
-        self._written_s[record.levelno] = now_s
+        self._written.add(record.msg)
         text = " ".join(record.getMessage().split())[:300]
         if record.exc_info and (error := record.exc_info[1]) is not None:
             text += f": {type(error).__name__} at {raised_at(error)}: {one_line(error)[:200]}"
-        if self._left_out:
-            text += f" ({self._left_out} earlier messages were left out)"
-            self._left_out = 0
-        complain(f"page: {text}")
+        LOG.warning(f"page: {text}")
 
 
 ELSEWHERE = ("192.0.2.1", 9)

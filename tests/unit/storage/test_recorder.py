@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.clock import VirtualClock
+from acquisition.events import Lost, StoredEvent
 from acquisition.live.reader import Sink
 from storage.errors import RunExists, WriteFailed
 from storage.recorder import Recorder
@@ -37,7 +38,7 @@ def test_everything_put_is_in_the_log_in_order(tmp_path: Path) -> None:
         sink.reads([(1, 500, b"last")])
         recording.mark("let go")
         recording.mark("stopped", host_ns=9, channel=1)
-        sink.event(1, 501, "lost", {"why": "unplugged"})
+        sink.event(1, 501, Lost(why="unplugged"))
     whole = list(read_log(tmp_path / "run.wire"))
     records = [record for record in whole if record.kind is not RecordKind.HEADER]
     data = [(record.channel, record.mono_ns, record.payload) for record in records[:501]]
@@ -112,7 +113,7 @@ def test_events_and_marks_outlast_an_overflow() -> None:
     assert disk.held.wait(WAIT_S)
     for number in range(1, 20):
         recording.put(0, number, b"x" * 10)
-        recording.event(0, number, "lost", {"number": number})
+        recording.event(0, number, StoredEvent("lost", {"number": number}))
     recording.mark("now", host_ns=20)
     disk.writes_pass.set()
     recording.drain()

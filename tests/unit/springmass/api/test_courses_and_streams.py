@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 import xarray as xr
 
 import springmass as sm
@@ -28,6 +29,18 @@ def test_a_course_is_a_frame_with_errors_as_rows(tmp_path: Path) -> None:
     assert frame.loc[0, "period"] == sm.analyse(PAIR[0], accuracy="fast")["T"].value
     with ThreadPoolExecutor(2) as executor:
         pd.testing.assert_frame_equal(sm.batch(sources, executor=executor, accuracy="fast"), frame)
+
+
+def test_a_source_without_a_name_is_a_row(tmp_path: Path) -> None:
+    """A series has no name, and arrays that are too short say so; a scene that is not there stops the call."""
+    t = np.arange(1000) / 100
+    series = pd.Series(0.2 + 0.05 * np.cos(8.3 * t), index=pd.Index(t, name="time"))
+    frame = sm.batch([series, (t[:3], t[:3])], accuracy="fast")
+    assert list(frame["status"]) == ["ok", "failed"]
+    assert list(frame["run"]) == ["", ""]
+    assert "\n" not in frame.loc[1, "error"]
+    with pytest.raises(sm.Error, match="nowhere"):
+        sm.batch([series], tmp_path / "nowhere.toml")
 
 
 def test_two_threads_give_the_numbers_of_one() -> None:

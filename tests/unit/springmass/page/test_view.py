@@ -14,6 +14,7 @@ import springmass
 from acquisition.block import Block
 from acquisition.clock import VirtualClock
 from acquisition.decoders.registry import get_family
+from acquisition.events import RunEnded, TimedOut, Triggered, Zeroed
 from pipeline.bench.scene import Scene
 from pipeline.track import F8, Track
 from springmass.charts.chart import decoded
@@ -55,7 +56,7 @@ def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
         for number in range(50):
             recorder.put(0, number * 100_000_000, b"R%04d\r" % (300 + number))
         recorder.mark("released", host_ns=2_000_000_000)
-        recorder.event(0, 2_500_000_000, "timeout", {"after_s": 1.0})
+        recorder.event(0, 2_500_000_000, TimedOut(after_s=1.0))
         recorder.drain()
         feed.poll()
         assert (feed.view.source, feed.view.title) == ("LIVE", "bob")
@@ -133,8 +134,8 @@ def test_marks_and_triggers_wait_for_the_first_sample(tmp_path: Path) -> None:
     path = tmp_path / "run.wire"
     with Recorder(path, header, VirtualClock()) as recorder:
         feed = LogFeed(path)
-        recorder.event(0, 500_000_000, "still", {"rest_m": 0.3, "noise_m": 2e-4})
-        recorder.event(0, 3_000_000_000, "trigger", {"threshold_m": 0.01, "keep_s": 2.0})
+        recorder.event(0, 500_000_000, Zeroed(rest_m=0.3, noise_m=2e-4))
+        recorder.event(0, 3_000_000_000, Triggered(threshold_m=0.01, keep_s=2.0))
         recorder.mark("lamp on", host_ns=4_000_000_000)
         recorder.drain()
         feed.poll()
@@ -158,8 +159,8 @@ def test_a_log_that_has_ended_is_analysed_on_the_page_as_anywhere_else(tmp_path:
     path = tmp_path / "run.wire"
     with Recorder(path, header, VirtualClock()) as recorder:
         put_samples(recorder, range(800))
-        recorder.event(0, 2_000_000_000, "trigger", {"threshold_m": 0.01, "keep_s": 2.0})
-        recorder.event(0, 8_000_000_000, "ended", {"by": "seconds"})
+        recorder.event(0, 2_000_000_000, Triggered(threshold_m=0.01, keep_s=2.0))
+        recorder.event(0, 8_000_000_000, RunEnded(by="seconds"))
     feed = LogFeed(path)
     feed.poll()
     assert feed.view.ended

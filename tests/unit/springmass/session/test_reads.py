@@ -6,7 +6,7 @@ import itertools
 import json
 from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ import pytest
 from acquisition.block import Flag, concatenate
 from acquisition.decoders.line_protocol import LineProtocolEncoder
 from acquisition.decoders.registry import get_family
+from acquisition.events import Event, Lost, Reopened, TimedOut
 from acquisition.live.decoding import SensorChain
 from acquisition.live.serial_port import SerialPort
 from acquisition.readings import Read, Readings
@@ -37,9 +38,9 @@ class Log:
         """Remember reads."""
         self.taken += reads
 
-    def event(self, channel: int, host_ns: int, kind: str, facts: dict[str, Any]) -> None:
+    def event(self, channel: int, host_ns: int, event: Event) -> None:
         """Remember an event."""
-        self.events.append(f"{channel} {host_ns} {kind} {json.dumps(facts)}")
+        self.events.append(f"{channel} {host_ns} {event.kind} {json.dumps(event.facts)}")
 
 
 def chain() -> SensorChain:
@@ -76,7 +77,7 @@ def test_what_is_recorded_decodes_to_what_was_shown() -> None:
     expected = []
     for n, (a, b) in enumerate(itertools.pairwise(cuts)):
         if n == 12:
-            tee.event(0, n * STEP_NS, "lost", {"why": "cable"})
+            tee.event(0, n * STEP_NS, Lost(why="cable"))
             other.lost()
         tee.reads([(0, n * STEP_NS, data[a:b])])
         expected.append(other.feed(n * STEP_NS, data[a:b]))
@@ -112,7 +113,7 @@ def test_a_defect_of_a_decoder_costs_no_byte_and_ends_nothing(monkeypatch: pytes
     tee, each = Tee([chain()], failures), chain()
     log = started(tee, [each], 0)
     events: list[str] = []
-    failures.tell = lambda kind, facts: events.append(f"{kind} {facts['error']} {facts['why']}")
+    failures.tell = lambda event: events.append(f"{event.kind} {event.facts['error']} {event.facts['why']}")
 
     def break_down(host_ns: int, data: bytes) -> Readings:
         raise RuntimeError("no such form")
@@ -133,7 +134,7 @@ def test_a_run_begins_with_the_reads_kept_from_before() -> None:
     for i in range(1, 20):
         tee.reads([(0, i * STEP_NS, frame(i))])
         if i == 10:
-            tee.event(0, i * STEP_NS, "timeout", {})
+            tee.event(0, i * STEP_NS, TimedOut())
             tee.blocks()
     tee.forget(3 * STEP_NS)
     log = started(tee, [chain()], 5 * STEP_NS)
@@ -160,8 +161,8 @@ class Bench:
 
     def away(self, since: int, until: int) -> None:
         """Lose the port, and let it come back."""
-        self.tee.event(0, since * STEP_NS, "lost", {"why": "cable"})
-        self.tee.event(0, until * STEP_NS, "reopened", {"gap_s": 0.01 * (until - since), "sensor": "assumed"})
+        self.tee.event(0, since * STEP_NS, Lost(why="cable"))
+        self.tee.event(0, until * STEP_NS, Reopened(gap_s=0.01 * (until - since), sensor="assumed"))
 
     @property
     def kinds(self) -> list[str]:
@@ -218,7 +219,7 @@ def test_what_a_network_port_sent_before_it_was_lost_again_is_recorded() -> None
         bench.away(1, 100)
         bench.send(101, b"half a li")
         if lost:
-            bench.tee.event(0, 102 * STEP_NS, "lost", {"why": "cable"})
+            bench.tee.event(0, 102 * STEP_NS, Lost(why="cable"))
         bench.tee.stop()
         assert bench.log.taken[1:] == [(0, 101 * STEP_NS, b"half a li")]
         assert bench.kinds == ["0 lost", *(["0 lost"] if lost else [])]

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from acquisition.block import Flag
 from acquisition.clock import VirtualClock
+from acquisition.events import Continued, Event, Lost, Reopened, Replaced, RunEnded
 from springmass.cli import main
 from storage.recorder import Recorder
 from storage.recovery.recover import recover
@@ -31,16 +30,16 @@ def send(recorder: Recorder, channel: int, start_s: float, seconds: float, first
         recorder.put(channel, int((start_s + n / 100) * SECOND_NS), line(first + n, echo_us))
 
 
-def event(recorder: Recorder, channel: int, at_s: float, kind: str, facts: Mapping[str, Any]) -> None:
+def record_event(recorder: Recorder, channel: int, at_s: float, event: Event) -> None:
     """Record an event of a port."""
-    recorder.event(channel, int(at_s * SECOND_NS), kind, facts)
+    recorder.event(channel, int(at_s * SECOND_NS), event)
 
 
 def comes_back(recorder: Recorder, before: int, channel: int, at_s: float, sensor: str = "identified") -> None:
     """Record that a port was lost a second ago and goes on in another channel."""
-    event(recorder, before, at_s - 1, "lost", {"why": "unplugged"})
-    event(recorder, before, at_s, "replaced", {"channel": channel, "sensor": sensor})
-    event(recorder, channel, at_s, "continues", {"of": before, "sensor": sensor})
+    record_event(recorder, before, at_s - 1, Lost(why="unplugged"))
+    record_event(recorder, before, at_s, Replaced(channel=channel, sensor=sensor))
+    record_event(recorder, channel, at_s, Continued(of=before, sensor=sensor))
 
 
 def recording(path: Path, sensors: int = 1, port: str = "COM3") -> Recorder:
@@ -63,7 +62,7 @@ def test_each_long_part_has_a_run_file_with_a_time_of_its_own(tmp_path: Path) ->
         send(recorder, 1, 20.0, 3.0)
         comes_back(recorder, 1, 2, 30.0, "another")
         send(recorder, 2, 30.0, 40.0)
-        event(recorder, 0, 70.0, "ended", {"by": "seconds"})
+        record_event(recorder, 0, 70.0, RunEnded(by="seconds"))
     report = recover(log)
     assert [run.path.name for run in report.runs] == ["run.h5", "run.part3.h5"]
     assert [run.samples for run in report.runs] == [1500, 4000]
@@ -104,8 +103,8 @@ def test_a_port_that_came_back_in_its_channel(tmp_path: Path, port: str, sensor:
     log = tmp_path / "run.wire"
     with recording(log, port=port) as recorder:
         send(recorder, 0, 1.0, 15.0)
-        event(recorder, 0, 16.5, "lost", {"port": port, "why": "gone"})
-        event(recorder, 0, 20.0, "reopened", {"port": port, "gap_s": 3.5, "sensor": sensor})
+        record_event(recorder, 0, 16.5, Lost(port=port, why="gone"))
+        record_event(recorder, 0, 20.0, Reopened(port=port, gap_s=3.5, sensor=sensor))
         send(recorder, 0, 21.0, 20.0, first=2000)
     report = recover(log)
     assert [run.samples for run in report.runs] == samples
@@ -121,9 +120,9 @@ def test_a_sensor_that_was_away_at_the_start_is_not_lost(tmp_path: Path) -> None
     for name, lost_s in (("early", 0.5), ("late", 20.0)):
         log = tmp_path / f"{name}.wire"
         with recording(log) as recorder:
-            event(recorder, 0, lost_s, "lost", {"why": "unplugged"})
+            record_event(recorder, 0, lost_s, Lost(why="unplugged"))
             send(recorder, 0, 5.0, 15.0)
-            event(recorder, 0, 20.5, "ended", {"by": "seconds"})
+            record_event(recorder, 0, 20.5, RunEnded(by="seconds"))
         (run,) = recover(log).runs
         assert (run.losses.gone_s is not None) == (name == "late")
 

@@ -14,6 +14,7 @@ import pytest
 from acquisition.block import Block, Flag, concatenate
 from acquisition.clock import VirtualClock
 from acquisition.decoders.registry import get_family
+from acquisition.events import Dropped, Event, RunEnded, StoredEvent, TimedOut
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
 from storage.errors import LogGrowing, NotALog, RunDamaged, RunExists
@@ -122,15 +123,15 @@ def test_a_torn_log_gives_what_it_holds_and_says_so(tmp_path: Path) -> None:
         assert run.originals()[0].data == bytes(data)
 
 
-@pytest.mark.parametrize("event", ["timeout", "overflow"])
-def test_no_frame_is_put_together_across_a_break(event: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("event", [TimedOut(), Dropped()], ids=lambda event: event.kind)
+def test_no_frame_is_put_together_across_a_break(event: Event, tmp_path: Path) -> None:
     """Half a frame before lost reads and half a frame after them make no value."""
     header = LogHeader(sensors=(SensorEntry(0, "maxbotix-hr"), SensorEntry(1, "maxbotix-hr")), mono_ns=0, unix_ns=0)
     log = tmp_path / "run.wire"
     with Recorder(log, header, VirtualClock()) as recorder:
         for channel in (0, 1):
             recorder.put(channel, 1, b"R1000\rR1000\rR12")
-        recorder.event(0, 2, event, {})
+        recorder.event(0, 2, event)
         for channel in (0, 1):
             recorder.put(channel, 3, b"34\rR1000\rR1000\r")
     broken, whole = (samples_of(run.path) for run in recover(log).runs)
@@ -150,7 +151,7 @@ def test_the_last_calibration_in_the_log_is_applied(tmp_path: Path) -> None:
     with Recorder(tmp_path / "b.wire", LogHeader(sensors=(sensor,), mono_ns=0, unix_ns=0), VirtualClock()) as recorder:
         for host_ns, data in wire(50):
             recorder.put(0, host_ns, data)
-        recorder.event(0, 1, "calibration", Calibration(offset_m=2.0).to_mapping())
+        recorder.event(0, 1, StoredEvent("calibration", Calibration(offset_m=2.0).to_mapping()))
     recover(tmp_path / "b.wire", tmp_path / "b.h5")
     with open_run(tmp_path / "a.h5") as first, open_run(tmp_path / "b.h5") as second:
         assert first.samples().distance[0] == pytest.approx(1.3, abs=1e-4)
@@ -291,7 +292,7 @@ def test_what_a_sensor_did_not_give_is_named(tmp_path: Path) -> None:
     with Recorder(tmp_path / "run.wire", HEADER, VirtualClock(START_NS)) as recorder:
         for n in range(1000):
             recorder.put(0, START_NS + 10_000_000 * n, line(n, math.nan if 300 <= n < 500 else 1500.0))
-        recorder.event(0, START_NS + 20_000_000_000, "ended", {"by": "seconds"})
+        recorder.event(0, START_NS + 20_000_000_000, RunEnded(by="seconds"))
     (made,) = recover(tmp_path / "run.wire").runs
     with open_run(made.path) as run:
         assert traps(run) == {"no_target", "sensor_lost"}

@@ -11,10 +11,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquisition.events import Reopened, StoredEvent
 from storage.errors import WriteFailed
 from storage.schema import ValueRefused
 from storage.wire_log.appending import WireLogWriter
-from storage.wire_log.records import RECORD_HEAD_BYTES, LogHeader, Record, RecordKind, SensorEntry, event_payload, frame
+from storage.wire_log.records import (
+    RECORD_HEAD_BYTES,
+    LogHeader,
+    Record,
+    RecordKind,
+    SensorEntry,
+    event_of,
+    event_payload,
+    frame,
+)
 from storage.wire_log.scanning import Scan, read_log
 from tests.sampling import sampled
 from tests.wire import Disk, append, json_of, parse_log
@@ -46,7 +56,7 @@ def test_what_is_appended_comes_back(tmp_path: Path) -> None:
         (RecordKind.DATA, 7, 1, bytes(range(256))),
         (RecordKind.DATA, 0, 2, b""),
         (RecordKind.MARK, 0, 3, "Stoß ∂".encode()),
-        (RecordKind.EVENT, 7, 4, event_payload("reopened", {"gap_s": 0.25})),
+        (RecordKind.EVENT, 7, 4, event_payload(Reopened(gap_s=0.25))),
         (RecordKind.END, 0, 5, b"{}"),
     ]
     for number, (kind, channel, mono_ns, payload) in enumerate(reported, 1):
@@ -146,10 +156,8 @@ def test_a_header_is_checked() -> None:
 
 def test_an_event_is_told_whatever_its_facts_are() -> None:
     """Facts that JSON cannot hold go in as text: the reading thread must not fail on them."""
-    record = Record(
-        0, 0, 0, RecordKind.EVENT, 0, event_payload("lost", {"why": OSError(5, "gone"), "gap_s": float("nan")})
-    )
-    assert json_of(record)["facts"] == {"why": "OSError(5, 'gone')", "gap_s": "nan"}
+    event = StoredEvent("lost", {"why": OSError(5, "gone"), "gap_s": float("nan")})
+    assert event_of(event_payload(event)).facts == {"why": "OSError(5, 'gone')", "gap_s": "nan"}
 
 
 def written(folder: Path) -> bytes:
