@@ -239,12 +239,6 @@ def test_fractions_of_a_day_are_asked_about(cli: Cli, tmp_path: Path) -> None:
     assert "--time-unit d" in cli("analyse", path, "--json").err
 
 
-def test_two_decimals_of_twelve_thousand_rows_are_certain(read: Callable[..., Any]) -> None:
-    """The step is exact."""
-    t = np.arange(12_000) / 100
-    assert codes(read(csv("Time (s),Distance (cm)", rewritten(t, "{:.2f}"), rewritten(100 * swing(t))))) == set()
-
-
 def jump(after_s: float, by_s: float, seconds: float = 30.0) -> str:
     """Return a run whose clock is set after some seconds."""
     t = np.arange(round(100 * seconds)) / 100
@@ -290,13 +284,6 @@ def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, t
     assert done.code == 3
     assert "decimal comma" in done.complaint
     assert "export" in done.complaint
-
-
-def test_the_line_above_the_numbers_has_the_names(read: Callable[..., Any]) -> None:
-    """Not the first comment."""
-    rows = [f"{a:.2f} {100 * b:.3f}" for a, b in zip(T, Y, strict=True)]
-    result = read(lines("# x0 = 0 m, v0 = 5 m/s", "# Tiempo Posicion", *rows), "--unit", "cm")
-    assert result["input"]["channel"] == "Posicion"
 
 
 # Channels

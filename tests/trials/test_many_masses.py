@@ -95,9 +95,9 @@ def pulls(seed: int) -> tuple[float, float, float, float]:
     )
 
 
-@pytest.mark.parametrize("benches", [8, pytest.param(100, marks=pytest.mark.trials)])
+@pytest.mark.parametrize("benches", [4, pytest.param(100, marks=pytest.mark.trials)])
 def test_line_and_exact_condition_give_constant_and_effective_mass(benches: int) -> None:
     """Each lies within two standard uncertainties of the truth in nine of ten benches."""
     found = np.array([pulls(seed) for seed in range(benches)])
     inside = np.count_nonzero(np.abs(found) < 2.0, axis=0)
-    assert (inside >= (0.9 * benches if benches >= 100 else benches - 2)).all(), inside
+    assert (inside >= (0.9 * benches if benches >= 100 else benches - 1)).all(), inside

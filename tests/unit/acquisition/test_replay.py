@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
 
 from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import VirtualClock
@@ -59,17 +56,3 @@ def test_a_loop_has_a_gap_before_each_further_turn() -> None:
         np.testing.assert_array_equal(block.distance, whole.distance)
         assert block.flags[0] == (Flag.GAP_BEFORE if block.first else 0)
         assert not block.flags[1:].any()
-
-
-def test_kind_travels_with_the_data() -> None:
-    """Simulated data stay simulated; all else is a replay."""
-    simulated = SourceInfo("simulated", "s", 100.0)
-    assert Replay([run()], VirtualClock(), info=simulated).info.kind == "simulated"
-    assert Replay([run()], VirtualClock(), info=SourceInfo("live", "p", 100.0)).info.kind == "replay"
-
-
-@pytest.mark.parametrize("speed", [0.0, -1.0, math.nan])
-def test_a_speed_that_is_not_positive_is_refused(speed: float) -> None:
-    """Time does not stand still or run back."""
-    with pytest.raises(ValueError, match="speed must be positive"):
-        Replay([run()], VirtualClock(), info=INFO, speed=speed)

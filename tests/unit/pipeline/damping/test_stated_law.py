@@ -8,7 +8,6 @@ import pytest
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import UpperLimit
-from pipeline.options import Options
 from pipeline.track import F8, Track
 
 T = np.arange(6000) / 100.0
@@ -46,15 +45,6 @@ def test_the_law_of_the_scene_is_the_stated_one() -> None:
     assert analysis.estimates["damping_rate"].value == pytest.approx(0.0105, rel=0.05)
     assert derived.coefficients["gamma"].value == pytest.approx(analysis.estimates["damping_rate"].value, rel=1e-9)
     assert not codes_of(analysis)
-
-
-def test_an_option_replaces_the_law_of_the_scene() -> None:
-    """Params state another law, or leave the choice to the recording."""
-    scene = Scene(damping_law="linear")
-    other = Options(stated="quadratic")
-    assert motion_of(analyse(QUADRATIC, scene, other)).damping.selected == "quadratic"
-    none = Options(stated="any")
-    assert motion_of(analyse(QUADRATIC, scene, none)).damping.stated == ""
 
 
 def test_a_recording_may_contradict_the_stated_law() -> None:

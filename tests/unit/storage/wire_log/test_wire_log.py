@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import struct
 import zlib
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from storage.errors import WriteFailed
 from storage.schema import ValueRefused
 from storage.wire_log.appending import WireLogWriter
 from storage.wire_log.records import HEAD_BYTES, Kind, LogHeader, Record, SensorEntry, event_payload, frame
@@ -68,32 +66,6 @@ def test_a_record_lies_in_the_file_as_documented() -> None:
     head = struct.pack("<2sHIqIBBH", b"\xf5\xa9", 6, 7, 123, 0xCAFE, 2, 3, 0)
     assert record == head + struct.pack("<I", zlib.crc32(head + b"R0500\r")) + b"R0500\r"
     assert len(record) == HEAD_BYTES + 6 == 34
-
-
-def test_a_log_that_cannot_be_made_says_why(tmp_path: Path) -> None:
-    """A missing folder and a header that JSON cannot hold are one line each and leave nothing."""
-    with pytest.raises(WriteFailed, match="could not be made"):
-        WireLogWriter(tmp_path / "none" / "run.wire", HEADER)
-    odd = LogHeader(sensors=(), mono_ns=0, unix_ns=0, scene={"a": float("nan")})
-    with pytest.raises(WriteFailed, match="header cannot be written"):
-        WireLogWriter(tmp_path / "run.wire", odd)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_failed_sync_is_never_taken_back() -> None:
-    """After one failed sync nothing more counts as safe: the kernel forgets which pages it could not write."""
-    disk = Disk()
-    log = WireLogWriter("run.wire", HEADER, open_file=disk)
-    append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    disk.sync_trouble = OSError(errno.EIO, "Input/output error")
-    with pytest.raises(WriteFailed, match="could not be synced"):
-        log.sync()
-    disk.sync_trouble = None
-    with pytest.raises(WriteFailed, match="could not be synced"):
-        log.sync()
-    with pytest.raises(WriteFailed, match="could not be synced"):
-        append(log, Kind.DATA, b"R0500\r", mono_ns=0)
-    assert (log.synced.records, log.written.records) == (1, 2)
 
 
 def test_the_header_survives_its_first_page() -> None:
