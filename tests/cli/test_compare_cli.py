@@ -6,12 +6,13 @@ import json
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import springmass
 from springmass.runs.loading import sample_data
 from tests.cli.conftest import Cli
+from tests.courses import write_recording
+from tests.synthetic import Truth, noisy, times
 
 DATA = sample_data()
 BARE, DISC = (str(DATA / f"{name}_simulated_position.txt") for name in ("undamped", "damped"))
@@ -31,14 +32,9 @@ def written_run(
     seconds: float = 60.0,
     seed: int = 1,
 ) -> str:
-    """Write a MotionSensor.vi position file of a damped oscillation by its closed form; return its name."""
-    t = np.arange(round(100 * seconds)) / 100
-    decay = np.exp(-gamma * t)
-    envelope = amplitude_m * decay / (1 + beta * amplitude_m * (1 - decay) / gamma)
-    y = 0.22 + envelope * np.cos(omega * t) + 1e-4 * np.random.default_rng(seed).standard_normal(t.size)
-    rows = "".join(f"{a:.3f}\t{100 * b:.3f}\t0.239\r\n" for a, b in zip(t, y, strict=True))
-    path.write_text(f"Motion Sensor Data File\r\nTime (s)\tDistance (cm)\tDist Error (cm)\r\n{rows}", "utf-8")
-    return str(path)
+    """Write a MotionSensor.vi position file of a damped oscillation; return its name."""
+    truth = Truth(amplitude=amplitude_m, omega=omega, phase=0.0, gamma=gamma, beta=beta)
+    return str(write_recording(path, noisy(truth, times(seconds), 1e-4, seed)))
 
 
 def test_the_reports_exchange_is_found_from_the_command_line(cli: Cli) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import UpperLimit
 from pipeline.track import F8, Track
+from tests.motion import motion_of
 
 T = np.arange(6000) / 100.0
 
@@ -17,12 +18,6 @@ def recorded(amplitude: F8, noise_m: float = 3.5e-4, seed: int = 3) -> Track:
     """Return 60 s of an oscillation of this amplitude."""
     noise = noise_m * np.random.default_rng(seed).standard_normal(T.size)
     return Track.from_arrays(T, 0.2 + amplitude * np.cos(8.3 * T) + noise)
-
-
-def motion_of(analysis: Analysis) -> Oscillation:
-    """Return the motion of a run that oscillates."""
-    assert isinstance(analysis.motion, Oscillation)
-    return analysis.motion
 
 
 def codes_of(analysis: Analysis) -> set[str]:

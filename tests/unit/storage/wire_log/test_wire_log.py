@@ -116,12 +116,6 @@ def test_a_header_is_checked() -> None:
         LogHeader.decode(HEADER.encode().replace(b'"title":', b'"titel":'))
 
 
-def test_an_event_is_told_whatever_its_facts_are() -> None:
-    """Facts that JSON cannot hold go in as text: the reading thread must not fail on them."""
-    record = Record(0, 0, 0, Kind.EVENT, 0, event_payload("lost", {"why": OSError(5, "gone"), "gap_s": float("nan")}))
-    assert json_of(record)["facts"] == {"why": "OSError(5, 'gone')", "gap_s": "nan"}
-
-
 def written(folder: Path) -> bytes:
     """Return a log of 300 reads and an end."""
     log = WireLogWriter(folder / "whole.wire", HEADER, log=7)
