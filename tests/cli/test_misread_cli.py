@@ -142,14 +142,6 @@ def test_segments_that_run_on_are_offered_as_one_run(cli: Cli, read: Callable[..
     assert cli("analyse", path, "--json", "--run", "Segment 2").results[0]["input"]["samples"] == 100
 
 
-@pytest.mark.parametrize("starts", [np.zeros(4), np.array([0.0, 30.0, 60.0, 90.0])])
-def test_segments_that_do_not_run_on_are_runs_of_their_own(cli: Cli, tmp_path: Path, starts: np.ndarray) -> None:
-    """Each begins anew, or long after the one before."""
-    path = tmp_path / "run.lvm"
-    path.write_text(lvm(starts))
-    assert "Segments 1 to" not in cli("formats", path).out
-
-
 # Tables that open as they are, or with what is stated
 
 

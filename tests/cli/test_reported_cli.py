@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests.cli.conftest import Cli
-from tests.courses import write_recording
-from tests.synthetic import Truth, noisy, times
-
-Row = tuple[str, str, object, object, str]
+from tests.reported import Row, periodic_rows, record, write_table
+from tests.synthetic import Truth
 
 # Table 1 and the conclusion of the report, with the units of its own lines.
 PRINTED: list[Row] = [
@@ -33,24 +30,6 @@ PRINTED: list[Row] = [
 SIX = ["exchanged", "power_of_ten", "u_too_small", "not_noise", "false_echoes", "not_exponential"]
 
 
-def write_table(path: Path, rows: list[Row]) -> Path:
-    """Write a table of printed values."""
-    path.write_text("".join(",".join(map(str, row)) + "\n" for row in [("run", "name", "value", "u", "unit"), *rows]))
-    return path
-
-
-def periodic_rows(name: str, seven_s: float, mass_kg: float) -> list[Row]:
-    """Return period to k from the time of seven cycles, read to 0.01 s."""
-    period, u = seven_s / 7, 0.01 / 7
-    omega = 2 * math.pi / period
-    return [
-        (name, "T", f"{period:.4f}", f"{u:.4f}", "s"),
-        (name, "f", f"{1 / period:.4f}", f"{u / period**2:.4f}", "Hz"),
-        (name, "omega", f"{omega:.3f}", f"{omega * u / period:.3f}", "s^-1"),
-        (name, "k", f"{omega**2 * mass_kg:.2f}", f"{omega**2 * mass_kg * 2 * u / period:.2f}", "N/m"),
-    ]
-
-
 @pytest.fixture
 def bench(tmp_path: Path) -> list[str]:
     """Return the arguments that name runs like the report's, whose periods are those that it printed, exchanged."""
@@ -58,9 +37,7 @@ def bench(tmp_path: Path) -> list[str]:
     disc = Truth(amplitude=0.05092, omega=2 * math.pi * 7 / 5.27, gamma=0.0073, beta=0.235)
     arguments: list[str] = []
     for name, truth, mass, seconds, echoes in (("bare", bare, 0.2007, 10, 0), ("disc", disc, 0.2176, 120, 36)):
-        y, rng = noisy(truth, times(seconds), 1e-4, 1), np.random.default_rng(63)
-        y[rng.choice(y.size, echoes, replace=False)] = rng.uniform(0.03, 0.12, echoes)
-        write_recording(tmp_path / f"{name}_position.txt", y)
+        record(tmp_path, name, truth, mass, seconds, noise_m=1e-4, echoes=echoes, seed=1)
         (tmp_path / f"{name}.toml").write_text(
             f"[bob]\nmass_kg = {{ value = {mass}, u = 0.00005 }}\n[disc]\ndiameter_m = 0.102\n"
             "[air]\ntemperature_c = 20\n"

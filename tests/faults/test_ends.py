@@ -146,7 +146,7 @@ def test_no_display_ends_a_recording(bench: Any, tmp_path: Path, display: str) -
     play(bench, tmp_path, display, "seconds")
 
 
-@pytest.mark.parametrize("end", sampled(["Ctrl-C", "a closed terminal", "kill"]))
+@pytest.mark.parametrize("end", sampled(["Ctrl-C", "a closed terminal", "kill"], 1))
 def test_the_user_ends_a_recording(bench: Any, tmp_path: Path, end: str) -> None:
     """Ctrl-C, kill and a closed terminal leave the run file, complete up to there, and no log."""
     play(bench, tmp_path, "none", end)

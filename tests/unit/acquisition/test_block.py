@@ -21,13 +21,6 @@ def test_flag_values_are_those_of_the_run_file() -> None:
     }
 
 
-@pytest.mark.parametrize(("quantity", "unit"), [("length", "mm"), ("angle", "m"), ("mass", "kg")])
-def test_an_unknown_quantity_or_unit_is_refused(quantity: str, unit: str) -> None:
-    """A block holds a known quantity in its SI unit."""
-    with pytest.raises(ValueError, match=f"length in m, angle in rad.*, got {quantity} in {unit}; convert to SI first"):
-        Block(0, np.zeros(1), np.zeros(1), np.zeros(1, np.uint8), quantity=quantity, unit=unit)
-
-
 def test_slices_and_joins_keep_the_quantity_and_two_are_not_joined() -> None:
     """Volts stay volts, and do not follow metres."""
     volts = Block(0, np.zeros(4), np.zeros(4), np.zeros(4, np.uint8), quantity="voltage", unit="V")

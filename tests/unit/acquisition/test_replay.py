@@ -17,14 +17,6 @@ def run(count: int = 100) -> Block:
     return Block(0, t, 0.2 + 0.01 * np.sin(8 * t), np.zeros(count, np.uint8), None, np.cos(8 * t))
 
 
-def test_blocks_are_due_with_their_last_sample() -> None:
-    """At twice the speed a second takes half of one, on absolute deadlines."""
-    clock = VirtualClock(7)
-    replay = Replay([run()], clock, info=INFO, speed=2.0, block_samples=25)
-    seen = [(block.first, clock.now_ns() - 7) for block in replay]
-    assert seen == [(0, 120_000_000), (25, 245_000_000), (50, 370_000_000), (75, 495_000_000)]
-
-
 def test_it_begins_at_a_time_of_the_recording() -> None:
     """At once and without a gap; behind the end there is nothing."""
     block = next(iter(Replay([run()], clock := VirtualClock(), info=INFO, block_samples=20, from_s=0.5)))

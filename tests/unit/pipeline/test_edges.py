@@ -89,7 +89,7 @@ def test_lost_rows_are_named_and_covered(seed: int, rate: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("quadratic", "degrees"), sampled(itertools.product((0.02, 0.0, 0.1), (45, 75, 90, 60, 30, 20)))
+    ("quadratic", "degrees"), sampled(itertools.product((0.02, 0.0, 0.1), (45, 60, 75, 90, 30, 20)))
 )
 def test_a_wide_pendulum(quadratic: float, degrees: int) -> None:
     """The equation of motion is solved by scipy; nobody touches the bob, and the pivot is fixed."""

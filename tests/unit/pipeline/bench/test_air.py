@@ -46,12 +46,6 @@ def test_density_is_the_cipm_2007_equations(temperature_c: float, pressure_pa: f
     assert air_density(temperature_c, pressure_pa, humidity) == pytest.approx(expected, rel=2e-6 if inside else 1e-4)
 
 
-def test_density_of_dry_standard_air() -> None:
-    """Dry air at 20 degC and one atmosphere weighs 1.2041 kg/m^3, at 15 degC 1.2250 (U.S. Standard Atmosphere 1976)."""
-    assert air_density(20.0) == pytest.approx(1.2041, rel=5e-4)
-    assert air_density(15.0) == pytest.approx(1.2250, rel=5e-4)
-
-
 @pytest.mark.parametrize(("kelvin", "micropascal_seconds"), [(100.0, 7.09559), (300.0, 18.5230)])
 def test_viscosity_is_the_published_check_value(kelvin: float, micropascal_seconds: float) -> None:
     """Lemmon and Jacobsen's table of check values (2004, table V), at zero density."""
