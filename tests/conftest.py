@@ -1,4 +1,4 @@
-"""What every test may ask for: synthetic runs, windows made by hand, and hypothesis that draws the same each time."""
+"""What every test may ask for: output of one width, a cluster, and hypothesis that draws the same each time."""
 
 from __future__ import annotations
 
@@ -7,16 +7,10 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from types import ModuleType
+from collections.abc import Iterator
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
-from numpy.typing import ArrayLike
-
-from pipeline.windows.demodulate import Demodulated
-from tests import synthetic as synthetic_runs
 
 # A slow machine is no fault of the data: neither a deadline nor the check for slow generation holds here.
 for _profile, _examples in (("springmass", 20), ("nightly", 1000)):
@@ -47,47 +41,6 @@ collect_ignore = ["plugin/check_extras.py"]  # a test of the plug-in, which is n
 def a_page_of_one_width(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wrap what the program prints at 100 columns, whatever terminal or test runner is around."""
     monkeypatch.setenv("COLUMNS", "100")
-
-
-@pytest.fixture(scope="session")
-def synthetic() -> ModuleType:
-    """Return the generator of synthetic runs, ``tests/synthetic.py``."""
-    return synthetic_runs
-
-
-@pytest.fixture(scope="session")
-def windows() -> Callable[..., Demodulated]:
-    """Return a function that makes the demodulated windows of a run from its amplitudes, phases and rests."""
-    return demodulated
-
-
-def demodulated(
-    t: ArrayLike,
-    amplitude: ArrayLike,
-    *,
-    omega: float = 8.3,
-    phase: ArrayLike | None = None,
-    offset: ArrayLike = 0.2,
-    u: tuple[float, float, float] = (1e-5, 1e-4, 1e-5),
-    noise_m: float = 3e-4,
-) -> Demodulated:
-    """Return windows at t (w,) s with independent uncertainties ``u`` of amplitude, phase and offset."""
-    at = np.asarray(t, np.float64)
-    samples = 76
-    return Demodulated(
-        t=at,
-        amplitude=np.broadcast_to(np.asarray(amplitude, np.float64), at.shape).copy(),
-        phase=omega * at if phase is None else np.asarray(phase, np.float64),
-        offset=np.broadcast_to(np.asarray(offset, np.float64), at.shape).copy(),
-        noise=np.full(at.size, noise_m),
-        covariance=np.broadcast_to(np.diag(np.square(u)), (at.size, 3, 3)).copy(),
-        count=np.full(at.size, samples),
-        angular_frequency=omega,
-        decay=np.zeros(at.size),
-        residual=noise_m * np.tile([-1.0, 1.0], at.size * samples // 2),
-        flags=np.zeros(at.size * samples, np.uint8),
-        lost=0,
-    )
 
 
 CLUSTER = """

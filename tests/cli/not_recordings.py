@@ -48,7 +48,6 @@ def _period(i: int) -> float:
 
 TABLES: dict[str, str] = {
     "length and period": _table("length (m),period (s)", 6, _rising(0.2, 0.1), _law(_period)),
-    "L and T": _table("L (m),T (s)", 6, _rising(0.2, 0.1), _law(_period)),
     "length and ten periods": _table(
         "length (cm),time of 10 periods (s)", 7, _rising(20, 10, 0), _law(lambda i: 10 * _period(i))
     ),
@@ -56,30 +55,22 @@ TABLES: dict[str, str] = {
         "Länge (m);Periode (s)", 9, _number(0.2, 1, 2, True), _number(0.9, 2, 2, True), mark=";"
     ),
     "longitud y periodo": _table("Longitud (m)\tPeriodo (s)", 10, _rising(0.1, 0.1), _law(_period), mark="\t"),
-    "mass and period": _table(
-        "mass (kg),period (s)", 6, _rising(0.05, 0.05), _law(lambda i: 1.7 * (0.05 + 0.05 * i) ** 0.5)
-    ),
-    "angle and period": _table("angle (deg),period (s)", 9, _rising(5, 10, 0), _law(lambda i: 2.0 + 0.01 * i * i)),
     "five trials": _table("trial,period (s)", 5, _count, _number(0.78, 0.8)),
     "spring extension": _table("mass (g),extension (cm)", 8, _rising(0, 50, 0), _law(lambda i: 3.4 * i)),
     "resonance curve": _table(
         "frequency (Hz),amplitude (mm)", 15, _rising(1, 0.05), _law(lambda i: 5 / (0.1 + abs(i - 6)))
     ),
-    "ruler calibration": _table("ruler (cm),sensor (cm)", 9, _rising(10, 5, 0), _law(lambda i: 10.1 + 5.02 * i)),
     "capacitors": _table(
         "part;C (nF);tan delta", 30, _count, _number(1, 100, 1, True), _number(0, 0.1, 3, True), mark=";"
     ),
     "dice": _table("throw,eyes", 100, _count, lambda _: _RNG.randint(1, 6)),
     "emission spectrum": _table("wavelength (nm)\tintensity", 400, _rising(350, 1, 0), _number(0, 4000, 0), mark="\t"),
     "gradebook": _table("student,lab 1,lab 2,lab 3,exam", 24, _name, _mark, _mark, _mark, _mark),
-    "class list": _table("number;name;group", 25, _count, _name, lambda i: i % 4 + 1, mark=";"),
     "attendance": _table(
         "student," + ",".join(f"week {i}" for i in range(1, 9)), 22, _name, *[lambda _: _RNG.randint(0, 1)] * 8
     ),
-    "price list": _table("article,price (EUR)", 80, lambda i: f"A-{1000 + i}", _number(1, 90)),
     "Preisliste": _table("Artikel;Preis;Anzahl", 50, lambda i: f"Teil {i}", _number(1, 90, 2, True), _mark, mark=";"),
     "parameters": "parameter,value\nmass,0.05\nlength,0.98\nrate,100\nseconds,120\n",
-    "parameter lines": "mass = 0.05 kg\nconstant = 14 N/m\ndisplacement = 0.05 m\n",
     "fit results": "name;value;error\nA;0.052;0.001\ngamma;0.015;0.001\nomega;7.95;0.01\nphi;0.1;0.02\n",
     "multiplication table": _table("", 12, *[lambda i, k=k: (i + 1) * k for k in range(1, 11)]),  # type: ignore[misc]
 }

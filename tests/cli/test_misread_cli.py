@@ -142,14 +142,6 @@ def test_segments_that_run_on_are_offered_as_one_run(cli: Cli, read: Callable[..
     assert cli("analyse", path, "--json", "--run", "Segment 2").results[0]["input"]["samples"] == 100
 
 
-@pytest.mark.parametrize("starts", [np.zeros(4), np.array([0.0, 30.0, 60.0, 90.0])])
-def test_segments_that_do_not_run_on_are_runs_of_their_own(cli: Cli, tmp_path: Path, starts: np.ndarray) -> None:
-    """Each begins anew, or long after the one before."""
-    path = tmp_path / "run.lvm"
-    path.write_text(lvm(starts))
-    assert "Segments 1 to" not in cli("formats", path).out
-
-
 # Tables that open as they are, or with what is stated
 
 
@@ -239,12 +231,6 @@ def test_fractions_of_a_day_are_asked_about(cli: Cli, tmp_path: Path) -> None:
     assert "--time-unit d" in cli("analyse", path, "--json").err
 
 
-def test_two_decimals_of_twelve_thousand_rows_are_certain(read: Callable[..., Any]) -> None:
-    """The step is exact."""
-    t = np.arange(12_000) / 100
-    assert codes(read(csv("Time (s),Distance (cm)", rewritten(t, "{:.2f}"), rewritten(100 * swing(t))))) == set()
-
-
 def jump(after_s: float, by_s: float, seconds: float = 30.0) -> str:
     """Return a run whose clock is set after some seconds."""
     t = np.arange(round(100 * seconds)) / 100
@@ -290,13 +276,6 @@ def test_rows_with_more_cells_than_names_are_refused_with_the_reason(cli: Cli, t
     assert done.code == 3
     assert "decimal comma" in done.complaint
     assert "export" in done.complaint
-
-
-def test_the_line_above_the_numbers_has_the_names(read: Callable[..., Any]) -> None:
-    """Not the first comment."""
-    rows = [f"{a:.2f} {100 * b:.3f}" for a, b in zip(T, Y, strict=True)]
-    result = read(lines("# x0 = 0 m, v0 = 5 m/s", "# Tiempo Posicion", *rows), "--unit", "cm")
-    assert result["input"]["channel"] == "Posicion"
 
 
 # Channels

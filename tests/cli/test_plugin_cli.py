@@ -8,19 +8,21 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+
+from tests.cli.conftest import MIXED
 
 PLUGIN = Path(__file__).resolve().parents[1] / "plugin"
 RECORDING = PLUGIN.parents[1] / "sample_data" / "damped_simulated_position.txt"
 
 
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture
+def installed(tmp_path: Path) -> Path:
     """Return a folder that holds the package as an installer leaves it: its module, its name and its entry points."""
-    site = tmp_path_factory.mktemp("site")
+    site = tmp_path / "site"
+    site.mkdir()
     (site / "bench_extras.py").write_bytes((PLUGIN / "bench_extras.py").read_bytes())
     project = tomllib.loads((PLUGIN / "pyproject.toml").read_text("utf-8"))["project"]
     described = site / f"bench_extras-{project['version']}.dist-info"
@@ -33,42 +35,39 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return site
 
 
-def program(installed: Path, *arguments: str | Path) -> Any:
-    """Run the program in a process that has the package on its path; return its JSON."""
-    environment = {**os.environ, "PYTHONPATH": str(installed)}
-    command = [sys.executable, "-m", "springmass", *map(str, arguments), "--json"]
-    return json.loads(subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout)
+PROGRAM = """
+import json, sys
+from springmass.cli import main
+for line in json.loads(sys.argv[1]):
+    assert main([*line, "--json"]) == 0, line
+import check_extras
+check_extras.test_all()
+"""
 
 
-def test_its_sensor_is_listed(installed: Path) -> None:
-    """``springmass ports`` has it next to those that ship."""
-    listed = program(installed, "ports", "--no-probe")["sensors"]
-    assert {"line-protocol", "plain-millimetres"} <= {sensor["name"] for sensor in listed}
+def test_what_it_adds_is_found_by_its_names_and_keeps_the_rules(installed: Path, tmp_path: Path) -> None:
+    """Its sensor is listed, its format recognised by content, its integrator and its law are options like any others.
 
-
-def test_its_format_is_recognised_and_analysed(installed: Path, tmp_path: Path) -> None:
-    """A file of its kind is read by content alone."""
+    ``springmass.testing`` holds everything that it adds to the rules.
+    """
     t = np.arange(1000) / 100
     heights = 200 + 50 * np.cos(8.3 * t) + 0.2 * np.random.default_rng(1).standard_normal(t.size)
-    path = tmp_path / "run.txt"
+    path, scene = tmp_path / "run.txt", tmp_path / "scene.toml"
     path.write_text("\n".join(["Height log, 100 Hz", *(f"{i};{y:.2f}" for i, y in enumerate(heights))]) + "\n")
-    results = program(installed, "analyse", path)
-    assert results["input"]["format"] == "height-log"
-    assert results["estimates"]["period"]["value"] == pytest.approx(2 * np.pi / 8.3, rel=1e-4)
-
-
-def test_its_law_and_its_integrator_are_found_by_their_names(installed: Path, tmp_path: Path) -> None:
-    """On the command line as those that ship; a name that none has is answered with all of them."""
-    scene = tmp_path / "scene.toml"
-    spring = "[bob]\nmass_kg = 0.2\n[spring]\nconstant_n_per_m = 15.0\n"
-    scene.write_text(f"{spring}[start]\ndisplacement_m = 0.05\n[damping]\ngamma_per_s = 0.007\n")
-    simulated = program(installed, "simulate", "--scene", scene, "--method", "midpoint", "--dt", "0.001")
-    assert "midpoint" in json.dumps(simulated)
-    results = program(installed, "analyse", RECORDING, "--law", "three-halves", "--no-report")
-    assert results["damping"]["selected"] == "three-halves"
-
-
-def test_its_own_tests_pass(installed: Path) -> None:
-    """``springmass.testing`` holds everything that it adds to the rules."""
+    scene.write_text(MIXED)
+    lines = [
+        ["ports", "--no-probe"],
+        ["analyse", str(path)],
+        ["simulate", "--scene", str(scene), "--method", "midpoint", "--dt", "0.001"],
+        ["analyse", str(RECORDING), "--law", "three-halves"],
+    ]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(installed), str(PLUGIN)])}
-    subprocess.run([sys.executable, "-m", "check_extras"], check=True, env=environment)
+    command = [sys.executable, "-c", PROGRAM, json.dumps(lines)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    ports, logged, simulated, analysed = map(json.loads, done.stdout.splitlines())
+    assert {"line-protocol", "plain-millimetres"} <= {sensor["name"] for sensor in ports["sensors"]}
+    assert logged["input"]["format"] == "height-log"
+    assert logged["estimates"]["period"]["value"] == pytest.approx(2 * np.pi / 8.3, rel=1e-4)
+    assert "midpoint" in json.dumps(simulated)
+    assert analysed["damping"]["selected"] == "three-halves"

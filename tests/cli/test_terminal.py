@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from storage.run_file.reading import open_run
-from tests.sampling import sampled
 from tests.screen import OnTerminal
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are POSIX's")
@@ -42,7 +41,8 @@ def test_several_runs_on_a_terminal_share_a_table_and_leave_no_bar_behind(data: 
     assert terminal.screen.wrapped == 0
 
 
-@pytest.mark.parametrize("environment", sampled([{"TERM": "dumb"}, {"PYTHONIOENCODING": "ascii"}], 1))
+@pytest.mark.trials
+@pytest.mark.parametrize("environment", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "ascii"}])
 def test_a_poor_terminal_gets_ascii(data: Path, tmp_path: Path, environment: dict[str, str]) -> None:
     """Without a cursor or without superscripts it is ASCII."""
     arguments = ["analyse", str(data / "undamped_simulated_position.txt"), "--no-report"]

@@ -30,7 +30,7 @@ def arguments(command: str, path: Path, out: Path, data: Path) -> list[Any]:
         "analyse": ["analyse", "--json", path],
         "convert": ["convert", path, out],
         "replay": ["replay", path, "--speed", "max"],
-        "trade": ["trade", path],
+        "trade": ["trade", path, "--seeds", "1", "--to", "4"],
         "simulate": ["simulate", "--scene", scene, "--json", "--against", path],
         "compare": ["compare", path, path, "--scene", scene, "--json"],
         "formats": ["formats", path],

@@ -13,6 +13,7 @@ import pytest
 from pipeline.dynamics import INTEGRATORS, Equation, Integrator, Problem, Trajectory, get_integrator
 from pipeline.errors import DynamicsError
 from springmass.testing import check
+from tests.sampling import sampled
 
 STORED = json.loads((Path(__file__).resolve().parents[1] / "reference" / "dynamics.json").read_text())
 STEP = STORED["step_s"]
@@ -51,7 +52,7 @@ def error_of(case: dict[str, Any], trajectory: Trajectory) -> float:
     return float(np.max(np.abs(trajectory.y[case["rows"]] - truth))) / trajectory.problem.amplitude_m()
 
 
-@pytest.mark.parametrize("name", STORED["cases"])
+@pytest.mark.parametrize("name", sampled(STORED["cases"], 6))
 def test_the_error_against_forty_digits_is_small(integrator: Integrator, name: str) -> None:
     """Against a reference that shares no code each method errs by no more than its order lets it, or refuses."""
     case = STORED["cases"][name]

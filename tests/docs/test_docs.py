@@ -70,16 +70,6 @@ def test_one_version_is_stated() -> None:
     assert f"version: {newest[1]}\ndate-released: {newest[2]}\n" in citation
 
 
-def test_every_target_that_a_page_names_is_there() -> None:
-    """It stands in the Makefile."""
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    targets = set(re.findall(r"^([a-z][a-z-]*):", makefile, re.MULTILINE))
-    for page in PAGES:
-        for block in re.findall(r"`+(make [^`]+)`", page.read_text(encoding="utf-8")):
-            for name in re.findall(r"make ([a-z][a-z-]*)", block):
-                assert name in targets, f"{page.name}: make {name}"
-
-
 def test_the_readme_shows_what_the_demo_prints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Each line of the README's first output is a line of the demo's own; its values agree within half their u."""
     assert main(["demo", "--output", str(tmp_path / "demo-output")]) == 0

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import nbclient
-import nbformat
 import pytest
 
 NOTEBOOK = Path(__file__).resolve().parents[2] / "docs" / "tutorial.ipynb"
@@ -23,6 +21,9 @@ def shown_by(notebook: Any) -> list[tuple[str, str]]:
 @pytest.mark.trials
 def test_the_notebook_runs_and_shows_what_is_stored_in_it() -> None:
     """A new kernel runs each task without an error, and shows the results that the stored notebook shows."""
+    import nbclient
+    import nbformat
+
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     stored = shown_by(notebook)
     where = {"metadata": {"path": str(NOTEBOOK.parent)}}

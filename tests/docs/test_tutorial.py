@@ -22,8 +22,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 LONG = (
     "docs/tutorial.md",
+    "docs/tutorial-report.md",
     "docs/how-to/compare-runs.md",
     "docs/how-to/compare-with-the-classic-method.md",
+    "docs/how-to/read-the-budget.md",
     "docs/how-to/record-at-the-bench.md",
     "docs/how-to/simulate-a-bench.md",
     "docs/reference/command-line.md",

@@ -15,6 +15,7 @@ from acquisition.decoders.registry import families, get_family
 from acquisition.errors import SensorError
 from acquisition.live.decoding import SensorChain
 from tests.encoders import ENCODERS, sealed
+from tests.sampling import sampled
 
 LAST = 2**32 - 1
 STAMP = 2**63 - 1
@@ -65,7 +66,7 @@ STAMPS: dict[str, Callable[[int], int]] = {
 }
 
 
-@pytest.mark.parametrize("stamps", STAMPS)
+@pytest.mark.parametrize("stamps", sampled(STAMPS))
 @pytest.mark.parametrize("wire", WIRES)
 def test_sound_frames_of_any_content_are_samples(wire: str, stamps: str) -> None:
     """In one read or many, at any rate: finite times, a flag on what has no distance, and a report that JSON holds."""

@@ -20,6 +20,7 @@ import pytest
 from springmass.cli import main
 from storage.run_file.reading import open_run
 from tests.faults.conftest import usual_signals, whole_numbers_of
+from tests.sampling import sampled
 
 ANSWER_S = 100.0
 """The program answers within ten seconds of the end, or of a fault's, where the machine is not ten times as busy."""
@@ -145,7 +146,7 @@ def test_no_display_ends_a_recording(bench: Any, tmp_path: Path, display: str) -
     play(bench, tmp_path, display, "seconds")
 
 
-@pytest.mark.parametrize("end", ["Ctrl-C", "kill", "a closed terminal"])
+@pytest.mark.parametrize("end", sampled(["Ctrl-C", "a closed terminal", "kill"], 1))
 def test_the_user_ends_a_recording(bench: Any, tmp_path: Path, end: str) -> None:
     """Ctrl-C, kill and a closed terminal leave the run file, complete up to there, and no log."""
     play(bench, tmp_path, "none", end)

@@ -41,7 +41,7 @@ KINDS = ("clipped", "undamped", "sixty_hz")
 LAPTOP: Any = {"width": 1366, "height": 900}
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     """Headless Chromium, offline. Where it is not installed the pages are not looked at; in CI that is a failure."""
     try:
@@ -131,7 +131,7 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
         yield found
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def old_run(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Any]]:
     """The address of the page of an old run, and the cookies of the browser that opened it."""
     with started(tmp_path_factory.mktemp("old"), "page", str(OLD_RUN)) as program:

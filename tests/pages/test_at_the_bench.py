@@ -89,6 +89,7 @@ def test_notes_and_putting_aside(bench: tuple[Any, Page]) -> None:
     assert "table was pushed" in (program.out.parent / "discarded" / "run.about.toml").read_text()
 
 
+@pytest.mark.trials
 def test_nothing_is_recorded_where_the_page_is_closed_before(bench: tuple[Any, Page]) -> None:
     """The program ends with 0 and leaves nothing."""
     program, page = bench

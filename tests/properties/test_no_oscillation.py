@@ -93,23 +93,6 @@ def test_what_is_no_oscillation_gets_no_period(tmp_path: Path, kind: Callable[[n
     assert not believed
 
 
-@pytest.mark.trials
-@pytest.mark.parametrize("noise", [1e-3, 0.02, 0.05])
-@pytest.mark.parametrize("share", [0.2, 1.0 / 3.0])
-def test_what_rests_for_most_of_the_record_is_analysed_while_it_moves(share: float, noise: float) -> None:
-    """Whether friction stops it, it dies away, or a hand holds it: the period is that of the motion."""
-    t = np.arange(3000) / 50.0
-    stop = share * t[-1]
-    envelopes = (np.maximum(1 - t / stop, 0), np.exp(-4 * t / stop), np.where(t < stop, np.exp(-t / stop), 0))
-    for seed, envelope in enumerate(envelopes):
-        y = 0.3 + envelope * np.cos(2 * np.pi * t / 1.69 + 1.0)
-        y += noise * np.random.default_rng(seed).standard_normal(t.size)
-        period = analyse(Track.from_arrays(t, y, quantity="angle", unit="rad")).estimates["period"]
-        # The period of strong friction's averaged law is off by a few thousandths of itself at most.
-        assert abs(period.value - 1.69) < 3.0 * period.u + 0.003
-        assert period.u < 0.01
-
-
 def told_modes(found: Analysis) -> list[float]:
     """Return the periods of two modes that an analysis names, ascending."""
     if "first_mode_period" in found.estimates:

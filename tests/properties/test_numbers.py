@@ -59,17 +59,6 @@ def test_every_form_of_number_is_read_as_a_decimal_number(
         assert value == exact or ("E" in cell.upper() and value == pytest.approx(exact, rel=3e-16, abs=0.0))
 
 
-def test_odd_rows_leave_the_numbers_of_their_neighbours_alone(tmp_path: Path) -> None:
-    """Comments, lost columns and words are marked or make no row; all other rows are read."""
-    rows = [f"{i / 100:.3f}\t{25 + 6 * np.sin(8 * i / 100):.3f}\t0.239" for i in range(3000)]
-    expected = [float(row.split("\t")[1]) for row in rows]
-    odd = ["here I touched it", "", "  ", "0.5\t99.1", "1.000\tnan\t0.239"]
-    mixed = [line for at, row in enumerate(rows) for line in ([odd[at // 100 % 5]] if at % 100 == 50 else []) + [row]]
-    samples = opened(tmp_path, "t (s)\ty (V)\tdy (V)", mixed).samples
-    sound = samples.distance[np.isin(samples.distance, expected)]
-    assert sound.tolist() == expected
-
-
 @pytest.mark.parametrize("delimiter", ["\t", ";", "  "])
 def test_a_file_of_many_pages_has_no_seams(tmp_path: Path, delimiter: str) -> None:
     """Rows are found as a whole wherever a page ends."""

@@ -53,6 +53,7 @@ def test_kafe2s_pendulum(recordings: Path) -> None:
     assert g.std_dev < 1.5 * 0.0023
 
 
+@pytest.mark.trials
 def test_phypraks_torsion_pendulum(recordings: Path) -> None:
     """PhyPraKit prints f = 0.5583 Hz and decay times of 102(10) s and 101(3) s: the times agree within their u.
 

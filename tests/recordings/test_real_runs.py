@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.findings.finding import Finding
 from pipeline.track import Track
+from tests.motion import motion_of
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 BARE = "AyushPandhi__Pandhi_Ayush_PHY224/position data.txt"
@@ -48,12 +49,6 @@ def analysed_capstone() -> Analysis:
     rows = [line.split(";") for line in (RECORDINGS / LARGE_DISC).read_text("utf-8").splitlines()[1:]]
     t, y = (np.array([float(row[k]) for row in rows]) for k in (0, 1))
     return analyse(Track.from_arrays(t, y))
-
-
-def motion_of(result: Analysis) -> Oscillation:
-    """Return the motion of a record that has one."""
-    assert isinstance(result.motion, Oscillation)
-    return result.motion
 
 
 def mode_of(result: Analysis) -> Finding:

@@ -112,7 +112,7 @@ def independent_period(t: np.ndarray, y: np.ndarray) -> float:
     return float(2.0 * np.pi / (omega + best.x[4] / span))
 
 
-@pytest.mark.parametrize(("start", "given"), OSCILLATE)
+@pytest.mark.parametrize(("start", "given"), sampled(OSCILLATE, 9))
 def test_what_oscillates_has_the_period_of_an_independent_fit(recordings: Path, start: str, given: Given) -> None:
     """Of the same rows: within three standard uncertainties and, as pendulums follow their amplitude, 0.02 %."""
     found, t, y = analysed(only(recordings, start), given)
@@ -140,7 +140,7 @@ def crossing_period(t: np.ndarray, y: np.ndarray, near: float) -> float:
     return float(theilslopes(crossed, np.round((crossed - crossed[0]) / near))[0])
 
 
-@pytest.mark.parametrize(("start", "given"), BEAT)
+@pytest.mark.parametrize(("start", "given"), sampled(BEAT, 3))
 def test_what_oscillates_unevenly_has_the_period_of_its_crossings(recordings: Path, start: str, given: Given) -> None:
     """Within three standard uncertainties and 0.02 %; what was read in volts, as no bob oscillates at the mains'."""
     found, t, y = analysed(only(recordings, start), given)

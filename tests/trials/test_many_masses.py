@@ -1,4 +1,4 @@
-"""Several masses on a spring: its constant and its mass, found together, and a bob whose mass is mistyped.
+"""Several masses on a spring: its constant and its mass, found together.
 
 A few benches are always taken, a hundred with the trials.
 """
@@ -6,7 +6,6 @@ A few benches are always taken, a hundred with the trials.
 from __future__ import annotations
 
 import math
-import os
 
 import numpy as np
 import pytest
@@ -16,11 +15,10 @@ from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import Estimate
 from pipeline.options import options_for
-from pipeline.results.compare import Comparison, SpringRun, compare_springs
+from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.results.masses import mass_line
 from pipeline.track import Track
 
-BENCHES = min(int(os.environ.get("SPRINGMASS_TRIALS", "40")), 400)
 U_BOB_KG = 2e-5
 LOADS = np.array([0.6, 0.8, 1.0, 1.2, 1.4])  # of five, in masses of the middle one; the spring weighs a tenth of it
 
@@ -43,40 +41,6 @@ def run_of(
     return SpringRun.of(name, motion.derived)
 
 
-def bench(seed: int, *, wrong: bool) -> tuple[Comparison, float, float]:
-    """Three runs of one spring; with ``wrong`` one bob's mass is typed 3 to 30 % too large or too small."""
-    rng = np.random.default_rng([13, seed])
-    k, spring_kg = rng.uniform(5.0, 40.0), rng.uniform(0.005, 0.05)
-    loads = rng.uniform(0.9, 1.1) * np.array([0.1, 0.2, 0.35])
-    typed = loads + rng.normal(0, U_BOB_KG, 3)
-    if wrong:
-        typed[rng.integers(3)] *= 1.0 + rng.choice([-1, 1]) * rng.uniform(0.03, 0.3)
-    runs = [run_of(n, k, spring_kg, m, x, rng) for n, m, x in zip("abc", loads, typed, strict=True)]
-    return compare_springs(runs), k, spring_kg
-
-
-@pytest.mark.trials
-def test_constant_and_mass_of_the_spring_are_found_together() -> None:
-    """Both lie within two standard uncertainties in 95 of 100 benches, and all benches agree with one spring."""
-    right, agreed = 0, 0
-    for seed in range(BENCHES):
-        found, k, spring_kg = bench(seed, wrong=False)
-        z = (
-            (found.spring_constant.value - k) / found.spring_constant.u,
-            (found.spring_mass.value - spring_kg) / found.spring_mass.u,
-        )
-        right += max(map(abs, z)) < 2.0
-        agreed += found.agree
-    assert right >= 0.95 * BENCHES
-    assert agreed >= 0.99 * BENCHES
-
-
-@pytest.mark.trials
-def test_a_mistyped_mass_is_found() -> None:
-    """In 95 of 100 benches the runs do not agree on one spring."""
-    assert sum(not bench(1000 + seed, wrong=True)[0].agree for seed in range(BENCHES)) >= 0.95 * BENCHES
-
-
 def pulls(seed: int) -> tuple[float, float, float, float]:
     """Return how many u the results of the line, and those of the exact condition, are from the truth."""
     rng = np.random.default_rng([67, seed])
@@ -95,9 +59,9 @@ def pulls(seed: int) -> tuple[float, float, float, float]:
     )
 
 
-@pytest.mark.parametrize("benches", [8, pytest.param(100, marks=pytest.mark.trials)])
+@pytest.mark.parametrize("benches", [4, pytest.param(100, marks=pytest.mark.trials)])
 def test_line_and_exact_condition_give_constant_and_effective_mass(benches: int) -> None:
     """Each lies within two standard uncertainties of the truth in nine of ten benches."""
     found = np.array([pulls(seed) for seed in range(benches)])
     inside = np.count_nonzero(np.abs(found) < 2.0, axis=0)
-    assert (inside >= (0.9 * benches if benches >= 100 else benches - 2)).all(), inside
+    assert (inside >= (0.9 * benches if benches >= 100 else benches - 1)).all(), inside

@@ -8,21 +8,6 @@ import pytest
 from acquisition.block import Block, Flag, concatenate
 
 
-def block(first: int = 0, count: int = 4, **more: np.ndarray) -> Block:
-    """Return a small block."""
-    t = (first + np.arange(count)) / 100
-    return Block(first, t, 0.2 + t, np.zeros(count, np.uint8), **more)
-
-
-def test_concatenate_fills_columns_that_some_blocks_lack() -> None:
-    """Velocity is NaN and host time -1 where nobody stated them."""
-    joined = concatenate([block(count=1), block(1, 1, host_ns=np.array([5]), velocity=np.array([2.0]))])
-    assert joined.host_ns is not None
-    assert joined.velocity is not None
-    assert joined.host_ns.tolist() == [-1, 5]
-    np.testing.assert_array_equal(joined.velocity, [np.nan, 2.0])
-
-
 def test_flag_values_are_those_of_the_run_file() -> None:
     """The bits are written to files and may not move."""
     assert {flag.name: flag.value for flag in Flag} == {
@@ -34,13 +19,6 @@ def test_flag_values_are_those_of_the_run_file() -> None:
         "MALFORMED": 32,
         "GAP_BEFORE": 64,
     }
-
-
-@pytest.mark.parametrize(("quantity", "unit"), [("length", "mm"), ("angle", "m"), ("mass", "kg")])
-def test_an_unknown_quantity_or_unit_is_refused(quantity: str, unit: str) -> None:
-    """A block holds a known quantity in its SI unit."""
-    with pytest.raises(ValueError, match=f"length in m, angle in rad.*, got {quantity} in {unit}; convert to SI first"):
-        Block(0, np.zeros(1), np.zeros(1), np.zeros(1, np.uint8), quantity=quantity, unit=unit)
 
 
 def test_slices_and_joins_keep_the_quantity_and_two_are_not_joined() -> None:

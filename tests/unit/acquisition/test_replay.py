@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
 
 from acquisition.block import Block, Flag, SourceInfo
 from acquisition.clock import VirtualClock
@@ -18,22 +15,6 @@ def run(count: int = 100) -> Block:
     """Return a run at 100 Hz."""
     t = np.arange(count) / 100
     return Block(0, t, 0.2 + 0.01 * np.sin(8 * t), np.zeros(count, np.uint8), None, np.cos(8 * t))
-
-
-def test_blocks_are_due_with_their_last_sample() -> None:
-    """At twice the speed a second takes half of one, on absolute deadlines."""
-    clock = VirtualClock(7)
-    replay = Replay([run()], clock, info=INFO, speed=2.0, block_samples=25)
-    seen = [(block.first, clock.now_ns() - 7) for block in replay]
-    assert seen == [(0, 120_000_000), (25, 245_000_000), (50, 370_000_000), (75, 495_000_000)]
-
-
-def test_a_slow_consumer_is_not_given_a_drift() -> None:
-    """Deadlines are absolute: time lost in the consumer is caught up."""
-    clock = VirtualClock()
-    for block in Replay([run()], clock, info=INFO, block_samples=10):
-        clock.sleep_until_ns(clock.now_ns() + (300_000_000 if block.first == 0 else 0))
-    assert clock.now_ns() == 990_000_000
 
 
 def test_it_begins_at_a_time_of_the_recording() -> None:
@@ -59,17 +40,3 @@ def test_a_loop_has_a_gap_before_each_further_turn() -> None:
         np.testing.assert_array_equal(block.distance, whole.distance)
         assert block.flags[0] == (Flag.GAP_BEFORE if block.first else 0)
         assert not block.flags[1:].any()
-
-
-def test_kind_travels_with_the_data() -> None:
-    """Simulated data stay simulated; all else is a replay."""
-    simulated = SourceInfo("simulated", "s", 100.0)
-    assert Replay([run()], VirtualClock(), info=simulated).info.kind == "simulated"
-    assert Replay([run()], VirtualClock(), info=SourceInfo("live", "p", 100.0)).info.kind == "replay"
-
-
-@pytest.mark.parametrize("speed", [0.0, -1.0, math.nan])
-def test_a_speed_that_is_not_positive_is_refused(speed: float) -> None:
-    """Time does not stand still or run back."""
-    with pytest.raises(ValueError, match="speed must be positive"):
-        Replay([run()], VirtualClock(), info=INFO, speed=speed)

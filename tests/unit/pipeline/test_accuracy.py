@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import math
-from types import ModuleType
 
 import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
 from pipeline.options import TIERS, Options, options_for
 from pipeline.track import F8, Track
+from tests import synthetic
+from tests.motion import motion_of
 
 every_tier = pytest.mark.parametrize("accuracy", TIERS)
 
 
-def motion_of(result: Analysis) -> Oscillation:
-    """Return the motion of a record that oscillates."""
-    assert isinstance(result.motion, Oscillation)
-    return result.motion
-
-
 @every_tier
-def test_the_origin_of_time_does_not_matter(synthetic: ModuleType, accuracy: str) -> None:
+def test_the_origin_of_time_does_not_matter(accuracy: str) -> None:
     """Counted from 1970 or from the start, period, amplitude and phase differ by less than 0.05 of their bounds."""
     truth = synthetic.Truth(gamma=0.01463)
     t = synthetic.times(20.0, 128.0)  # steps of 1/128 s are exact beside 1.7e9 s
@@ -65,7 +60,7 @@ def test_a_stated_law_is_fitted_to_two_periods() -> None:
     assert result.estimates["damping_rate"].value == pytest.approx(0.4, abs=0.05)
 
 
-def test_a_stated_noise_counts_where_the_record_agrees(synthetic: ModuleType) -> None:
+def test_a_stated_noise_counts_where_the_record_agrees() -> None:
     """It draws the noise of a short record towards itself; one that the record contradicts is not used."""
     t = synthetic.times(2.2)
     track = Track.from_arrays(t, synthetic.noisy(synthetic.Truth(), t, 3e-4, 2))

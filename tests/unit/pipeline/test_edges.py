@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -87,18 +88,19 @@ def test_lost_rows_are_named_and_covered(seed: int, rate: int) -> None:
     assert 0.008 < period.u / period.value < 0.04
 
 
-@pytest.mark.parametrize("degrees", [20, 30, 45, 60, 75, 90])
-@pytest.mark.parametrize("quadratic", sampled((0.02, 0.0, 0.1), 1))
-def test_a_wide_pendulum(degrees: int, quadratic: float) -> None:
+@pytest.mark.parametrize(
+    ("quadratic", "degrees"), sampled(itertools.product((0.02, 0.0, 0.1), (45, 60, 75, 90, 30, 20)))
+)
+def test_a_wide_pendulum(quadratic: float, degrees: int) -> None:
     """The equation of motion is solved by scipy; nobody touches the bob, and the pivot is fixed."""
     from scipy.integrate import solve_ivp
 
-    t, square, start = np.arange(6000) / 50, (2.0 * math.pi / 1.2) ** 2, math.radians(degrees)
+    t, square, start = np.arange(3000) / 50, (2.0 * math.pi / 1.2) ** 2, math.radians(degrees)
 
     def moves(_: float, z: np.ndarray) -> list[float]:
         return [z[1], -square * math.sin(z[0]) - quadratic * z[1] * abs(z[1]) - 0.002 * z[1]]
 
-    angle = solve_ivp(moves, (0.0, 120.0), [start, 0.0], t_eval=t, rtol=1e-10, atol=1e-12).y[0]
+    angle = solve_ivp(moves, (0.0, 60.0), [start, 0.0], t_eval=t, rtol=1e-10, atol=1e-12).y[0]
     angle += math.radians(0.1) * np.random.default_rng(degrees).standard_normal(t.size)
     step = math.radians(0.25)
     scene = Scene(pendulum_length_m=(9.81 / square, 1e-6))
@@ -128,7 +130,7 @@ def test_the_amplitude_of_a_small_pendulum_is_corrected_for(degrees: int) -> Non
     assert gravity.u < 2e-3
 
 
-@pytest.mark.parametrize("step", [0.2, 0.35, 0.5, 0.8])
+@pytest.mark.parametrize("step", sampled([0.35, 0.8, 0.2, 0.5]))
 def test_steps_as_large_as_the_motion_are_part_of_the_uncertainties(step: float) -> None:
     """Amplitude, rest position and damping rate hold, and no law is rejected, for steps up to 0.8 of the amplitude."""
     t, amplitude, pulls = np.arange(3000) / 100, 0.03, []

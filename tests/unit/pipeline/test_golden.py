@@ -6,16 +6,13 @@ One test or more for each mistake on docs/tutorial-report.md, in the report's or
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from types import ModuleType
 
 import numpy as np
 import pytest
 
-from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.scene import Scene
-from pipeline.numerics.estimate import Estimate, format_value
-from pipeline.results.classic import STATED_ERROR_M, classic
+from pipeline.numerics.estimate import Estimate
+from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.track import Track
 
@@ -26,8 +23,6 @@ DISC = Scene.from_mapping(
         "disc": {"diameter_m": {"value": 0.102, "u": 0.0005}},
     }
 )
-RMS_M_PER_S = 0.18073
-GAMMA = 0.01463
 
 
 def seven_cycles(seconds: float) -> Track:
@@ -39,13 +34,6 @@ def seven_cycles(seconds: float) -> Track:
 def estimates(seconds: float, scene: Scene) -> dict[str, Estimate]:
     """Return what the report's method makes of seven cycles of a length."""
     return classic(seven_cycles(seconds), scene).estimates
-
-
-def decaying_velocity(samples: int = 12_020) -> np.ndarray:
-    """Return velocities of the report's rms that decay with its gamma over its 120 s."""
-    t = np.arange(samples) / 100
-    velocity = np.exp(-GAMMA * t) * np.sin(8.3458 * t)
-    return velocity * RMS_M_PER_S / math.sqrt(float(np.mean(velocity**2)))
 
 
 @pytest.mark.parametrize(
@@ -102,45 +90,3 @@ def test_amplitude_is_six_centimetres() -> None:
     assert math.floor(found.value * 1e5 + 1e-6) / 1e5 == pytest.approx(0.05914, abs=1e-12)
     assert found.u == pytest.approx(0.00169, abs=5e-6)
     assert found.u > 1e4 * 5e-8
-
-
-def test_velocity_uncertainty_as_printed() -> None:
-    """(25) as printed, 0.03266 m^2/s^2 over 24038 times 0.18073 m/s is 7e-6 m/s; the former is the mean of v^2."""
-    velocity = decaying_velocity(12_019)
-    found = classic(replace(seven_cycles(5.08), velocity=velocity), DISC).estimates["velocity_rms"]
-    assert float(np.mean(velocity**2)) == pytest.approx(0.03266, abs=5e-6)
-    assert found.value == pytest.approx(RMS_M_PER_S, abs=1e-12)
-    assert found.u == pytest.approx(0.03266 / (24038 * 0.18073), rel=2e-4)
-    assert round(found.u, 6) == pytest.approx(7e-6, abs=1e-6)
-
-
-def test_reynolds_number_from_the_length_alone() -> None:
-    """1.204 x 0.18073 x 0.102 / 1.825e-5 = 1216 +- 6 where only the disc's diameter is uncertain."""
-    found = classic(replace(seven_cycles(5.08), velocity=decaying_velocity()), DISC).estimates
-    assert found["reynolds_number"].value == pytest.approx(1216.2, abs=0.1)
-    assert found["reynolds_number"].u == pytest.approx(5.96, abs=0.01)
-    assert str(found["reynolds_number"]) == "1216.2 +- 6.0"
-
-
-def test_the_printed_uncertainty_of_gamma_is_a_variance(synthetic: ModuleType) -> None:
-    """(28) "+- 2 x 10^-10" squares 1.3e-5 1/s; an exponential through mixed drag errs by far more than that."""
-    assert round((1.3e-5) ** 2 * 1e10) == 2
-    assert format_value(GAMMA, 1.3e-5, "1/s") == "0.014630 +- 0.000013 1/s"
-    truth = synthetic.Truth(amplitude=0.05092, gamma=0.0073, beta=0.235)
-    t = synthetic.times(120.2)
-    found = classic(Track.from_arrays(t, synthetic.noisy(truth, t, 1e-4, 1))).estimates["damping_rate"]
-    assert found.u == pytest.approx(1.3e-5, abs=0.3e-5)
-    assert abs(found.value - (truth.gamma + truth.beta * truth.amplitude)) > 100 * found.u
-
-
-def test_chi_square_of_63_was_no_poor_fit(synthetic: ModuleType) -> None:
-    """62.9 over 12,020 points is a 200th each: 2.39 mm is no noise. The exponential falls all the same, by its law."""
-    truth = synthetic.Truth(amplitude=0.05092, gamma=0.0073, beta=0.235)
-    t = synthetic.times(120.2)
-    track = Track.from_arrays(t, synthetic.noisy(truth, t, 1e-4, 2))
-    assert 62.87862 / t.size == pytest.approx(0.0052, abs=5e-5)
-    assert 62.87862 * (STATED_ERROR_M / 1e-4) ** 2 / t.size == pytest.approx(3.0, abs=0.05)
-    motion = analyse(track).motion
-    assert isinstance(motion, Oscillation)
-    assert motion.damping.fits["linear"].rejection == "misfit"
-    assert motion.damping.selected == "linear+quadratic"

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import analyse
 from pipeline.bench.scene import Scene
 from pipeline.errors import AnalysisError, TrackError
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.classic import classic
 from pipeline.results.compare import SpringRun
 from pipeline.track import UNITS, Track
+from tests.motion import motion_of
 from tests.sampling import sampled
 from tests.synthetic import Truth, noisy, times
 
@@ -37,12 +38,6 @@ def track(quantity: str = "length", unit: str = "m", *, seconds: float = 60.0, s
     return Track.from_arrays(t, noisy(TRUTH, t, SIGMA, seed), quantity=quantity, unit=unit)
 
 
-def oscillation(found: Analysis) -> Oscillation:
-    """Return its motion, which oscillates."""
-    assert isinstance(found.motion, Oscillation)
-    return found.motion
-
-
 @every
 def test_the_same_numbers_give_the_same_results_in_their_own_unit(quantity: str, unit: str) -> None:
     """Whatever a record is of, period, damping and amplitudes are those of a length, and only the units differ."""
@@ -53,10 +48,8 @@ def test_the_same_numbers_give_the_same_results_in_their_own_unit(quantity: str,
         mine, its = other.estimates[name], length.estimates[name]
         assert (mine.value, mine.u) == (its.value, its.u)
         assert (mine.unit, its.unit) == (unit, "m")
-    assert oscillation(other).damping.selected == oscillation(length).damping.selected == "linear+quadratic"
-    units = dict(
-        zip(*(getattr(oscillation(other).damping.best.joint, each) for each in ("names", "units")), strict=True)
-    )
+    assert motion_of(other).damping.selected == motion_of(length).damping.selected == "linear+quadratic"
+    units = dict(zip(*(getattr(motion_of(other).damping.best.joint, each) for each in ("names", "units")), strict=True))
     per = {
         "rad": "1/(rad s)",
         "V": "1/(V s)",
@@ -67,14 +60,14 @@ def test_the_same_numbers_give_the_same_results_in_their_own_unit(quantity: str,
         "1": "1/s",
     }
     assert units == {"A0": unit, "gamma": "1/s", "beta": per[unit]}
-    assert oscillation(other).derived.coefficients["beta"].unit == per[unit]
+    assert motion_of(other).derived.coefficients["beta"].unit == per[unit]
 
 
 @every
 def test_no_number_is_in_metres_where_nothing_was_measured_in_them(quantity: str, unit: str) -> None:
     """Units of estimates, budgets, laws and effects, with a bench that knows everything."""
     found = analyse(track(quantity, unit), SCENE)
-    motion = oscillation(found)
+    motion = motion_of(found)
     units = {name: each.unit for name, each in found.estimates.items()}
     units |= {f"budget {name}": each.estimate.unit for name, each in motion.derived.budgets.items()}
     units |= {f"effect {each.name}": each.unit for each in found.effects}
@@ -145,5 +138,5 @@ def test_what_needs_a_length_says_so_in_one_line() -> None:
         classic(track("voltage", "V"))
     found = analyse(track("angle", "rad"), SCENE)
     with pytest.raises(AnalysisError, match=r"^swing: "):
-        SpringRun.of("swing", oscillation(found).derived)
-    assert SpringRun.of("coil", oscillation(analyse(track("voltage", "V"), SCENE)).derived).clock == ""
+        SpringRun.of("swing", motion_of(found).derived)
+    assert SpringRun.of("coil", motion_of(analyse(track("voltage", "V"), SCENE)).derived).clock == ""

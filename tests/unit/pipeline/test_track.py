@@ -63,10 +63,3 @@ def test_any_numbers_make_a_track_or_a_track_error(t: list[float], y: list[float
 def test_units_are_those_of_blocks() -> None:
     """The pipeline's quantities and the acquisition's are one table."""
     assert UNITS == BLOCK_UNITS
-
-
-@pytest.mark.parametrize(("quantity", "unit"), [("length", "cm"), ("angle", "m"), ("angle", "deg"), ("colour", "m")])
-def test_an_unknown_quantity_or_unit_is_refused(quantity: str, unit: str) -> None:
-    """Only the SI unit of a quantity that is known."""
-    with pytest.raises(TrackError, match=f"got {quantity} in {unit}"):
-        Track.from_arrays([0.0, 1.0], [0.0, 1.0], quantity=quantity, unit=unit)

@@ -59,12 +59,6 @@ def test_a_failing_body_leaves_the_old_state(tmp_path: Path, error: BaseExceptio
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_missing_folder_is_one_line(tmp_path: Path) -> None:
-    """The error says what to do."""
-    with pytest.raises(WriteFailed, match=r"No such file or directory\); make the folder first"):
-        write_whole(tmp_path / "none" / "a", "x")
-
-
 @pytest.mark.parametrize("overwrite", [True, False])
 def test_the_file_is_synced_before_it_is_placed_and_the_folder_after(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overwrite: bool
@@ -156,27 +150,6 @@ def make(folder: Path, content: str) -> None:
         fill(part, content)
 
 
-def test_a_folder_is_replaced_whole(tmp_path: Path) -> None:
-    """What the earlier one held and this one does not is gone; nothing is left beside."""
-    folder = tmp_path / "a" / "run.results"
-    with whole_folder(folder, NAMES, "page") as part:
-        fill(part, "1")
-        (part / "old").write_text("1")
-        (part / "figures").mkdir()
-        (part / "figures/a").write_text("1")
-    make(folder, "2")
-    assert held(folder) == {"page": "2", "table": "2"}
-
-
-def test_a_build_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
-    """After an error of the body what stood there stands."""
-    folder = tmp_path / "run.results"
-    make(folder, "1")
-    with pytest.raises(TypeError), whole_folder(folder, NAMES, "page") as part:
-        (part / "table").write_text(2)  # type: ignore[arg-type]
-    assert held(folder) == {"page": "1", "table": "1"}
-
-
 @pytest.mark.parametrize("inside", [False, True])
 def test_what_others_put_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: bool) -> None:
     """A folder with other files, or that somebody stands in, keeps its place and its files; stale ones of ours go."""
@@ -190,10 +163,3 @@ def test_what_others_put_there_stays(tmp_path: Path, monkeypatch: pytest.MonkeyP
         (folder / "notes.txt").write_text("mine")
     make(folder, "2")
     assert held(folder.resolve()) == {"page": "2", "table": "2"} | ({} if inside else {"notes.txt": "mine"})
-
-
-def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
-    """A file stands where a folder above should be."""
-    (tmp_path / "file").write_text("")
-    with pytest.raises(WriteFailed, match="could not be written"):
-        make(tmp_path / "file" / "run.results", "1")

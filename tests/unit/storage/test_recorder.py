@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import threading
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ import pytest
 from acquisition.clock import VirtualClock
 from acquisition.events import Lost, StoredEvent
 from acquisition.live.reader import Sink
-from storage.errors import RunExists, WriteFailed
+from storage.errors import WriteFailed
 from storage.recorder import Recorder
 from storage.wire_log.appending import SECOND_COPY
 from storage.wire_log.records import LogHeader, RecordKind, SensorEntry
@@ -49,15 +48,6 @@ def test_everything_put_is_in_the_log_in_order(tmp_path: Path) -> None:
     assert (records[504].kind, len(records)) == (RecordKind.END, 505)
     assert json_of(records[504]) == {"records": len(whole) - 1, "dropped_records": 0, "dropped_bytes": 0}
     assert read_log(tmp_path / "run.wire").damage.intact
-
-
-def test_a_recording_is_never_written_over(tmp_path: Path) -> None:
-    """The second recording of a name is refused before a thread starts."""
-    Recorder(tmp_path / "run.wire", HEADER, VirtualClock()).close()
-    before = set(threading.enumerate())
-    with pytest.raises(RunExists):
-        Recorder(tmp_path / "run.wire", HEADER, VirtualClock())
-    assert set(threading.enumerate()) <= before
 
 
 def test_a_slow_sync_holds_up_no_write() -> None:
@@ -129,21 +119,6 @@ def test_events_and_marks_outlast_an_overflow() -> None:
     assert recorded + overflow["facts"]["records"] == 19 == recorded + recording.status.dropped_records
 
 
-def test_reads_that_a_hanging_disk_has_not_taken_are_counted() -> None:
-    """The count has the write that hangs and those that wait, but no marks; the user sees it when leaving."""
-    disk = Disk()
-    recording = recorder(disk)
-    disk.writes_pass.clear()
-    recording.put(0, 0, b"first")
-    assert disk.held.wait(WAIT_S)
-    recording.reads([(0, number, b"x") for number in range(10)])
-    recording.mark("let go")
-    assert recording.unwritten() == (11, 15)
-    disk.writes_pass.set()
-    recording.close()
-    assert recording.unwritten() == (0, 0)
-
-
 def test_a_read_longer_than_a_record_is_divided() -> None:
     """A record has 65535 bytes at most."""
     disk, long = Disk(), bytes(range(256)) * 1000
@@ -203,26 +178,3 @@ def test_a_failed_sync_stops_the_recording() -> None:
     with pytest.raises(WriteFailed, match="could not be synced"):
         recording.close()
     assert recording.status.synced_records == 2
-
-
-def test_a_defect_does_not_pass_for_a_recording() -> None:
-    """A record that cannot be laid out stops the recording with a line, not a thread without a word."""
-    recording = recorder(Disk())
-    recording.put(0, 1 << 70, b"x")
-    with pytest.raises(WriteFailed, match="a record could not be appended"):
-        recording.close()
-
-
-def test_a_channel_is_a_byte() -> None:
-    """A caller's error is raised to the caller."""
-    with recorder(Disk()) as recording, pytest.raises(ValueError, match="0 to 255, got 256"):
-        recording.put(256, 0, b"x")
-
-
-def test_putting_after_the_end_is_counted() -> None:
-    """A reading thread that outlives the recording harms nothing and is not forgotten."""
-    disk = Disk()
-    recording = recorder(disk)
-    recording.close()
-    recording.put(0, 0, b"late")
-    assert (recording.status.dropped_records, recording.status.dropped_bytes) == (1, 4)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquisition.decoders.decoder import Identity
-from acquisition.decoders.line_protocol import SETTINGS, LineProtocolDecoder, LineProtocolEncoder, frame
+from acquisition.decoders.line_protocol import SETTINGS, LineProtocolDecoder, frame
 
 ROOT = Path(__file__).resolve().parents[4]
 PAGE = (ROOT / "docs" / "reference" / "line-protocol.md").read_text(encoding="utf-8")
@@ -63,26 +63,6 @@ def test_a_vector_of_the_page_is_read_as_it_says(vector: tuple[str, ...]) -> Non
     expected = [*map(number, cells), float(missing == "yes")]
     np.testing.assert_array_equal(rows, [expected])
     assert faults == {}
-
-
-@pytest.mark.parametrize(
-    "vector", [row for row in vectors() if row[5] != "-" and "R1,00" not in row[0]], ids=lambda row: row[0]
-)
-def test_a_vector_of_the_page_is_written_as_it_says(vector: tuple[str, ...]) -> None:
-    """The encoder makes the same line of the fields; no simulated sensor has other letters than E and N."""
-    line, sequence, device_us, echo_us, celsius, *_ = vector
-    written = LineProtocolEncoder().encode(
-        sequence=int(sequence),
-        device_us=int(device_us),
-        echo_us=number(echo_us),
-        distance_m=number(echo_us) * 171.5e-6,
-        temperature_c=number(celsius),
-    )
-    body = line[1:].partition("*")[0]
-    if body[-1] not in "EN":
-        assert written == frame(f"{body[:-1]}N".encode())
-    else:
-        assert written == line.encode() + b"\n"
 
 
 def test_an_identification_of_the_page_is_read_as_it_says() -> None:

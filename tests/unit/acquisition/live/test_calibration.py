@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
@@ -56,14 +55,6 @@ def test_a_moving_bob_is_refused(amplitude_m: float) -> None:
     assert "hangs still" in one_line(error)
 
 
-def test_one_ruler_distance_gives_the_offset() -> None:
-    """One known distance shifts and leaves the scale; its u joins the ruler's and the measurement's."""
-    point = StillPoint(0.300, 3e-4, 1e-3, 300)
-    result = against_ruler((point,), (0.312,), 4e-4)
-    assert (result.scale, result.offset_m) == (1.0, pytest.approx(0.012))
-    assert result.u_offset_m == pytest.approx(5e-4)
-
-
 def test_the_rulers_uncertainty_covers() -> None:
     """Over 300 seeds the error of scale and offset has the size that is stated."""
     known = (0.2, 0.5, 0.9)
@@ -100,20 +91,6 @@ def test_a_wrong_unit_is_refused() -> None:
     with pytest.raises(CalibrationError, match="check the unit") as error:
         against_ruler(points, (0.2 / 0.0254, 0.6 / 0.0254), 1e-3)
     one_line(error)
-
-
-def test_another_speed_of_sound_scales_stored_echo_times() -> None:
-    """Echo times are stored, so distances follow the speed applied; a stated distance does not."""
-    readings = [(1000.0, math.nan), (math.nan, 0.25), (2000.0, math.nan)]
-    slow, fast = ([Calibration(speed).distance(*reading) for reading in readings] for speed in (340.0, 345.1))
-    np.testing.assert_allclose(slow, [0.17, 0.25, 0.34], rtol=1e-15)
-    np.testing.assert_allclose(np.divide(fast, slow), [345.1 / 340.0, 1.0, 345.1 / 340.0], rtol=1e-14)
-
-
-def test_the_mapping_goes_there_and_back_through_json() -> None:
-    """What is written in a log gives the same calibration to the last bit."""
-    given = Calibration(343.21, 1.0 + 1e-9, -0.0123, 1e-4, 2e-5)
-    assert Calibration.from_mapping(json.loads(json.dumps(given.to_mapping()))) == given
 
 
 @pytest.mark.parametrize(

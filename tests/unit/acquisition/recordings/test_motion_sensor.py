@@ -122,27 +122,6 @@ def test_a_hole_in_velocity_leaves_a_flagged_unknown_offset() -> None:
 # Position and velocity -----------------------------------------------------------------------------------
 
 
-def test_a_pair_is_joined_by_time_not_by_row() -> None:
-    """Windows differ: where one file has no row, its quantity is missing."""
-    position, velocity = velocity_run(60)
-    rows = [f"{i / 100:.3f}\t{x * 100:.3f}\t0.239" for i, x in enumerate(position)]
-    recording = FORMAT.read_pair(
-        ("p.txt", "\n".join([POSITION, *rows[10:50]]).encode()),
-        ("v.txt", "\n".join([VELOCITY, *velocity[5:55]]).encode()),
-    )
-    samples = recording.samples
-    assert samples.velocity is not None
-    assert samples.t.tolist() == [i / 100 for i in range(5, 55)]
-    np.testing.assert_allclose(samples.distance[5:45], position[10:50], atol=5.01e-6)
-    assert np.isnan(samples.distance[:5]).all()
-    assert np.isnan(samples.distance[45:]).all()
-    assert samples.flags.tolist() == [1] * 5 + [0] * 40 + [1] * 5
-    assert np.isfinite(samples.velocity).all()
-    assert [original.name for original in recording.originals] == ["p.txt", "v.txt"]
-    assert recording.info.quantum_m == 1e-5
-    assert "pair_mismatch" not in codes(recording)
-
-
 def test_a_pair_of_different_runs_is_noticed() -> None:
     """Velocities that are not the differences of the positions are another run's; so are other rates."""
     _, velocity = velocity_run(60)

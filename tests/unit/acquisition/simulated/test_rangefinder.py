@@ -60,19 +60,3 @@ def test_false_echoes_come_in_clusters_where_the_bob_turns_near_the_sensor() -> 
     assert np.all((off[false] > 2.4e-3) & (off[false] < 7.6e-3))
     assert all(bob((start - 1) / 100) < 0.2005 for start in edges[::2])
     assert np.all(np.abs(off[~false]) < 25e-6)
-
-
-def finder(**sensor: Any) -> VirtualRangefinder:
-    """Return a rangefinder over the bob."""
-    return VirtualRangefinder(bob, VirtualSensor(**sensor), np.random.default_rng(2))
-
-
-def test_a_block_holds_the_readings_of_its_seconds_at_their_times() -> None:
-    """All samples of two minutes: the device's times, the distances of single readings, the true host times."""
-    samples = finder().block(120.0)
-    single = finder()
-    shots = [single.shot(i) for i in range(12_000)]
-    assert len(samples) == 12_000
-    np.testing.assert_allclose(samples.t, np.arange(12_000) / 100.0 + samples.distance / 344.0, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(samples.distance, [shot.distance_m for shot in shots])
-    np.testing.assert_array_equal(samples.host_ns, [round(shot.true_s * 1e9) for shot in shots])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from pipeline.analyse import analyse
 from pipeline.bench.instrument import U_CRYSTAL, Instrument
 from pipeline.errors import TrackError
 from pipeline.track import Track
+from tests import synthetic
 
 ROOT3 = math.sqrt(3.0)
 LIMITED = {"clock_limit": 0.01, "u_rate_error": 1e-5}
@@ -65,7 +65,7 @@ def test_a_comparison_corrects_widens_or_is_refused(case: str) -> None:
     assert found.clock_refused == refused
 
 
-def test_period_is_corrected(synthetic: ModuleType) -> None:
+def test_period_is_corrected() -> None:
     """A device that counts 1.002 s in a second shows periods 0.2 % too long; analyse gives the true one."""
     t, truth = synthetic.times(20), synthetic.Truth()
     y = synthetic.noisy(truth, t, 3e-4, 1)

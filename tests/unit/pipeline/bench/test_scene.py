@@ -25,28 +25,6 @@ WHOLE = {
 }
 
 
-def test_every_key_of_the_reference_scene_is_read() -> None:
-    """Each quantity arrives with its value, uncertainty and unit."""
-    scene = Scene.from_mapping(WHOLE)
-    assert scene == Scene(
-        bob_mass_kg=Estimate(0.2176, 0.00005, "kg"),
-        spring_mass_kg=Estimate(0.01, 0.0005, "kg"),
-        spring_constant_n_per_m=Estimate(14.0, 0.0, "N/m"),
-        disc_diameter_m=Estimate(0.102, 0.0005, "m"),
-        air_temperature_c=Estimate(20.0, 0.0, "degC"),
-        air_pressure_pa=Estimate(101325.0, 0.0, "Pa"),
-        air_relative_humidity=Estimate(0.4, 0.0, ""),
-        sensor_sigma_m=Estimate(0.0003, 0.0, "m"),
-        sensor_position="below",
-        start_displacement_m=Estimate(-0.05, 0.0, "m"),
-        start_velocity_m_per_s=Estimate(0.0, 0.0, "m/s"),
-        gamma_per_s=Estimate(0.0073, 0.0, "1/s"),
-        beta_per_m_s=Estimate(0.235, 0.0, "1/(m s)"),
-        mu_m_per_s=Estimate(0.0, 0.0, "m/s"),
-    )
-    assert scene.tells_of_sensor
-
-
 REFUSED: list[tuple[str, str, Any]] = [
     ("bob", "mass_g", 200.0),
     ("bob", "mass_kg", -0.2),

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.analyse import Analysis, Oscillation, analyse
 from pipeline.bench.scene import Scene
-from pipeline.damping.laws import LAWS, find_law
+from pipeline.damping.laws import LAWS
 from pipeline.damping.laws.of_function import FunctionLaw, make_law
 from pipeline.errors import AnalysisError
 from pipeline.options import Options, options_for
@@ -54,16 +54,6 @@ def test_a_law_of_a_function_is_found_where_it_holds(accuracy: str) -> None:
     assert d.unit == "1/(m^1/2 s)"
     assert abs(d.value - 0.2) < 4.0 * d.u < 0.01
     assert {"clock_rate", "damping_law"} <= {c.name for c in motion.derived.budgets["d"].contributions}
-
-
-def test_laws_are_named_or_given() -> None:
-    """Unknown names list what there is; a law of the user needs a new name."""
-    assert find_law("linear") is LAWS["linear"]
-    assert find_law(LAWS["linear"]) is LAWS["linear"]
-    with pytest.raises(AnalysisError, match="cubic"):
-        find_law("cubic")
-    with pytest.raises(AnalysisError, match="linear"):
-        find_law(replace(three_halves(), name="linear"))
 
 
 @pytest.mark.parametrize("name", ["n", "beta"])

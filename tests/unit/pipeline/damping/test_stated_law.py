@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.analyse import Analysis, Oscillation, analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
 from pipeline.numerics.estimate import UpperLimit
-from pipeline.options import Options
 from pipeline.track import F8, Track
+from tests.motion import motion_of
 
 T = np.arange(6000) / 100.0
 
@@ -18,12 +18,6 @@ def recorded(amplitude: F8, noise_m: float = 3.5e-4, seed: int = 3) -> Track:
     """Return 60 s of an oscillation of this amplitude."""
     noise = noise_m * np.random.default_rng(seed).standard_normal(T.size)
     return Track.from_arrays(T, 0.2 + amplitude * np.cos(8.3 * T) + noise)
-
-
-def motion_of(analysis: Analysis) -> Oscillation:
-    """Return the motion of a run that oscillates."""
-    assert isinstance(analysis.motion, Oscillation)
-    return analysis.motion
 
 
 def codes_of(analysis: Analysis) -> set[str]:
@@ -46,15 +40,6 @@ def test_the_law_of_the_scene_is_the_stated_one() -> None:
     assert analysis.estimates["damping_rate"].value == pytest.approx(0.0105, rel=0.05)
     assert derived.coefficients["gamma"].value == pytest.approx(analysis.estimates["damping_rate"].value, rel=1e-9)
     assert not codes_of(analysis)
-
-
-def test_an_option_replaces_the_law_of_the_scene() -> None:
-    """Params state another law, or leave the choice to the recording."""
-    scene = Scene(damping_law="linear")
-    other = Options(stated="quadratic")
-    assert motion_of(analyse(QUADRATIC, scene, other)).damping.selected == "quadratic"
-    none = Options(stated="any")
-    assert motion_of(analyse(QUADRATIC, scene, none)).damping.stated == ""
 
 
 def test_a_recording_may_contradict_the_stated_law() -> None:

@@ -8,8 +8,6 @@ import pytest
 
 from pipeline.analyse import Analysis, analyse
 from pipeline.bench.scene import Scene
-from pipeline.findings.finding import word
-from pipeline.registry.found import Found
 from pipeline.track import Track
 from tests.synthetic import Truth, noisy, times
 
@@ -42,11 +40,3 @@ def test_inputs_without_uncertainty_are_named(tables: dict[str, object], named: 
     messages = [f.message for f in in_scene(tables).findings if f.code == "uncertainty_missing"]
     assert [message.count("[") for message in messages] == ([1] if named else [])
     assert all(named in message for message in messages)
-
-
-def test_numbers_have_the_unit_of_the_recording() -> None:
-    """A step of a length is in mm, one of a voltage in V, and the sentence names what steps."""
-    found = Found("quantised", {"step_m": 0.002, "noise_m": 1e-4})
-    assert {"distances", "2", "mm,"} <= set(word(found, "m").message.split())
-    assert {"voltages", "0.002", "V,"} <= set(word(found, "V").message.split())
-    assert word(found, "V").values == found.numbers

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from scipy.optimize import curve_fit
 from pipeline.errors import AnalysisError
 from pipeline.results.classic import classic
 from pipeline.track import Track
+from tests import synthetic
 
 
 def naive_period(t: list[float], y: list[float]) -> float:
@@ -46,16 +46,16 @@ def naive_sliding(t: list[float], y: list[float], window_s: float) -> tuple[list
     return starts, amplitudes
 
 
-def record(synthetic: ModuleType, seconds: float, sigma_m: float, seed: int, **truth: float) -> Track:
+def record(seconds: float, sigma_m: float, seed: int, **truth: float) -> Track:
     """Return a synthetic track."""
     t = synthetic.times(seconds)
     return Track.from_arrays(t, synthetic.noisy(synthetic.Truth(**truth), t, sigma_m, seed))
 
 
 @pytest.mark.parametrize(("sigma_m", "seed"), [(0.0, 1), (3e-4, 2), (2.39e-3, 3)])
-def test_period_and_amplitude_are_the_naive_ones(synthetic: ModuleType, sigma_m: float, seed: int) -> None:
+def test_period_and_amplitude_are_the_naive_ones(sigma_m: float, seed: int) -> None:
     """Period, amplitude and sliding amplitude equal what plain loops give."""
-    track = record(synthetic, 10.0, sigma_m, seed, gamma=0.005)
+    track = record(10.0, sigma_m, seed, gamma=0.005)
     found = classic(track)
     t, y = track.t.tolist(), track.y.tolist()
     assert found.estimates["period"].value == pytest.approx(naive_period(t, y), abs=1e-12)
@@ -65,9 +65,9 @@ def test_period_and_amplitude_are_the_naive_ones(synthetic: ModuleType, sigma_m:
     np.testing.assert_allclose(found.window_amplitude, amplitudes, atol=1e-15)
 
 
-def test_exponential_is_scipys_with_the_start_fixed(synthetic: ModuleType) -> None:
+def test_exponential_is_scipys_with_the_start_fixed() -> None:
     """Gamma and its formal uncertainty are curve_fit's for A0 e^(-gamma t), A0 held at the first amplitude."""
-    found = classic(record(synthetic, 60.0, 2.39e-3, 5, gamma=0.01463))
+    found = classic(record(60.0, 2.39e-3, 5, gamma=0.01463))
     t, amplitude = found.window_t - found.window_t[0], found.window_amplitude
     start = amplitude[0]
     (gamma,), covariance = curve_fit(
@@ -79,27 +79,15 @@ def test_exponential_is_scipys_with_the_start_fixed(synthetic: ModuleType) -> No
     assert found.chi2 == pytest.approx(float(residual @ residual), rel=1e-6)
 
 
-def test_gamma_is_biased_by_an_eighth(synthetic: ModuleType) -> None:
-    """At 2.39 mm noise, 120 s and a true exponential the mean error of gamma over 20 seeds is about -12 %."""
-    truth = 0.01463
-    errors, inside = [], 0
-    for seed in range(20):
-        rate = classic(record(synthetic, 120.0, 2.39e-3, seed, gamma=truth)).estimates["damping_rate"]
-        errors.append(rate.value / truth - 1.0)
-        inside += abs(rate.value - truth) <= rate.u
-    assert -0.15 <= np.mean(errors) <= -0.09
-    assert inside <= 1
-
-
 @pytest.mark.parametrize(("sigma_m", "bias_m"), [(3e-4, 0.56e-3), (2.39e-3, 5.4e-3)])
-def test_amplitude_is_biased_outward(synthetic: ModuleType, sigma_m: float, bias_m: float) -> None:
+def test_amplitude_is_biased_outward(sigma_m: float, bias_m: float) -> None:
     """Extremes of noisy samples lie outside the motion, by as much as the docstring says."""
-    bias = [classic(record(synthetic, 10.0, sigma_m, s)).estimates["amplitude"].value - 0.05 for s in range(40)]
+    bias = [classic(record(10.0, sigma_m, s)).estimates["amplitude"].value - 0.05 for s in range(40)]
     assert np.mean(bias) == pytest.approx(bias_m, rel=0.1)
 
 
 @pytest.mark.parametrize(("seconds", "words"), [(3.0, "8 maxima"), (1.0, "maxima")])
-def test_short_record_is_refused_with_what_it_needs(synthetic: ModuleType, seconds: float, words: str) -> None:
+def test_short_record_is_refused_with_what_it_needs(seconds: float, words: str) -> None:
     """Fewer than eight maxima are refused in one line that says how many there were."""
     with pytest.raises(AnalysisError, match=words):
-        classic(record(synthetic, seconds, 3e-4, 9))
+        classic(record(seconds, 3e-4, 9))

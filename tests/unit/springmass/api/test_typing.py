@@ -29,6 +29,7 @@ sm.Scene(bob_mas_kg=0.2)  # wrong
 """
 
 
+@pytest.mark.trials
 def test_mypy_finds_every_mistake_and_no_other(tmp_path: Path) -> None:
     """Names, arguments, options and choices, under ``mypy --strict``."""
     script = tmp_path / "script.py"

@@ -3,49 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import springmass
-from acquisition.block import Block
 from acquisition.clock import VirtualClock
 from acquisition.decoders.registry import get_family
 from acquisition.events import RunEnded, TimedOut, Triggered, Zeroed
 from pipeline.bench.scene import Scene
-from pipeline.track import F8, Track
-from springmass.charts.chart import decoded
+from pipeline.track import Track
 from springmass.page.feeds import LogFeed, view_of
 from springmass.page.live_analysis import motion_of
-from springmass.page.view import MOST_PER_MESSAGE, SampleBuffer
 from storage.recorder import Recorder
 from storage.wire_log.records import LogHeader, SensorEntry
-
-
-def test_messages_hold_every_sample_once() -> None:
-    """In order, a missing one as NaN, however many come at a time."""
-    count = 2 * MOST_PER_MESSAGE + 17
-    t = np.arange(count) / 100
-    y = np.where(np.arange(count) % 7, 0.2 + 1e-3 * t, np.nan)
-    series = SampleBuffer()
-    for start in range(0, count, 999):
-        part = slice(start, start + 999)
-        series.push(Block(start, t[part], y[part], np.zeros(t[part].size, np.uint8)))
-        assert series.missing == np.count_nonzero(np.isnan(y[: len(series)]))
-    found_t, found_y, first = [], [], 0
-    while first < len(series):
-        message = series.message(3, first)
-        kind, sensor, start, size = struct.unpack_from("<4I", message)
-        assert (kind, sensor, start) == (1, 3, first)
-        values = np.frombuffer(message, "<f8", offset=16)
-        found_t.append(values[:size])
-        found_y.append(values[size:])
-        first += size
-    np.testing.assert_array_equal(np.concatenate(found_t), t)
-    np.testing.assert_array_equal(np.concatenate(found_y), y)
 
 
 def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
@@ -71,32 +43,6 @@ def test_a_log_is_seen_as_it_grows(tmp_path: Path) -> None:
     assert feed.view.ended
     assert feed.view.error == ""
     feed.close()
-
-
-def test_the_motion_of_a_run_is_that_of_an_analysis() -> None:
-    """The same numbers as ``analyse`` at ``fast``, with the law's curve through the amplitudes."""
-    loaded = springmass.load(springmass.sample_data() / "damped_simulated_position.txt").loaded
-    view = view_of(loaded)
-    assert len(view.series[0]) == len(loaded.samples)
-    message = motion_of(loaded.track, Scene(), 20e-6, charts=True)
-    found = message["estimates"]
-    assert found["period"]["value"] == pytest.approx(0.790066, abs=5 * found["period"]["u"])
-    assert message["stop"]["u_s"] == found["period"]["u"]
-    assert {"amplitude", "spectrum"} == set(message["charts"])
-    chart = message["charts"]["amplitude"]
-    series = chart["panels"][0]["series"]
-    law = next(each for each in series if each["role"] == "law")
-    points = next(each for each in series if each["role"] == "data")
-    curve = np.interp(x_of(chart, points), x_of(chart, law), decoded(law["y"]))
-    assert np.median(np.abs(curve / decoded(points["y"]) - 1.0)) < 0.01
-
-
-def x_of(chart: dict[str, Any], series: dict[str, Any]) -> F8:
-    """Return the x of a series of a chart's JSON."""
-    x = chart["xs"][series["x"]]
-    if "after" in x:
-        return np.asarray(x["start"] + decoded(x["after"]))
-    return np.asarray(x["start"] + x["step"] * np.arange(x["count"]))
 
 
 def test_the_fit_decays_as_its_law() -> None:

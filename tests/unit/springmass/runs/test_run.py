@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -178,14 +177,6 @@ def test_the_dataset_holds_the_run_and_goes_into_a_file(damped: sm.Run, still: s
         analysis.to_dataset().to_netcdf(tmp_path / name, engine="h5netcdf")
         with xr.open_dataset(tmp_path / name, engine="h5netcdf", decode_times=False) as again:
             xr.testing.assert_equal(again.load(), analysis.to_dataset())
-
-
-def test_an_analysis_travels_between_processes(damped: sm.Run) -> None:
-    """Pickled and back it is the same, its estimates still correlated."""
-    again = pickle.loads(pickle.dumps(damped))
-    assert again.analysis.estimates == damped.analysis.estimates
-    assert (again["period"] * again["frequency"]).std_dev < 1e-12
-    assert repr(again) == repr(damped)
 
 
 @pytest.fixture(scope="module")

@@ -209,28 +209,3 @@ def test_behind_a_break_of_the_network_the_part_goes_on_if_the_counter_does(runs
     sent = [1000, 1001, 1002, 1201, 1202] if runs_on else [5, 6]
     np.testing.assert_allclose(block.t, met(sent) - 0.01 * sent[0], atol=1e-12)
     assert block.flags.tolist() == ([0, 0, 0, Flag.GAP_BEFORE, 0] if runs_on else [0, 0])
-
-
-def test_what_a_network_port_sent_before_it_was_lost_again_is_recorded() -> None:
-    """Bytes that show no reading stay in the channel before, so that the run over a poor network is one."""
-    for lost in (True, False):
-        bench = Bench("socket://sensor:23")
-        bench.send(0, frame(0))
-        bench.away(1, 100)
-        bench.send(101, b"half a li")
-        if lost:
-            bench.tee.event(0, 102 * STEP_NS, Lost(why="cable"))
-        bench.tee.stop()
-        assert bench.log.taken[1:] == [(0, 101 * STEP_NS, b"half a li")]
-        assert bench.kinds == ["0 lost", *(["0 lost"] if lost else [])]
-        assert bench.tee.absent(103 * STEP_NS) == ([0] if lost else [])
-
-
-def test_a_sensor_that_was_away_when_the_run_began_has_one_part() -> None:
-    """Nothing of it is in the run before, so what it sends is the first part."""
-    bench = Bench("/dev/ttyUSB0")
-    bench.away(0, 100)
-    bench.send(101, frame(7))
-    assert bench.kinds == ["0 lost"]
-    assert bench.log.taken == [(0, 101 * STEP_NS, frame(7))]
-    assert bench.tee.gone == {}

@@ -230,18 +230,6 @@ def test_a_log_without_its_header_needs_one(tmp_path: Path) -> None:
     assert recover(log, header=HEADER).runs[0].samples == 50
 
 
-@pytest.mark.parametrize("data", [b"", b"Time (s)\t0.1\n", bytes(10_000)])
-def test_what_is_no_log_is_refused_in_one_line(data: bytes, tmp_path: Path) -> None:
-    """An empty file, a text and zeros are no logs, nor is a file that is not there."""
-    path = tmp_path / "any.wire"
-    with pytest.raises(NotALog, match="cannot be read"):
-        recover(path)
-    path.write_bytes(data)
-    with pytest.raises(NotALog, match=rf"any\.wire: expected a wire log, got {len(data)} bytes without a record"):
-        recover(path)
-    assert not (tmp_path / "any.h5").exists()
-
-
 @pytest.mark.skipif(os.name == "nt", reason="this system has no such locks")
 def test_a_log_that_is_still_written_is_not_recovered(tmp_path: Path) -> None:
     """While a recorder has the log, no run file is made; afterwards it is."""

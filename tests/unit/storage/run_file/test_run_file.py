@@ -18,7 +18,7 @@ import pytest
 from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.errors import PortError
 from acquisition.recordings.recording import FormatIssue, Original
-from storage.errors import NotARun, RunClosed, RunDamaged, RunExists, RunOpen, WriteFailed
+from storage.errors import NotARun, RunDamaged, RunExists, RunOpen, WriteFailed
 from storage.run_file.layout import CHUNK, HEADER
 from storage.run_file.reading import open_run
 from storage.run_file.writing import write_run
@@ -85,17 +85,6 @@ def test_many_chunks_come_back(tmp_path: Path) -> None:
     with open_run(path) as run:
         assert same(run.samples(), whole)
         run.verify()
-
-
-def test_a_closed_run_says_so(path: Path) -> None:
-    """Reading after the with is an error of one line; what was read at opening is still there."""
-    with open_run(path) as run:
-        run.samples()
-    run.close()
-    assert run.header.title == "Träger 3"
-    for read in (run.samples, run.originals, run.verify):
-        with pytest.raises(RunClosed, match="closed"):
-            read()
 
 
 def test_a_standing_run_is_not_overwritten_unasked(path: Path) -> None:
@@ -180,18 +169,6 @@ except WriteFailed as error:
     assert done.stdout.count("\n") == 1
     assert done.stderr == ""
     assert list(tmp_path.iterdir()) == []
-
-
-def test_other_files_are_no_runs(tmp_path: Path) -> None:
-    """A missing file, a folder, a text and another program's HDF5 are told apart from a damaged run."""
-    text, second = tmp_path / "a.txt", tmp_path / "other.h5"
-    text.write_text("0.1\t0.5\n")
-    with h5py.File(second, "w") as file:
-        file["x"] = 1
-    for path in (tmp_path / "none.h5", tmp_path, text, second):
-        with pytest.raises(NotARun) as caught:
-            open_run(path)
-        assert "\n" not in str(caught.value)
 
 
 def test_a_later_schema_is_refused(path: Path) -> None:
