@@ -28,7 +28,12 @@ from storage.atomic import write_whole
 
 Amendments = Mapping[tuple[str, str], Any]
 """Mapping of a scene's (table, key) to a value as a scene file states it."""
-LONGEST_SCENE = 1 << 14  # maximum size of a scene file in bytes; some longer files take seconds to parse
+LONGEST = 1 << 14
+"""Maximum size of a file of a scene or of notes in bytes, for reading and for writing.
+
+The time and the memory that Python's parser of TOML takes grow with the square of the longest dotted key: one key of
+this size takes 3 s, one four times as long takes a minute and gigabytes.
+"""
 
 
 def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:
@@ -63,12 +68,12 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     """Read a small TOML file of a scene or of notes."""
     try:
         with open_regular(path) as file:
-            content = file.read(LONGEST_SCENE + 1) or b""
+            content = file.read(LONGEST + 1) or b""
     except OSError as error:
         raise ProgramError(f"{path}: cannot read the scene file ({error.strerror}); check the name") from error
-    if len(content) > LONGEST_SCENE:
+    if len(content) > LONGEST:
         raise ProgramError(
-            f"{path}: expected a scene file of at most {LONGEST_SCENE} bytes, got a longer one; "
+            f"{path}: expected a scene file of at most {LONGEST} bytes, got a longer one; "
             "name the scene, not the recording"
         )
     text = ""
@@ -176,10 +181,20 @@ def about_of(recording: Path) -> About:
 
 
 def write_about(about: About) -> Path:
-    """Write the notes atomically, replacing any earlier file, and return their path."""
+    """Write the notes atomically, replacing any earlier file, and return their path.
+
+    Notes that :func:`about_of` would refuse are not written, because they would lock their recording out.
+    """
     tables: dict[str, Any] = {"notes": list(about.notes)} if about.notes else {}
     if about.scene is not None and (scene := about.scene.to_mapping()):
         tables["scene"] = scene
     if about.marks:
         tables["marks"] = [{"t_s": t_s, "text": text} for t_s, text in about.marks]
-    return write_whole(about.path, tomli_w.dumps(tables), overwrite=True)
+    try:
+        content = tomli_w.dumps(tables).encode()
+    except UnicodeEncodeError as error:
+        raise ProgramError(f"{about.path}: a note is not text in UTF-8; write it in other letters") from error
+    if len(content) > LONGEST:
+        demand = f"all notes together take at most {LONGEST} bytes, got {len(content)}"
+        raise ProgramError(f"{about.path}: {demand}; shorten the new note, or keep long notes in a file of your own")
+    return write_whole(about.path, content, overwrite=True)

@@ -107,6 +107,28 @@ def test_scenes_are_saved_on_request_under_the_whole_name(cli: Cli, data: Path, 
     assert "spring_constant" not in cli("analyse", tmp_path / "a.txt", "--json").results[0]["estimates"]
 
 
+@pytest.mark.parametrize("note", ["x" * 17000, "caf\udce9"])
+def test_notes_that_could_not_be_read_again_are_not_written(cli: Cli, run: Path, note: str) -> None:
+    """One line that names the file; the earlier notes stay, and the recording can still be analysed."""
+    beside = run.with_name("damped.txt.about.toml")
+    assert cli("scene", run, "--note", "by hand").code == 0
+    before = beside.read_bytes()
+    done = cli("scene", run, "--note", note)
+    assert (done.code, str(beside) in done.complaint) == (2, True)
+    assert beside.read_bytes() == before
+    assert cli("analyse", run, "--json", "--accuracy", "fast").code == 0
+
+
+def test_notes_up_to_the_limit_are_read_again(cli: Cli, run: Path) -> None:
+    """Remarks are added until one is refused; the recording then opens with all that were accepted."""
+    note, accepted = "é \" \\ \x01 " * 250, 0
+    while cli("scene", run, "--note", note).code == 0:
+        accepted += 1
+    (result,) = cli("analyse", run, "--json", "--accuracy", "fast").results
+    assert accepted > 1
+    assert result["recorded"]["notes"] == [note] * accepted
+
+
 @pytest.mark.parametrize(
     "text", ["marks = 3", "[scene.bob]\nmass_kg = -1", "what = 1", "notes = [", "[[marks]]\nt_s = 'a'"]
 )
