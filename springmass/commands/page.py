@@ -48,7 +48,7 @@ def page(
         state.follow(path)
     else:
         loaded = load(path, read)
-        state.show(view_of(loaded), loaded.scene, loaded.path)
+        state.show(view_of(loaded), loaded.scene, loaded.path, read.given())
 
     def opened(address: str, share: str) -> None:
         lines = [f"page: {address}"]

@@ -13,7 +13,9 @@ from typing import Any
 from springmass.page.feeds import LogFeed
 from springmass.page.live_analysis import Watcher
 from springmass.page.view import View
-from springmass.runs.scenes import about_of, write_about
+from springmass.runs.outputs import results_name
+from springmass.runs.questions import option_words
+from springmass.runs.scenes import about_of, about_path, write_about
 from springmass.session.progress import free_bytes
 
 ASIDE = "discarded"
@@ -24,11 +26,11 @@ class RunActions:
     """Works on one run; its path comes from the recorder or the command line, never from the network.
 
     ``ours`` is whether the run was recorded just now; no other run can be discarded. ``report`` is the path of the
-    report; None until it is made.
+    report; None until it is made. ``options`` are those of ``springmass analyse`` with which the report is made.
     """
 
-    def __init__(self, run: Path, *, ours: bool, law: str | None = None) -> None:
-        self._run, self.ours, self._law = run, ours, law
+    def __init__(self, run: Path, *, ours: bool, options: Mapping[str, Any]) -> None:
+        self._run, self.ours, self._options = run, ours, options
         self.report: Path | None = None
         self._making = False
         self._notes: list[str] = []
@@ -61,7 +63,7 @@ class RunActions:
             notes, aside = about_of(self._run).path, folder / name
             self._run.rename(aside)
             if notes.exists():
-                notes.rename(folder / f"{aside.stem}.about.toml")
+                notes.rename(about_path(aside))
             self._run, self._aside = aside, f"{ASIDE}/{name}"
         except OSError as error:
             self._failed = f"not set aside ({error.strerror or error})"
@@ -73,11 +75,13 @@ class RunActions:
             threading.Thread(target=self._analyse, name="springmass-page-report", daemon=True).start()
 
     def _analyse(self) -> None:
-        command = [sys.executable, "-m", "springmass", "-q", "analyse", str(self._run), "-o", str(self._run.parent)]
-        command += [] if self._law is None else ["--law", self._law]
+        # A name that begins with a minus sign must not be taken for an option.
+        run = self._run.absolute()
+        command = [sys.executable, "-m", "springmass", "-q", "analyse", str(run), "-o", str(run.parent)]
+        command += option_words(self._options)
         try:
             done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, errors="replace")
-            page = self._run.parent / f"{self._run.stem}.results" / "report.html"
+            page = run.parent / results_name(run, self._options.get("channel")) / "report.html"
             if done.returncode == 0 and page.is_file():
                 self.report = page
             else:
@@ -123,11 +127,11 @@ class PageState:
         self._folder: Path | None = None
         self.recorder_states: queue.SimpleQueue[Mapping[str, Any]] = queue.SimpleQueue()
 
-    def show(self, view: View, scene: Mapping[str, Any] | None, path: Path) -> None:
-        """Show a complete run."""
+    def show(self, view: View, scene: Mapping[str, Any] | None, path: Path, read: Mapping[str, Any]) -> None:
+        """Show a complete run, which was read with these options."""
         self._folder = path.parent
         self._lay(view, scene)
-        self.after = RunActions(path, ours=False, law=self._law)
+        self.after = RunActions(path, ours=False, options={**read, "law": self._law})
 
     def follow(self, log: Path) -> None:
         """Show a growing log; raises NotALog if the file is not a wire log."""
@@ -189,7 +193,7 @@ class PageState:
             except Exception as error:  # the recording goes on, even if the page cannot show it
                 self.bench["said"] = f"it cannot be shown ({error})"
         if message["phase"] == "built":
-            self.after = RunActions(Path(message["run"]), ours=True, law=self._law)
+            self.after = RunActions(Path(message["run"]), ours=True, options={"law": self._law})
             if self.watcher is not None:
                 self.watcher.complete(Path(message["run"]))
 

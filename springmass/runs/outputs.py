@@ -13,6 +13,8 @@ from typing import Any
 from acquisition.block import Block
 from springmass import __version__
 from springmass.errors import ProgramError
+from springmass.layout import STDIN
+from springmass.runs.inputs import kind_of
 from springmass.runs.loading import Loaded
 from storage.run_file.writing import write_run
 
@@ -22,6 +24,17 @@ LONGEST_NAME = 255
 def safe_name(text: str) -> str:
     """Return a text as a part of a file's name: at most 60 letters, digits and signs; empty if it has none."""
     return re.sub(r"[^A-Za-z0-9.+-]+", "_", text).strip("._")[:60]
+
+
+def results_name(path: Path, channel: str | None = None) -> str:
+    """Return the name of the folder for the report of a recording.
+
+    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the channel that was chosen
+    follows, because each has its own results.
+    """
+    name = "stdin" if str(path) == STDIN else path.name if kind_of(path) == "recording" else path.stem
+    safe = "" if channel is None else safe_name(channel)
+    return in_a_name(f"{name}.{safe}" if safe else name, ".results")
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:

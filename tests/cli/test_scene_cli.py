@@ -121,7 +121,7 @@ def test_notes_that_could_not_be_read_again_are_not_written(cli: Cli, run: Path,
 
 def test_notes_up_to_the_limit_are_read_again(cli: Cli, run: Path) -> None:
     """Remarks are added until one is refused; the recording then opens with all that were accepted."""
-    note, accepted = "é \" \\ \x01 " * 250, 0
+    note, accepted = 'é " \\ \x01 ' * 250, 0
     while cli("scene", run, "--note", note).code == 0:
         accepted += 1
     (result,) = cli("analyse", run, "--json", "--accuracy", "fast").results
