@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import heapq
-import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ from springmass.course.store import Store
 from springmass.course.worker import analyse_one, blank_row, write_report_of
 from springmass.errors import ProgramError, complain, manner
 from springmass.report.html import SHARED, report_script
+from springmass.runs.outputs import safe_name
 from springmass.terminal.progress import counting
 from storage.atomic import write_whole, writing
 
@@ -113,5 +113,5 @@ def _write_pages(course: Plan, folder: Path, table: Sequence[Row], reports: int,
 
 def _report_of(line: Mapping[str, Any], job: Job) -> str:
     """Return the path of a run's report in the folder; names are numbered anew if a run is removed, keys are not."""
-    safe = re.sub(r"[^A-Za-z0-9.+_-]+", "_", line["name"]).strip("._")[:100]
+    safe = safe_name(line["name"], longest=100)
     return f"{REPORTS}/{safe}-{hashlib.sha256(job.key.encode()).hexdigest()[:8]}.results/report.html"
