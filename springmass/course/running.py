@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import heapq
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from springmass.errors import ProgramError, complain, manner
 from springmass.report.html import SHARED, report_script
 from springmass.runs.outputs import safe_name
 from springmass.terminal.progress import counting
-from storage.atomic import write_whole, writing
+from storage.atomic import write_whole
 
 GROWTH = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
 REPORTS = "reports"
@@ -38,9 +37,11 @@ def run_course(
     made_of = {job.key: job.made_of() for job in course.jobs}
     stored = store.made_of()
     todo = [job for job in course.jobs if stored.get(job.key) != made_of[job.key]]
-    for page in (folder / REPORTS).glob("*.results/report.html") if todo else ():
-        with writing(page.parent):  # it may show a run that has changed; an interrupted pass leaves none of these
-            shutil.rmtree(page.parent)
+    if todo:
+        from springmass.report.write import remove_report
+
+        for page in (folder / REPORTS).glob("*.results/report.html"):
+            remove_report(page.parent)  # it may show a run that has changed; an interrupted pass leaves none of these
     done = made_of.keys() - {job.key for job in todo}
     made, written = 0, len(done)
     with counting("runs", len(todo), lines=True, quiet=manner()[0]) as show:

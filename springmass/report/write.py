@@ -24,7 +24,7 @@ from springmass.runs.json_results import plain
 from springmass.runs.outputs import safe_name
 from springmass.runs.rows import results_csv
 from springmass.runs.run import Run
-from storage.atomic import whole_folder, write_whole
+from storage.atomic import remove_files, whole_folder, write_whole
 
 PAGE = "report.html"
 LAB_REPORT = "lab-report.tex"
@@ -110,6 +110,11 @@ def write_report(
             write_whole(folder / LAB_REPORT, lab_report_tex(runs[0], captions, sentences))
     detail(f"written: {directory}: {', '.join(sorted(each.name for each in directory.iterdir()))}")
     return directory / PAGE
+
+
+def remove_report(directory: Path) -> None:
+    """Remove the files of the report of one run; its folder stays if it contains anything else."""
+    remove_files(directory, _names([""]), PAGE)
 
 
 def _names(stems: Sequence[str]) -> set[str]:

@@ -228,6 +228,19 @@ def test_a_name_like_a_formula_is_text_in_a_spreadsheet(runs, cli):
     assert " =1+1" in list(springmass.results("out")["run"])
 
 
+def test_files_of_a_person_stay_among_the_reports(runs, cli):
+    """A changed run gets its report anew; what batch did not write stays, and an old report without such goes."""
+    assert cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "6", "--accuracy", "fast").code == 0
+    folders = sorted(path.name for path in Path("out/reports").iterdir())
+    notes = Path("out/reports", folders[0], "my-notes.md")
+    notes.write_text("the clamp was loose")
+    Path(runs, "run005.txt").unlink()
+    shutil.copy(Path(runs, "run001.txt"), Path(runs, "run002.txt"))
+    assert cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "6", "--accuracy", "fast").code == 0
+    assert notes.read_text() == "the clamp was loose"
+    assert sorted(path.name for path in Path("out/reports").iterdir()) == folders[:5]
+
+
 def test_a_report_stays_that_of_its_recording(runs, cli):
     """Two recordings have one stem; without the first, its name is that of the second, and its report is not."""
     for name in ("run001.txt", "run002.txt", "run003.txt", "run004.txt", "run005.txt"):
