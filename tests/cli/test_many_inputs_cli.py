@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Cli
+from tests.courses import contents
 
 
 @pytest.fixture
@@ -44,6 +45,23 @@ def test_several_inputs_share_one_table_and_one_report(cli: Cli, bench: Path, tm
     for run, result in zip(runs, results, strict=True):
         for name, estimate in result["estimates"].items():
             assert values[run.stem, name] == estimate["value"]
+
+
+def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(cli: Cli, bench: Path, tmp_path: Path) -> None:
+    """The folder has what it has when it is new, and the files that a person put there."""
+    undamped, damped = (bench / f"{name}_simulated_position.txt" for name in ("undamped", "damped"))
+    runs = [bench / f"{name}.txt" for name in "abc"]
+    for run in runs:
+        run.write_bytes(undamped.read_bytes())
+    options = ("--accuracy", "fast", "--figures", "svg", "--output")
+    assert cli("analyse", undamped, damped, *options, tmp_path / "out").code == 0
+    own = tmp_path / "out" / "together.results" / "my_motion.csv"
+    own.write_text("t,y\n")
+    for out in ("out", "new"):
+        assert cli("analyse", *runs, *options, tmp_path / out).code == 0
+    files = [set(contents(tmp_path / out / "together.results")) for out in ("out", "new")]
+    assert files[0] - files[1] == {own.name}
+    assert not files[1] - files[0]
 
 
 def test_a_folder_gives_its_recordings_and_names_what_is_none(cli: Cli, bench: Path) -> None:
