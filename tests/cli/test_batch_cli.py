@@ -195,6 +195,16 @@ def test_a_wrong_table_is_one_line(runs, cli, table, named):
     assert not Path("out/results.csv").exists()
 
 
+def test_patterns_of_a_table_in_a_folder_with_brackets_match(runs, cli):
+    """Brackets in the name of the table's folder are no part of its patterns."""
+    folder = Path("lab [1]")
+    shutil.copytree(runs, folder / "runs")
+    (folder / "runs.csv").write_text("path,group\nruns/run00[01].txt,7\n./runs/../runs/*5.txt,8\nrun003*,9\n")
+    done = cli("batch", folder / "runs", "--runs", folder / "runs.csv", "-o", "out", *QUICK)
+    assert done.code == 0
+    assert [row["group"] for row in rows("out")] == ["7", "7", "", "9", "", "8"]
+
+
 def test_two_passes_do_not_share_a_folder(runs, cli):
     """The second pass is refused while the first one runs; the message names the process of the first."""
     cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
