@@ -20,6 +20,7 @@ from springmass.parameters import Count, WholeNumber, argument, flag, option, ou
 from springmass.runs.options import How
 from springmass.runs.outputs import make_folder
 from springmass.terminal.printing import visible_lines
+from springmass.typeset import count
 
 
 @Parameter(name="*")
@@ -77,7 +78,7 @@ def batch(
     for line in unwritten:
         complain(line)
     failed = sum(row["status"] in FAILED for row in rows)
-    tell(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
+    tell(f"{count(len(rows), 'run')}: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
     suggest(f"open {folder / PAGE} in a browser")
     tell(f"written: {folder / PAGE}, {folder / GROUPS}, {folder / CSV}; the data are in {folder / DATABASE}")
     if failed and failed == len(rows):

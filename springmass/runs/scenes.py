@@ -24,6 +24,7 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import ProgramError, complain
 from springmass.runs.inputs import is_recording
+from springmass.typeset import count
 from storage.atomic import write_whole
 
 Amendments = Mapping[tuple[str, str], Any]
@@ -138,8 +139,8 @@ class About:
     def described(self, *, scene: bool = True) -> str:
         """Return a summary of the notes in words, with or without their scene; empty if there are none."""
         parts = ["its scene"] if scene and self.scene is not None else []
-        parts += [f"{len(self.notes)} notes"] if self.notes else []
-        parts += [f"{len(self.marks)} marks"] if self.marks else []
+        parts += [count(len(self.notes), "note")] if self.notes else []
+        parts += [count(len(self.marks), "mark")] if self.marks else []
         return ", ".join(parts)
 
 

@@ -15,6 +15,7 @@ from pipeline.results.compare import Comparison
 from springmass.runs.reported import Reported
 from springmass.runs.rows import table_rows
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
+from springmass.typeset import count
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 NAMED = 5  # maximum number of runs that a line names
@@ -80,7 +81,8 @@ def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], writte
         listed = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
         head = f"{_MARKS[first['severity']]} {code}, {len(names)} of {len(runs)} runs ({listed}): "
         lines.append(wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{written(first['message'])}", INDENT))
-    lines.append(f"{notes} notes do not affect the results; --json lists them.")
+    verb = "does" if notes == 1 else "do"
+    lines.append(f"{count(notes, 'note')} {verb} not affect the results; --json lists them.")
     return "\n".join(lines)
 
 
