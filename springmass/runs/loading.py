@@ -65,6 +65,11 @@ class Loaded:
     kept: tuple[Original, ...] | None = ()
 
     @property
+    def source(self) -> str:
+        """The path as it was given; empty for arrays, which have none."""
+        return "" if self.path == Path() else str(self.path)
+
+    @property
     def originals(self) -> tuple[Original, ...]:
         """Exact copies of the original files; those inside a run file are checked as they are read."""
         if self.kept is not None:
@@ -119,7 +124,7 @@ def load(path: str | Path, options: ReadOptions = READ, *, scene_given: bool = F
 
 def within(loaded: Loaded, options: ReadOptions) -> Loaded:
     """Return an input with its track cut to the chosen seconds, and with the stated error of its clock."""
-    track = cut(loaded.track, options.from_s, options.to_s, where=loaded.path)
+    track = cut(loaded.track, options.from_s, options.to_s, where=loaded.source or "arrays")
     if options.clock_ppm is not None:
         track = replace(track, clock_limit=options.clock_ppm * 1e-6)
     return replace(loaded, track=track)

@@ -52,6 +52,15 @@ def test_every_way_to_hand_over_arrays_gives_the_same_numbers() -> None:
         assert abs(found.value - expected["period"].value) < 1e-6 * found.value
 
 
+def test_arrays_have_no_path() -> None:
+    """The result states none, also after a dataset, and an error names the arrays."""
+    run = sm.analyse(record())
+    assert run.result["input"]["path"] == ""
+    assert sm.analyse(run.to_dataset()).result["input"]["path"] == ""
+    with pytest.raises(sm.Error, match="^arrays: "):
+        sm.analyse(record(), from_s=1e6)
+
+
 @pytest.mark.parametrize("source", [3.0, None, {"t": [0.0]}, np.zeros(5), ([0.0, 1.0],), pd.DataFrame({"x": [1.0]})])
 def test_what_holds_no_run_is_refused(source: Any) -> None:
     """Whatever it is, the error is the track's own."""
