@@ -75,6 +75,7 @@ def scene(
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from pipeline.bench.scene import Scene
+    from springmass.runs.questions import quoted
     from springmass.runs.scenes import about_of, ask_about, read_scene, stated_keys, write_about
 
     noted = scene is not None or note or mark
@@ -96,7 +97,10 @@ def scene(
         suggest("springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
-        raise ProgramError(f"{recording}: nothing to save; give --scene, --note or --mark S=TEXT")
+        demand = "nothing to save; give --scene, --note or --mark S=TEXT"
+        raise ProgramError(
+            f"{recording}: {demand}, or check a scene: springmass scene --check {quoted(str(recording))}"
+        )
     path = Path(recording)
     if not path.is_file():
         raise ProgramError(f"{path}: expected a recording, got none; check the name")

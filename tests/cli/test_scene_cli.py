@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -55,6 +56,16 @@ def test_a_check_asks_about_values_and_refuses_what_cannot_be(cli: Cli, tmp_path
     assert "mass_kg" in cli("scene", "--check", path).err
     path.write_text("[bob]\nmass_g = 217.6\n")
     assert cli("scene", "--check", path).code == 2
+
+
+def test_a_scene_given_as_a_recording_gets_the_command_that_checks_it(cli: Cli, tmp_path: Path) -> None:
+    """The line ends in a command that works."""
+    path = tmp_path / "my bench.toml"
+    path.write_text("[bob]\nmass_kg = 0.2\n")
+    done = cli("scene", path)
+    assert done.code == 2
+    _, command = done.complaint.split("springmass scene ")
+    assert cli("scene", *shlex.split(command)).code == 0
 
 
 def test_values_of_the_bench_on_the_command_line_stand_for_a_scene(cli: Cli, run: Path, data: Path) -> None:
