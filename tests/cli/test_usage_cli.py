@@ -27,8 +27,8 @@ def test_every_command_explains_itself(cli: Cli, monkeypatch: pytest.MonkeyPatch
 
 def test_an_unknown_command_names_all_commands(cli: Cli) -> None:
     """One line, with the near one first."""
-    done = cli("anaylse", "run.txt")
-    named = re.findall(r"[a-z]+", done.complaint.partition("anaylse")[2])
+    done = cli("analyze", "run.txt")
+    named = re.findall(r"[a-z]+", done.complaint.partition("analyze")[2])
     assert done.code == 2
     assert set(COMMANDS) <= set(named)
     assert next(word for word in named if word in COMMANDS) == "analyse"
