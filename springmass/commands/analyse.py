@@ -101,7 +101,8 @@ def analyse(
         print(json.dumps(run.result, allow_nan=False), flush=True)
     else:
         _print_text(run, options)
-    written = OK if out is None else _write(out / results_name(run.loaded.path, run.how.channel), [run], options)
+    name = results_name(run.loaded.path, run=how.run, channel=how.channel)
+    written = OK if out is None else _write(out / name, [run], options)
     return max(_judged(run, options), written)
 
 

@@ -81,7 +81,11 @@ class RunActions:
         command += option_words(self._options)
         try:
             done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, errors="replace")
-            page = run.parent / results_name(run, self._options.get("channel")) / "report.html"
+            page = (
+                run.parent
+                / results_name(run, run=self._options.get("run"), channel=self._options.get("channel"))
+                / "report.html"
+            )
             if done.returncode == 0 and page.is_file():
                 self.report = page
             else:

@@ -33,14 +33,15 @@ def safe_name(text: str, mark: str = "_", *, longest: int = 60) -> str:
     return safe.encode()[:longest].decode(errors="ignore")
 
 
-def results_name(path: Path, channel: str | None = None) -> str:
+def results_name(path: Path, *, run: str | None = None, channel: str | None = None) -> str:
     """Return the name of the folder for the report of a recording.
 
-    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the channel that was chosen
-    follows, because each has its own results.
+    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the run and the channel that
+    were chosen follow, because each has its own results.
     """
     name = "stdin" if str(path) == STDIN else path.name if kind_of(path) == "recording" else path.stem
-    return in_a_name(name if channel is None else f"{name}.{_distinct(channel)}", ".results")
+    chosen = [_distinct(part) for part in (run, channel) if part is not None]
+    return in_a_name(".".join((name, *chosen)), ".results")
 
 
 def _distinct(text: str) -> str:
