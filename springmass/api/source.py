@@ -87,6 +87,11 @@ def source(
     **how
         Options of reading a recording, as for :func:`springmass.load`.
 
+    Raises
+    ------
+    springmass.Error
+        If there is no such file or port, or an argument would have no effect on this source.
+
     Examples
     --------
     >>> from springmass import Stream, sample_data

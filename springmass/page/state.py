@@ -75,17 +75,12 @@ class RunActions:
             threading.Thread(target=self._analyse, name="springmass-page-report", daemon=True).start()
 
     def _analyse(self) -> None:
-        # A name that begins with a minus sign must not be taken for an option.
-        run = self._run.absolute()
-        command = [sys.executable, "-m", "springmass", "-q", "analyse", str(run), "-o", str(run.parent)]
-        command += option_words(self._options)
+        run, chosen = self._run, {name: self._options.get(name) for name in ("run", "channel")}
+        command = [sys.executable, "-m", "springmass", "-q", "analyse", f"--output={run.parent}"]
+        command += [*option_words(self._options), "--", str(run)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, errors="replace")
-            page = (
-                run.parent
-                / results_name(run, run=self._options.get("run"), channel=self._options.get("channel"))
-                / "report.html"
-            )
+            page = run.parent / results_name(run, **chosen) / "report.html"
             if done.returncode == 0 and page.is_file():
                 self.report = page
             else:
