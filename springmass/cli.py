@@ -62,13 +62,21 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 def _call(words: Sequence[str]) -> int:
     """Call a command; answer command-line errors and a reader's questions, because both need the command line."""
-    from cyclopts import CycloptsError
+    from cyclopts import CycloptsError, UnknownCommandError
 
-    from springmass.commands import call
+    from springmass.commands import COMMANDS, call
 
     try:
         with STOPS.raising(True):
             return call(words)
+    except UnknownCommandError as error:
+        from difflib import get_close_matches
+
+        # The library's own message ends its list after eight commands.
+        word = (error.unused_tokens or words)[0]
+        near = "".join(f"did you mean {name}? " for name in get_close_matches(word, COMMANDS, n=1))
+        errors.LOG.warning(f"unknown command {word!r}; {near}the commands are {', '.join(COMMANDS)}")
+        return errors.USAGE
     except CycloptsError as error:
         what = " ".join(str(error).split()).rstrip(".")
         called = " ".join(("springmass", *(error.command_chain or ())))

@@ -16,6 +16,15 @@ _POWER = re.compile(r"\^(?:\(([\dn-]+)\)|([\dn-]+))")
 NOTHING = "-"
 
 
+def count(number: int, noun: str) -> str:
+    """Return a number of things with its noun.
+
+    >>> count(1, "recording"), count(2, "other file")
+    ('1 recording', '2 other files')
+    """
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def cell(text: str) -> str:
     """Return a text of foreign origin as a safe cell of a CSV file.
 

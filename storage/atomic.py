@@ -201,10 +201,24 @@ def whole_folder(path: str | os.PathLike[str], names: Collection[str], last: str
             os.close(lock)
 
 
+def remove_files(path: str | os.PathLike[str], names: Collection[str], last: str) -> None:
+    """Remove the files of a build, ``last`` first, and then the folders that are empty; other files stay."""
+    target = Path(path).resolve()
+    with writing(path):
+        _unlink(target, names, last)
+        for folder in sorted({target, *((target / name).parent for name in names)}, reverse=True):
+            if folder.is_dir() and not any(folder.iterdir()):
+                folder.rmdir()
+
+
+def _unlink(target: Path, names: Collection[str], last: str) -> None:
+    for name in (last, *sorted(names)):
+        (target / name).unlink(missing_ok=True)
+
+
 def _move(part: Path, target: Path, names: Collection[str], last: str) -> None:
     new = sorted(each.relative_to(part).as_posix() for each in part.rglob("*") if not each.is_dir())
-    for name in (last, *sorted(set(names) - {*new})):
-        (target / name).unlink(missing_ok=True)
+    _unlink(target, set(names) - {*new}, last)
     for name in sorted(new, key=lambda name: name == last):
         (target / name).parent.mkdir(parents=True, exist_ok=True)
         os.replace(part / name, target / name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import count
@@ -88,6 +89,11 @@ def source(
     **how
         Options of reading a recording, as for :func:`springmass.load`.
 
+    Raises
+    ------
+    springmass.Error
+        If there is no such file or port, or an argument would have no effect on this source.
+
     Examples
     --------
     >>> from springmass import Stream, sample_data
@@ -98,20 +104,31 @@ def source(
     >>> stream.finish()["T"]
     0.758516(22) s
     """
+    read = ReadOptions.of(how)
+    of_port = {"sensor": sensor, "baud": baud}
     if isinstance(what, Scene | Mapping):
+        _refuse("a simulated bench", {"scene": scene, **of_port, **how})
         return _bench(what if isinstance(what, Scene) else Scene.from_mapping(what), speed)
     if os.path.isfile(what):
+        _refuse(os.fspath(what), of_port)
         given_scene = scene_from(scene)
-        loaded = load(Path(what), ReadOptions.of(how))
+        loaded = load(Path(what), read)
         loaded = loaded if given_scene is None else replace(loaded, scene=given_scene.to_mapping())
         pace = speed if math.isfinite(speed) else None
         replay = Replay(loaded.samples_in_blocks(), _clock(speed), info=loaded.info, speed=pace)
         return _Played(replace(loaded, info=replay.info), replay)
     address = os.fspath(what)
-    if not (address.startswith("/dev/") or "://" in address or address.upper().startswith("COM")):
+    if not re.fullmatch(r"/dev/.*|.*://.*|COM\d+", address, re.IGNORECASE | re.DOTALL):
         ports = 'a port is named like "/dev/ttyUSB0", "COM3" or "socket://HOST:PORT"'
         raise ProgramError(f"{address}: there is no such file; check the name, {ports}", UNREADABLE)
+    _refuse(address, how if speed == 1.0 else {"speed": speed, **how})
     return _Live(address, sensor, baud, scene_from(scene))
+
+
+def _refuse(what: str, given: Mapping[str, Any]) -> None:
+    """Refuse options that would have no effect on a source."""
+    if unused := [name for name, value in given.items() if value is not None]:
+        raise ProgramError(f"{what}: {', '.join(unused)} would have no effect on this source; leave that out")
 
 
 def _clock(speed: float) -> Clock:

@@ -65,7 +65,8 @@ def simulate(
     if spacing_s <= 0.0 or not np.allclose(times, spacing_s * np.arange(times.size), rtol=1e-9, atol=1e-9 * spacing_s):
         raise DynamicsError("simulate takes equally spaced times from 0 on; give np.arange(0, SECONDS, STEP)")
     given_scene, seconds = scene_from(scene), float(times[-1])
-    assert given_scene is not None
+    if given_scene is None:
+        raise DynamicsError("simulate takes a scene, got None; give a Scene, its tables or the path of its file")
     ready = prepare(given_scene, seconds)
     band, _ = band_of(ready, seconds)
     integrator: str | Integrator = method if isinstance(method, str) else _own(method)

@@ -46,8 +46,8 @@ class Stream:
 
     def __init__(self, scene: AnyScene | None = None, *, accuracy: Any = "fast", law: str | None = None) -> None:
         self._scene, self._how = scene_from(scene), AnalysisOptions(accuracy=accuracy, law=law)
-        self._t: list[Any] = []
-        self._y: list[Any] = []
+        self._t: list[Any] = [np.empty(0)]
+        self._y: list[Any] = [np.empty(0)]
         self._count, self._due = 0, FEWEST
         self._run: Run | None = None
 

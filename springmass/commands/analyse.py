@@ -32,7 +32,7 @@ from springmass.errors import HINT, LOG, OK, REJECTED, SOME_FAILED, UNREADABLE, 
 from springmass.layout import STDIN
 from springmass.loading.inputs import files_of
 from springmass.loading.scenes import read_scenes
-from springmass.result.output_names import distinct_names, in_a_name, make_folder, safe_name
+from springmass.result.output_names import distinct_names, make_folder, results_name
 from springmass.result.run_json import rejected
 from springmass.runs.run import Run
 from springmass.runs.tasks import Failed, Task, analyse_all, law_lines
@@ -103,20 +103,9 @@ def analyse(
         print(json.dumps(run.result, allow_nan=False), flush=True)
     else:
         _print_text(run, options)
-    written = OK if out is None else _write(out / _results_name(run), [run], options)
+    name = results_name(run.loaded.path, run=how.run, channel=how.channel)
+    written = OK if out is None else _write(out / name, [run], options)
     return max(_judged(run, options), written)
-
-
-def _results_name(run: Run) -> str:
-    """Return the name of the folder for a run's report.
-
-    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the channel that was chosen
-    follows, because each has its own results.
-    """
-    path, channel = run.loaded.path, run.how.channel
-    name = "stdin" if str(path) == STDIN else path.stem if run.loaded.format in ("run", "wire") else path.name
-    safe = "" if channel is None else safe_name(channel)
-    return in_a_name(f"{name}.{safe}" if safe else name, ".results")
 
 
 def _several(tasks: Sequence[Task], inputs: Sequence[str], options: AnalyseOptions, out: Path | None) -> int:

@@ -20,6 +20,7 @@ from springmass.course.store import DATABASE, opened
 from springmass.errors import HINT, LOG, OK, SOME_FAILED, UNREADABLE, ProgramError
 from springmass.result.output_names import make_folder
 from springmass.terminal.printing import visible_lines
+from springmass.typeset import count
 
 
 @Parameter(name="*")
@@ -79,7 +80,7 @@ def batch(
     for line in unwritten:
         LOG.warning(line)
     failed = sum(row["status"] in FAILED for row in rows)
-    LOG.info(f"{len(rows)} runs: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
+    LOG.info(f"{count(len(rows), 'run')}: {len(rows) - made} unchanged, {made} analysed, {failed} failed")
     LOG.log(HINT, f"open {folder / COURSE_PAGE} in a browser")
     LOG.info(
         f"written: {folder / COURSE_PAGE}, {folder / GROUPS_FILE}, {folder / CSV}; the data are in {folder / DATABASE}"

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 from springmass.commands.options import PART, PageOptions, ReadArguments, RecordingArgument, refuse
 from springmass.commands.parameters import flag
+from springmass.commands.questions import option_words
 from springmass.errors import LOG, OK, ProgramError
 from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
@@ -39,6 +40,7 @@ def page(
     state = PageState(
         wanted_u_s,
         _to_recorder if recorder else None,
+        words_of=option_words,
         name=path.with_suffix(".h5").name if recorder else "",
         law=page.law,
     )
@@ -48,7 +50,7 @@ def page(
         state.follow(path)
     else:
         loaded = load(path, read)
-        state.show(view_of(loaded), loaded.scene, loaded.path)
+        state.show(view_of(loaded), loaded.scene, loaded.path, read.given())
 
     def opened(address: str, share: str) -> None:
         lines = [f"page: {address}"]

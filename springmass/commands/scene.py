@@ -77,6 +77,7 @@ def scene(
 ) -> int:
     """Print the template, check a scene, or note scene, remarks and marks beside a recording."""
     from pipeline.bench.scene import Scene
+    from springmass.commands.questions import quoted
     from springmass.loading.notes import about_of, write_about
     from springmass.loading.scenes import ask_about, read_scene, stated_keys
 
@@ -99,7 +100,10 @@ def scene(
         LOG.log(HINT, "springmass scene > bench.toml, fill it in, springmass scene --check bench.toml")
         return OK
     if not noted:
-        raise ProgramError(f"{recording}: nothing to save; give --scene, --note or --mark S=TEXT")
+        demand = "nothing to save; give --scene, --note or --mark S=TEXT"
+        raise ProgramError(
+            f"{recording}: {demand}, or check a scene: springmass scene --check {quoted(str(recording))}"
+        )
     path = Path(recording)
     if not path.is_file():
         raise ProgramError(f"{path}: expected a recording, got none; check the name")

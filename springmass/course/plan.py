@@ -220,8 +220,17 @@ class RunsTable:
         return any(mark in text for mark in "*?[") and not os.path.exists(self.whole(text))
 
     def whole(self, text: str) -> str:
-        """Return the absolute path or pattern of a row."""
+        """Return the absolute path of a row."""
         return os.path.abspath(os.path.join(self.path.parent, text))
+
+    def pattern(self, text: str) -> str:
+        """Return the pattern that a row means: a name without a slash, or else a whole path.
+
+        Signs of a pattern in the name of the table's own folder stand for themselves.
+        """
+        if "/" not in text:
+            return text
+        return os.path.normpath(os.path.join(glob.escape(os.path.abspath(self.path.parent)), text))
 
 
 def template(paths: Sequence[str]) -> str:
@@ -289,7 +298,7 @@ def join(table: RunsTable, files: Sequence[InputFile]) -> tuple[list[tuple[Input
     patterns: list[tuple[int, str, Values]] = []
     for line, text, values in table.rows:
         if table.is_pattern(text):
-            patterns.append((line, text if "/" not in text else table.whole(text), values))
+            patterns.append((line, table.pattern(text), values))
         else:
             exact.setdefault(table.whole(text), []).append((line, values))
     used: set[int] = set()

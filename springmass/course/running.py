@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import heapq
-import re
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,9 +18,10 @@ from springmass.course.store import Store
 from springmass.course.worker import Remedy, analyse_one, blank_row, write_report_of
 from springmass.errors import LOG, ProgramError
 from springmass.report.html import SHARED, report_script
+from springmass.result.output_names import safe_name
 from springmass.runs.tasks import Task
 from springmass.terminal.progress import counting
-from storage.atomic import write_whole, writing
+from storage.atomic import write_whole
 
 ROWS_RATIO = 1.1  # results.csv is written again when there are so many times as many rows, so that it takes little time
 REPORTS = "reports"
@@ -41,9 +40,11 @@ def run_course(
     now = {key_of(task): made_of(task) for task in course.tasks}
     stored = store.made_of()
     todo = [task for task in course.tasks if stored.get(key_of(task)) != now[key_of(task)]]
-    for page in (folder / REPORTS).glob("*.results/report.html") if todo else ():
-        with writing(page.parent):  # it may show a run that has changed; an interrupted pass leaves none of these
-            shutil.rmtree(page.parent)
+    if todo:
+        from springmass.report.write import remove_report
+
+        for page in (folder / REPORTS).glob("*.results/report.html"):
+            remove_report(page.parent)  # it may show a run that has changed; an interrupted pass leaves none of these
     done = now.keys() - set(map(key_of, todo))
     made, written = 0, len(done)
     with counting("runs", len(todo), lines=True) as show:
@@ -121,5 +122,5 @@ def _write_pages(
 
 def _report_of(line: Mapping[str, Any], task: Task) -> str:
     """Return the path of a run's report in the folder; names are numbered anew if a run is removed, keys are not."""
-    safe = re.sub(r"[^A-Za-z0-9.+_-]+", "_", line["name"]).strip("._")[:100]
+    safe = safe_name(line["name"], longest=100)
     return f"{REPORTS}/{safe}-{hashlib.sha256(key_of(task).encode()).hexdigest()[:8]}.results/report.html"

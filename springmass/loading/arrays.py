@@ -93,7 +93,7 @@ def about_json(loaded: Loaded, scene: Mapping[str, Any]) -> str:
     about = {name: getattr(loaded, name) for name in names}
     info = {name: getattr(loaded.info, name) for name in SourceInfo.__slots__}
     traps = [{name: getattr(trap, name) for name in FormatIssue.__slots__} for trap in loaded.traps]
-    return json.dumps({**about, "path": str(loaded.path), "info": info, "traps": traps, "scene": dict(scene)})
+    return json.dumps({**about, "path": loaded.source, "info": info, "traps": traps, "scene": dict(scene)})
 
 
 class _ArrayColumn(NamedTuple):

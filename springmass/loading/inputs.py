@@ -12,6 +12,7 @@ from acquisition.errors import AcquisitionError, UnknownFormat
 from acquisition.recordings.identify import sniff
 from acquisition.regular_file import open_regular
 from springmass.errors import UNREADABLE, ProgramError
+from springmass.typeset import count
 from storage.run_file.layout import HDF5_MAGIC
 from storage.wire_log.records import WIRE_MAGIC
 
@@ -49,8 +50,8 @@ def files_of(
             others += [str((folder / name).relative_to(text)) for name in not_in_it]
         if not taken:
             raise ProgramError(f"{text}: expected a folder with recordings, got none{_named(others)}", UNREADABLE)
-        files = "file" if len(others) == 1 else "files"
-        messages.append(f"{text}: {len(taken)} recordings; {len(others)} other {files}{_named(others)}")
+        numbers = f"{count(len(taken), 'recording')}; {count(len(others), 'other file')}"
+        messages.append(f"{text}: {numbers}{_named(others)}")
         named += taken
     return named, messages
 

@@ -44,6 +44,11 @@ class Loaded:
     kept: tuple[Original, ...] | None = ()
 
     @property
+    def source(self) -> str:
+        """The path as it was given; empty for arrays, which have none."""
+        return "" if self.path == Path() else str(self.path)
+
+    @property
     def originals(self) -> tuple[Original, ...]:
         """Exact copies of the original files; those inside a run file are checked as they are read."""
         if self.kept is not None:

@@ -19,7 +19,8 @@ from pipeline.bench.scene import Scene
 from pipeline.errors import SceneError
 from springmass.errors import ProgramError
 from springmass.loading.inputs import is_recording
-from springmass.loading.scenes import read_tables
+from springmass.loading.scenes import LONGEST_SCENE, read_tables
+from springmass.typeset import count
 from storage.atomic import write_whole
 
 STEM_SUFFIXES = (".h5", ".hdf5", ".nxs", ".wire")
@@ -43,8 +44,8 @@ class About:
     def described(self, *, scene: bool = True) -> str:
         """Return a summary of the notes in words, with or without their scene; empty if there are none."""
         parts = ["its scene"] if scene and self.scene is not None else []
-        parts += [f"{len(self.notes)} notes"] if self.notes else []
-        parts += [f"{len(self.marks)} marks"] if self.marks else []
+        parts += [count(len(self.notes), "note")] if self.notes else []
+        parts += [count(len(self.marks), "mark")] if self.marks else []
         return ", ".join(parts)
 
 
@@ -86,10 +87,20 @@ def about_of(recording: Path) -> About:
 
 
 def write_about(about: About) -> Path:
-    """Write the notes atomically, replacing any earlier file, and return their path."""
+    """Write the notes atomically, replacing any earlier file, and return their path.
+
+    Notes that :func:`about_of` would refuse are not written, because they would lock their recording out.
+    """
     tables: dict[str, Any] = {"notes": list(about.notes)} if about.notes else {}
     if about.scene is not None and (scene := about.scene.to_mapping()):
         tables["scene"] = scene
     if about.marks:
         tables["marks"] = [{"t_s": t_s, "text": text} for t_s, text in about.marks]
-    return write_whole(about.path, tomli_w.dumps(tables), overwrite=True)
+    try:
+        content = tomli_w.dumps(tables).encode()
+    except UnicodeEncodeError as error:
+        raise ProgramError(f"{about.path}: a note is not text in UTF-8; write it in other letters") from error
+    if len(content) > LONGEST_SCENE:
+        demand = f"all notes together take at most {LONGEST_SCENE} bytes, got {len(content)}"
+        raise ProgramError(f"{about.path}: {demand}; shorten the new note, or keep long notes in a file of your own")
+    return write_whole(about.path, content, overwrite=True)

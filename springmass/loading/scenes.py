@@ -18,7 +18,12 @@ from springmass.errors import LOG, ProgramError
 
 Amendments = Mapping[tuple[str, str], Any]
 """Mapping of a scene's (table, key) to a value as a scene file states it."""
-LONGEST_SCENE = 1 << 14  # maximum size of a scene file in bytes; some longer files take seconds to parse
+LONGEST_SCENE = 1 << 14
+"""Maximum size of a file of a scene or of notes in bytes, for reading and for writing.
+
+The time and the memory that Python's parser of TOML takes grow with the square of the longest dotted key: one key of
+this size takes 3 s, one four times as long takes a minute and gigabytes.
+"""
 
 
 def read_scenes(paths: Sequence[str | Path], count: int) -> list[Scene | None]:

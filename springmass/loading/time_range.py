@@ -15,7 +15,7 @@ from springmass.loading.options import ReadOptions
 
 def within(loaded: Loaded, options: ReadOptions) -> Loaded:
     """Return an input with its track cut to the chosen seconds, and with the stated error of its clock."""
-    track = cut(loaded.track, options.from_s, options.to_s, where=loaded.path)
+    track = cut(loaded.track, options.from_s, options.to_s, where=loaded.source or "arrays")
     if options.clock_ppm is not None:
         track = replace(track, clock_limit=options.clock_ppm * 1e-6)
     return replace(loaded, track=track)

@@ -6,14 +6,15 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from springmass.loading.notes import about_of, write_about
+from springmass.loading.notes import about_of, about_path, write_about
 from springmass.page.feeds import LogFeed
 from springmass.page.live_analysis import Watcher
 from springmass.page.view import View
+from springmass.result.output_names import results_name
 from springmass.session.live_state import free_bytes
 
 ASIDE = "discarded"
@@ -24,11 +25,12 @@ class RunActions:
     """Works on one run; its path comes from the recorder or the command line, never from the network.
 
     ``ours`` is whether the run was recorded just now; no other run can be discarded. ``report`` is the path of the
-    report; None until it is made.
+    report; None until it is made. ``words`` are the options of ``springmass analyse`` with which it is made, and
+    ``chosen`` has the run and the channel among them.
     """
 
-    def __init__(self, run: Path, *, ours: bool, law: str | None = None) -> None:
-        self._run, self.ours, self._law = run, ours, law
+    def __init__(self, run: Path, *, ours: bool, words: Sequence[str], chosen: Mapping[str, str] | None = None) -> None:
+        self._run, self.ours, self._words, self._chosen = run, ours, words, chosen or {}
         self.report: Path | None = None
         self._making = False
         self._notes: list[str] = []
@@ -61,7 +63,7 @@ class RunActions:
             notes, aside = about_of(self._run).path, folder / name
             self._run.rename(aside)
             if notes.exists():
-                notes.rename(folder / f"{aside.stem}.about.toml")
+                notes.rename(about_path(aside))
             self._run, self.discarded = aside, f"{ASIDE}/{name}"
         except OSError as error:
             self._failed = f"not set aside ({error.strerror or error})"
@@ -73,11 +75,12 @@ class RunActions:
             threading.Thread(target=self._analyse, name="springmass-page-report", daemon=True).start()
 
     def _analyse(self) -> None:
-        command = [sys.executable, "-m", "springmass", "-q", "analyse", str(self._run), "-o", str(self._run.parent)]
-        command += [] if self._law is None else ["--law", self._law]
+        run = self._run
+        command = [sys.executable, "-m", "springmass", "-q", "analyse", f"--output={run.parent}"]
+        command += [*self._words, "--", str(run)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, errors="replace")
-            page = self._run.parent / f"{self._run.stem}.results" / "report.html"
+            page = run.parent / results_name(run, **self._chosen) / "report.html"
             if done.returncode == 0 and page.is_file():
                 self.report = page
             else:
@@ -112,7 +115,8 @@ class PageState:
     """Holds the view, its watcher, and ``bench``: the recorder's phase and the facts of this phase.
 
     ``controls`` passes requests to the recorder, if there is one; ``name`` is that of the run that will be recorded.
-    ``closed`` is whether somebody closed the page. None wants u(T) to reach 40 ppm of the period.
+    ``words_of`` words options of reading and analysing for a command line. ``closed`` is whether somebody closed the
+    page. None wants u(T) to reach 40 ppm of the period.
     """
 
     def __init__(
@@ -120,10 +124,12 @@ class PageState:
         wanted_u_s: float | None,
         controls: Callable[[Mapping[str, Any]], None] | None = None,
         *,
+        words_of: Callable[[Mapping[str, object]], list[str]],
         name: str = "",
         law: str | None = None,
     ) -> None:
         self._wanted_u_s, self.controls, self._name, self._law = wanted_u_s, controls, name, law
+        self._words_of = words_of
         self.closed = False
         self.view: View | None = None
         self.watcher: Watcher | None = None
@@ -134,11 +140,12 @@ class PageState:
         self._folder: Path | None = None
         self.recorder_states: queue.SimpleQueue[Mapping[str, Any]] = queue.SimpleQueue()
 
-    def show(self, view: View, scene: Mapping[str, Any] | None, path: Path) -> None:
-        """Show a complete run."""
+    def show(self, view: View, scene: Mapping[str, Any] | None, path: Path, read: Mapping[str, Any]) -> None:
+        """Show a complete run, which was read with these options."""
         self._folder = path.parent
         self._lay(view, scene)
-        self.after = RunActions(path, ours=False, law=self._law)
+        chosen = {name: str(read[name]) for name in ("run", "channel") if name in read}
+        self.after = RunActions(path, ours=False, words=self._words_of({**read, "law": self._law}), chosen=chosen)
 
     def follow(self, log: Path) -> None:
         """Show a growing log; raises NotALog if the file is not a wire log."""
@@ -211,7 +218,7 @@ class PageState:
             except Exception as error:  # the recording goes on, even if the page cannot show it
                 self.bench["said"] = f"it cannot be shown ({error})"
         if message["phase"] == "built":
-            self.after = RunActions(Path(message["run"]), ours=True, law=self._law)
+            self.after = RunActions(Path(message["run"]), ours=True, words=self._words_of({"law": self._law}))
             if self.watcher is not None:
                 self.watcher.complete(Path(message["run"]))
 

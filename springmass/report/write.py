@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from acquisition.regular_file import open_regular_text
 from springmass.charts.chart import Chart
 from springmass.charts.draw import PictureFormat, save
 from springmass.charts.run import CHARTS, charts_of
@@ -24,11 +26,12 @@ from springmass.result.output_names import safe_name
 from springmass.result.run_json import plain
 from springmass.result.table1 import results_csv
 from springmass.runs.run import Run
-from storage.atomic import whole_folder, write_whole
+from storage.atomic import remove_files, whole_folder, write_whole
 
 REPORT_PAGE = "report.html"
 LAB_REPORT = "lab-report.tex"
-TABLES = ("results.json", "results.csv", "table.tex", "budget.csv", "budget.tex")
+RUN_TABLE = "results.csv"
+TABLES = ("results.json", RUN_TABLE, "table.tex", "budget.csv", "budget.tex")
 OF_LAB_REPORT = ("position", "amplitude", "frequency")
 
 
@@ -69,7 +72,7 @@ def write_report(
             several["masses"] = masses(compared.line)
         if compared.hooke is not None:
             several["hooke"] = static(compared.hooke)
-    with whole_folder(directory, _names(stems), REPORT_PAGE) as folder:
+    with whole_folder(directory, _names([*stems, *_earlier_stems(directory)]), REPORT_PAGE) as folder:
         pictures: dict[str, bytes] = {}
         if kinds:
             (folder / "figures").mkdir()
@@ -112,6 +115,11 @@ def write_report(
     return directory / REPORT_PAGE
 
 
+def remove_report(directory: Path) -> None:
+    """Remove the files of a report; its folder stays if it contains anything else."""
+    remove_files(directory, _names(_earlier_stems(directory)), REPORT_PAGE)
+
+
 def _names(stems: Sequence[str]) -> set[str]:
     """Return the names of all files that a report of these runs may contain, or one of 0.2.0."""
     charts = [f"{stem}{name}" for stem in stems for name in (*CHARTS, "classic", "logarithmic")]
@@ -124,10 +132,22 @@ def _names(stems: Sequence[str]) -> set[str]:
     return {REPORT_PAGE, LAB_REPORT, *TABLES, *figures, *tables}
 
 
+def _earlier_stems(directory: Path) -> list[str]:
+    """Return the prefixes that files of an earlier report in the folder may have, by the runs that its table names."""
+    try:
+        with open_regular_text(directory / RUN_TABLE, "utf-8", newline="") as file:
+            names = dict.fromkeys(row["run"] or "" for row in csv.DictReader(file))
+    except (OSError, ValueError, KeyError, csv.Error):
+        names = {}  # no earlier report, or a table of something else: nothing says which other files would be ours
+    return ["", *_prefixes(list(names))]
+
+
 def _stems(names: Sequence[str]) -> list[str]:
     """Return the prefix of each run's figures: empty for a single run, else a safe name."""
-    if len(names) == 1:
-        return [""]
+    return [""] if len(names) == 1 else _prefixes(names)
+
+
+def _prefixes(names: Sequence[str]) -> list[str]:
     stems: list[str] = []
     for i, name in enumerate(names, 1):
         safe = safe_name(name) or f"run{i}"

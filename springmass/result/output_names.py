@@ -9,13 +9,41 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from springmass.errors import ProgramError
+from springmass.layout import STDIN
+from springmass.loading.inputs import kind_of
 
 LONGEST_NAME = 255
 
 
-def safe_name(text: str) -> str:
-    """Return a text as a part of a file's name: at most 60 letters, digits and signs; empty if it has none."""
-    return re.sub(r"[^A-Za-z0-9.+-]+", "_", text).strip("._")[:60]
+def safe_name(text: str, mark: str = "_", *, longest: int = 60) -> str:
+    """Return a text as a part of a file's name, with ``mark`` for all but letters and digits of any script, ``+-.``.
+
+    It takes at most ``longest`` bytes, and is empty if nothing of the text is left.
+
+    >>> safe_name("Gyroscope x (rad/s)"), safe_name("位置/m"), safe_name("???")
+    ('Gyroscope_x_rad_s', '位置_m', '')
+    """
+    safe = re.sub(r"(?:[^\w.+-]|_)+", mark, text).strip(f"{mark}.")
+    return safe.encode()[:longest].decode(errors="ignore")
+
+
+def results_name(path: Path, *, run: str | None = None, channel: str | None = None) -> str:
+    """Return the name of the folder for the report of a recording.
+
+    A text keeps its whole name, because ``bob.txt`` and ``bob.csv`` are two recordings; the run and the channel that
+    were chosen follow, because each has its own results.
+    """
+    name = "stdin" if str(path) == STDIN else path.name if kind_of(path) == "recording" else path.stem
+    chosen = [_distinct(part) for part in (run, channel) if part is not None]
+    return in_a_name(".".join((name, *chosen)), ".results")
+
+
+def _distinct(text: str) -> str:
+    """Return a safe name that other texts do not share: with a digest if more than spaces was replaced or cut."""
+    safe = safe_name(text)
+    if safe == text.replace(" ", "_"):
+        return safe
+    return f"{safe}-{hashlib.sha256(text.encode(errors='backslashreplace')).hexdigest()[:8]}".lstrip("-")
 
 
 def distinct_names(paths: Sequence[str]) -> list[str]:

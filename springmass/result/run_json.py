@@ -68,7 +68,7 @@ def input_of(loaded: Loaded) -> dict[str, Any]:
     """Return the ``input`` object: what was analysed."""
     track = loaded.track
     return {
-        "path": str(loaded.path),
+        "path": loaded.source,
         "format": loaded.format,
         "sha256": loaded.sha256,
         "kind": loaded.info.kind,

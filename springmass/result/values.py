@@ -116,6 +116,12 @@ class Value(UFloat):  # type: ignore[misc]
         exact = self.u <= EXPONENT_ROUNDING * abs(self.value)
         return write(self.value, 0.0 if exact else self.u, self.unit or "")
 
+    def __copy__(self) -> Value:
+        return self
+
+    def __deepcopy__(self, _: Any) -> Value:
+        return self  # nothing of a value changes, and a copy of its variables would be independent of them
+
     def __abs__(self) -> Value:
         return self if self.value >= 0.0 else -self
 

@@ -100,7 +100,8 @@ class Run(Mapping[str, Value]):
     @cached_property
     def scene(self) -> Scene:
         """The scene: the one that was given, or else the one that the recording carries."""
-        return self.stated or Scene.from_mapping(self.loaded.scene or {}, where=f"{self.loaded.path} (its scene)")
+        where = f"{self.loaded.source or 'arrays'} (its scene)"
+        return self.stated or Scene.from_mapping(self.loaded.scene or {}, where=where)
 
     @cached_property
     def analysis(self) -> Analysis:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import glob
 import itertools
 import os
-import re
 from datetime import datetime
 from pathlib import Path
 
 from springmass.errors import ProgramError
+from springmass.result.output_names import safe_name
 from storage.recovery.recover import run_paths
 
 
@@ -19,7 +19,7 @@ def default_name(what: str, now: datetime) -> Path:
     >>> str(default_name("undamped", datetime(2026, 11, 22, 14, 5)))
     '2026-11-22_1405_undamped.h5'
     """
-    stem = f"{now:%Y-%m-%d_%H%M}_{re.sub(r'[^A-Za-z0-9.+-]+', '-', what).strip('-.')[:60] or 'run'}"
+    stem = f"{now:%Y-%m-%d_%H%M}_{safe_name(what, '-') or 'run'}"
     taken = {path.name.removeprefix(stem).split(".")[0] for path in Path().glob(f"{stem}*")}
     number = next(text for text in itertools.chain([""], (f"-{n}" for n in itertools.count(2))) if text not in taken)
     return Path(f"{stem}{number}.h5")

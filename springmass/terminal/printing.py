@@ -15,6 +15,7 @@ from pipeline.results.compare import Comparison
 from springmass.comparing.reported import Reported
 from springmass.result.table1 import table_rows
 from springmass.terminal.style import PLAIN, TerminalStyle, concise, shown
+from springmass.typeset import count
 
 _MARKS = {"error": "ERROR  ", "warning": "warning", "info": "note   "}
 RUNS_NAMED = 5  # maximum number of runs that a line names
@@ -84,7 +85,8 @@ def shared_findings_text(runs: Mapping[str, Sequence[Mapping[str, Any]]], writte
         lines.append(
             wrapped(f"{head}{'' if len(names) == 1 else 'the first: '}{written(first['message'])}", FINDING_INDENT)
         )
-    lines.append(f"{notes} notes do not affect the results; --json lists them.")
+    verb = "does" if notes == 1 else "do"
+    lines.append(f"{count(notes, 'note')} {verb} not affect the results; --json lists them.")
     return "\n".join(lines)
 
 

@@ -183,7 +183,7 @@ def _header(contents: LogContents, stand_in: LogHeader | None) -> LogHeader:
         problem = f"expected a wire log, got {contents.size} bytes without a record"
         raise NotALog(contents.path, problem, "name another file")
     problem = f"both copies of the log's header are lost ({contents.damage.describe()})"
-    raise NotALog(contents.path, problem, "in Python, give recover() the header of a log with the same sensors")
+    raise NotALog(contents.path, problem, "keep it, and name an earlier copy of this log if there is one")
 
 
 def _calibrated(sensor: SensorEntry, survey: LogSurvey, speed_of_sound_m_per_s: float | None) -> SensorEntry:

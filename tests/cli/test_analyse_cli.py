@@ -186,3 +186,29 @@ def test_recordings_and_channels_have_their_own_results(cli: Cli, tmp_path: Path
         assert cli("analyse", tmp_path / name, *options, "-o", tmp_path / "out").code == 0
     folders = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert folders == ["bob.csv.right.results", "bob.results", "bob.txt.left.results"]
+
+
+def test_runs_of_one_file_have_their_own_results(cli: Cli, tmp_path: Path) -> None:
+    """The run that was chosen follows the name of the file, and no report replaces another."""
+    t = np.arange(1000) / 100
+    rows = "".join(f"{a:.2f},{np.cos(8 * a):.5f},{a:.2f},{np.cos(9 * a):.5f}\n" for a in t)
+    names = "Run 1: Time (s),Run 1: Position (m),Run 2: Time (s),Run 2: Position (m)"
+    (tmp_path / "bob.csv").write_text(f"{names}\n{rows}")
+    for run in ("Run 1", "Run 2"):
+        done = cli("analyse", tmp_path / "bob.csv", "--run", run, "--accuracy", "fast", "-o", tmp_path)
+        assert done.code == 0, done.err
+    found = [json.loads(each.read_text("utf-8")) for each in tmp_path.glob("*/results.json")]
+    assert {each["provenance"]["parameters"]["run"] for each in found} == {"Run 1", "Run 2"}
+
+
+@pytest.mark.parametrize("names", [("位置", "高度"), ("a/b", "a:b"), ("x" * 70 + "1", "x" * 70 + "2"), ("?", "!")])
+def test_channels_have_their_own_results_whatever_their_names(cli: Cli, tmp_path: Path, names: tuple[str, str]) -> None:
+    """Names in other scripts, with signs that no file name has, or longer than a file name may be stay distinct."""
+    t = np.arange(1000) / 100
+    rows = "".join(f"{a:.2f},{0.2 + 0.05 * np.cos(8 * a):.5f},{0.3 + 0.04 * np.cos(9 * a):.5f}\n" for a in t)
+    (tmp_path / "bob.csv").write_text(f"time (s),{names[0]} (m),{names[1]} (m)\n{rows}", "utf-8")
+    for name in names:
+        done = cli("analyse", tmp_path / "bob.csv", "--channel", name, "--accuracy", "fast", "-o", tmp_path)
+        assert done.code == 0, done.err
+    results = sorted(json.loads(each.read_text("utf-8"))["input"]["channel"] for each in tmp_path.glob("*/*.json"))
+    assert results == sorted(names)

@@ -234,6 +234,16 @@ def test_a_wrong_table_is_one_line(runs, cli, table, named):
     assert not Path("out/results.csv").exists()
 
 
+def test_patterns_of_a_table_in_a_folder_with_brackets_match(runs, cli):
+    """Brackets in the name of the table's folder are no part of its patterns."""
+    folder = Path("lab [1]")
+    shutil.copytree(runs, folder / "runs")
+    (folder / "runs.csv").write_text("path,group\nruns/run00[01].txt,7\n./runs/../runs/*5.txt,8\nrun003*,9\n")
+    done = cli("batch", folder / "runs", "--runs", folder / "runs.csv", "-o", "out", *QUICK)
+    assert done.code == 0
+    assert [row["group"] for row in rows("out")] == ["7", "7", "", "9", "", "8"]
+
+
 def test_two_passes_do_not_share_a_folder(runs, cli):
     """The second pass is refused while the first one runs; the message names the process of the first."""
     cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK)
@@ -265,6 +275,19 @@ def test_a_name_like_a_formula_is_text_in_a_spreadsheet(runs, cli):
     assert cli("batch", runs, "-o", "out", "--jobs", "1", *QUICK).code == 0
     assert "' =1+1" in [row["run"] for row in rows("out")]
     assert " =1+1" in list(springmass.results("out")["run"])
+
+
+def test_files_of_a_person_stay_among_the_reports(runs, cli):
+    """A changed run gets its report anew; what batch did not write stays, and an old report without such goes."""
+    assert cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "6", "--accuracy", "fast").code == 0
+    folders = sorted(path.name for path in Path("out/reports").iterdir())
+    notes = Path("out/reports", folders[0], "my-notes.md")
+    notes.write_text("the clamp was loose")
+    Path(runs, "run005.txt").unlink()
+    shutil.copy(Path(runs, "run001.txt"), Path(runs, "run002.txt"))
+    assert cli("batch", runs, "-o", "out", "--jobs", "1", "--reports", "6", "--accuracy", "fast").code == 0
+    assert notes.read_text() == "the clamp was loose"
+    assert sorted(path.name for path in Path("out/reports").iterdir()) == folders[:5]
 
 
 def test_a_report_stays_that_of_its_recording(runs, cli):

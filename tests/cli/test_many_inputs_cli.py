@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from tests.cli.conftest import Cli
+from tests.courses import contents
 
 
 @pytest.fixture
@@ -46,6 +48,23 @@ def test_several_inputs_share_one_table_and_one_report(cli: Cli, bench: Path, tm
             assert values[run.stem, name] == estimate["value"]
 
 
+def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(cli: Cli, bench: Path, tmp_path: Path) -> None:
+    """The folder has what it has when it is new, and the files that a person put there."""
+    undamped, damped = (bench / f"{name}_simulated_position.txt" for name in ("undamped", "damped"))
+    runs = [bench / f"{name}.txt" for name in "abc"]
+    for run in runs:
+        run.write_bytes(undamped.read_bytes())
+    options = ("--accuracy", "fast", "--figures", "svg", "--output")
+    assert cli("analyse", undamped, damped, *options, tmp_path / "out").code == 0
+    own = tmp_path / "out" / "together.results" / "my_motion.csv"
+    own.write_text("t,y\n")
+    for out in ("out", "new"):
+        assert cli("analyse", *runs, *options, tmp_path / out).code == 0
+    files = [set(contents(tmp_path / out / "together.results")) for out in ("out", "new")]
+    assert files[0] - files[1] == {own.name}
+    assert not files[1] - files[0]
+
+
 def test_a_folder_gives_its_recordings_and_names_what_is_none(cli: Cli, bench: Path) -> None:
     """The velocity files join their positions; what no family knows is counted and named, folders are left alone."""
     done = cli("analyse", bench, "--json")
@@ -57,6 +76,17 @@ def test_a_folder_gives_its_recordings_and_names_what_is_none(cli: Cli, bench: P
     velocities = [result["provenance"]["parameters"]["velocity"] for result in done.results]
     assert velocities == [str(bench / f"{name}_simulated_velocity.txt") for name in ("damped", "undamped")]
     assert all(word in done.complaint for word in ("2 recordings", "bench.toml", "notes.md"))
+
+
+def test_one_recording_is_counted_as_one(cli: Cli, bench: Path, tmp_path: Path) -> None:
+    """Singular and plural agree, for a folder with one recording and for the notes on it."""
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    run = alone / "a.txt"
+    run.write_bytes((bench / "damped_simulated_position.txt").read_bytes())
+    assert cli("scene", run, "--note", "by hand", "--mark", "3=door").code == 0
+    done = cli("analyse", alone, "--json", "--accuracy", "fast")
+    assert {"1 recording", "1 other file", "1 note", "1 mark"} <= set(re.findall(r"1 [a-z]+(?: file)?\b", done.err))
 
 
 def test_a_folder_without_a_recording_is_refused(cli: Cli, bench: Path) -> None:

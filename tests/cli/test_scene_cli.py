@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -57,6 +58,16 @@ def test_a_check_asks_about_values_and_refuses_what_cannot_be(cli: Cli, tmp_path
     assert cli("scene", "--check", path).code == 2
 
 
+def test_a_scene_given_as_a_recording_gets_the_command_that_checks_it(cli: Cli, tmp_path: Path) -> None:
+    """The line ends in a command that works."""
+    path = tmp_path / "my bench.toml"
+    path.write_text("[bob]\nmass_kg = 0.2\n")
+    done = cli("scene", path)
+    assert done.code == 2
+    _, command = done.complaint.split("springmass scene ")
+    assert cli("scene", *shlex.split(command)).code == 0
+
+
 def test_values_of_the_bench_on_the_command_line_stand_for_a_scene(cli: Cli, run: Path, data: Path) -> None:
     """Masses with their uncertainties give the spring constant that the scene gives; one amends a scene."""
     masses = ("--mass-kg", "0.2176+/-0.00005", "--set", "spring.mass_kg=0.0100(5)")
@@ -105,6 +116,28 @@ def test_scenes_are_saved_on_request_under_the_whole_name(cli: Cli, data: Path, 
     assert "spring_constant" in cli("analyse", tmp_path / "a.txt", "--json").results[0]["estimates"]
     (tmp_path / "a.csv").write_text("t (s),x (m)\n0,1\n0.1,2\n")
     assert "spring_constant" not in cli("analyse", tmp_path / "a.txt", "--json").results[0]["estimates"]
+
+
+@pytest.mark.parametrize("note", ["x" * 17000, "\udce9"])
+def test_notes_that_could_not_be_read_again_are_not_written(cli: Cli, run: Path, note: str) -> None:
+    """One line that names the file; the earlier notes stay, and the recording can still be analysed."""
+    beside = run.with_name("damped.txt.about.toml")
+    assert cli("scene", run, "--note", "by hand").code == 0
+    before = beside.read_bytes()
+    done = cli("scene", run, "--note", note)
+    assert (done.code, str(beside) in done.complaint) == (2, True)
+    assert beside.read_bytes() == before
+    assert cli("analyse", run, "--json", "--accuracy", "fast").code == 0
+
+
+def test_notes_up_to_the_limit_are_read_again(cli: Cli, run: Path) -> None:
+    """Remarks are added until one is refused; the recording then opens with all that were accepted."""
+    note, accepted = 'é " \\ \x01 ' * 250, 0
+    while cli("scene", run, "--note", note).code == 0:
+        accepted += 1
+    (result,) = cli("analyse", run, "--json", "--accuracy", "fast").results
+    assert accepted > 1
+    assert result["recorded"]["notes"] == [note] * accepted
 
 
 @pytest.mark.parametrize(

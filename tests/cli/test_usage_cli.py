@@ -25,6 +25,15 @@ def test_every_command_explains_itself(cli: Cli, monkeypatch: pytest.MonkeyPatch
         assert (done.code, done.err, command in whole.out) == (0, "", True), command
 
 
+def test_an_unknown_command_names_all_commands(cli: Cli) -> None:
+    """One line, with the near one first."""
+    done = cli("analyze", "run.txt")
+    named = re.findall(r"[a-z]+", done.complaint.partition("analyze")[2])
+    assert done.code == 2
+    assert set(COMMANDS) <= set(named)
+    assert next(word for word in named if word in COMMANDS) == "analyse"
+
+
 def test_the_first_help_is_short_and_quick() -> None:
     """First what a student, a course and a bench need, a line each; no command is imported for it, and no numpy."""
     code = "import sys; from springmass.cli import main; main(['--help']); print('numpy' in sys.modules)"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +52,31 @@ def test_every_way_to_hand_over_arrays_gives_the_same_numbers() -> None:
     for source in (pd.Series(y, elapsed), pd.Series(y, pd.Timestamp("2026-11-22") + elapsed)):
         found = sm.analyse(source)["period"]
         assert abs(found.value - expected["period"].value) < 1e-6 * found.value
+
+
+@dataclass
+class Measured:
+    """A dataclass of a user's own."""
+
+    period: Any
+
+
+def test_a_copied_result_keeps_unit_and_correlation() -> None:
+    """Copied by itself or within a dataclass, it is the same result."""
+    period = sm.analyse(record())["T"]
+    for copied in (copy.copy(period), copy.deepcopy(period), asdict(Measured(period))["period"]):
+        assert repr(copied) == repr(period)
+        assert copied.unit == "s"
+        assert (copied - period).u == 0.0
+
+
+def test_arrays_have_no_path() -> None:
+    """The result states none, also after a dataset, and an error names the arrays."""
+    run = sm.analyse(record())
+    assert run.result["input"]["path"] == ""
+    assert sm.analyse(run.to_dataset()).result["input"]["path"] == ""
+    with pytest.raises(sm.Error, match=r"^arrays: "):
+        sm.analyse(record(), from_s=1e6)
 
 
 @pytest.mark.parametrize("source", [3.0, None, {"t": [0.0]}, np.zeros(5), ([0.0, 1.0],), pd.DataFrame({"x": [1.0]})])

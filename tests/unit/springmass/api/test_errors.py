@@ -35,6 +35,14 @@ WRONG: dict[str, Callable[[Path], Any]] = {
     "times under another name": lambda _: sm.analyse(xr.DataArray(RUN[1], {"t": RUN[0]}, ["t"])),
     "no array": lambda _: sm.analyse(3),  # type: ignore[arg-type]
     "a range without samples": lambda _: sm.analyse(RUN, from_s=99.0),
+    "no scene for a simulation": lambda _: sm.simulate(None, T),  # type: ignore[arg-type]
+    "a stream without samples": lambda _: sm.Stream().finish(),
+    "a missing file with a name like a port's": lambda _: sm.source("comparison.txt"),
+    "a bench on a port": lambda _: sm.source(BENCH, sensor="maxbotix"),
+    "a bench with another scene": lambda _: sm.source(BENCH, scene=BENCH),
+    "a recording at a baud rate": lambda folder: sm.source(folder / "plain.csv", unit="m", baud=9600),
+    "a port with a unit": lambda _: sm.source("/dev/nothing", unit="m"),
+    "a port in slow motion": lambda _: sm.source("/dev/nothing", speed=0.5),
     "an unknown law": lambda _: sm.analyse(RUN, law="cubic"),
 }
 
@@ -80,6 +88,8 @@ def test_an_unknown_option_names_the_known_ones() -> None:
     """Among them the one that was mistyped."""
     with pytest.raises(TypeError, match=r"'lwa'.*\blaw\b"):
         sm.analyse(RUN, lwa="linear")  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match=r"'unitt'.*\bunit\b"):
+        sm.source(BENCH, unitt="m")  # type: ignore[call-arg]
 
 
 def test_messages_go_to_logging(
