@@ -160,7 +160,7 @@ def _print_text(run: Run, options: AnalyseOptions) -> None:
     """Print Table 1, one sentence on damping and the warnings, and further parts on request."""
     from springmass.report.words import damping_sentence
     from springmass.result.advice import trust_text
-    from springmass.result.budgets import budget_text
+    from springmass.result.budget_tables import budget_text
     from springmass.terminal.printing import classic_text, findings_text, fitted, text_table, wrapped
     from springmass.terminal.style import style_of
     from springmass.typeset import typeset

@@ -21,7 +21,7 @@ from springmass.comparing.comparison import SpringComparison, line_and_hooke_wor
 from springmass.report.recorded import bench_words, calibration_of, date_words, notes_of
 from springmass.report.words import method, summary
 from springmass.result.advice import notices_of, trust_of
-from springmass.result.budgets import budgets_of
+from springmass.result.budget_tables import budgets_of
 from springmass.result.law_rows import laws_across, laws_of
 from springmass.result.table1 import table_rows
 from springmass.runs.run import Run

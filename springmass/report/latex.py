@@ -14,7 +14,7 @@ from pipeline.analyse import Analysis
 from pipeline.numerics.estimate import Estimate, UpperLimit, format_limit, in_brackets
 from pipeline.registry.quantities import INPUTS
 from springmass.result.advice import by_harm, lab_report_line
-from springmass.result.budgets import budgets_of
+from springmass.result.budget_tables import budgets_of
 from springmass.result.table1 import table_rows
 from springmass.runs.run import Run
 

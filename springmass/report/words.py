@@ -11,7 +11,7 @@ from pipeline.registry.quantities import INPUTS
 from pipeline.results.budget import Contribution
 from pipeline.track import UNUSABLE
 from springmass.result.advice import harm_of, sentence, trust_of, trust_text
-from springmass.result.budgets import budgets_of
+from springmass.result.budget_tables import budgets_of
 from springmass.result.table1 import is_about
 from springmass.typeset import prefixed, pretty, pretty_number, typeset, unbroken
 

@@ -20,7 +20,7 @@ from springmass.report.latex import budget_tex, lab_report_tex, table_tex
 from springmass.report.motion_table import amplitude_csv, motion_csv
 from springmass.report.recorded import notes_of
 from springmass.report.words import summary as in_words
-from springmass.result.budgets import budget_csv
+from springmass.result.budget_tables import budget_csv
 from springmass.result.frames import smoothed_or_why
 from springmass.result.output_names import safe_name
 from springmass.result.run_json import plain

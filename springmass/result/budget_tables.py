@@ -1,4 +1,4 @@
-"""Uncertainty budgets made for readers: the share of each input in u, in words and as CSV."""
+"""The shares of an uncertainty budget, which `pipeline.results.budget` makes, as a text table and as CSV."""
 
 from __future__ import annotations
 
