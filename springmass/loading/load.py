@@ -20,7 +20,7 @@ from springmass.loading.loaded import UNVERIFIED, Loaded, sha256_of
 from springmass.loading.notes import about_of
 from springmass.loading.options import READ_DEFAULTS, ReadOptions
 from storage.errors import RunDamaged
-from storage.recovery.recover import recover
+from storage.recovery.recover import open_log, read_longest_part
 from storage.run_file.layout import CHECKED
 from storage.run_file.reading import open_run
 
@@ -132,22 +132,16 @@ def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[FormatIssu
 
 
 def _load_wire(path: Path, channel: str | None) -> Loaded:
-    """Recover a log into a temporary run file and load that; the log is not changed."""
-    with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
-        report = recover(path, Path(folder) / "run.h5", growing=True)
-        ports = {str(run.sensor.channel): run.sensor.port for run in report.runs}
-        wanted = [number for number, port in ports.items() if channel in (None, number, port)]
-        if len(wanted) != 1:
-            sensors = ", ".join(f"{number} at {port}" for number, port in ports.items())
-            refused = "" if channel is None else f'channel "{channel}" is not in the log, '
-            need = MissingItem(Missing.CHANNEL, tuple(ports), next(iter(ports)))
-            raise NeedsAnswer(Question(str(path), (need,), reason=f"{refused}the log holds the sensors {sensors}"))
-        parts = report.parts_of(int(wanted[0]))
-        longest = max(parts, key=lambda run: run.samples)
-        if len(parts) > 1:
-            LOG.info(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
-        loaded = _load_run(longest.path)
-        originals = loaded.originals  # read while the run file exists
-    recording = replace(loaded.recording, path=str(path), format="wire", originals=originals)
-    sha256 = originals[0].sha256 if originals else ""
-    return replace(loaded, recording=recording, format="wire", sha256=sha256, originals_inside=False)
+    """Decode the longest part of a sensor's data; the log is not changed, and may still be written."""
+    contents, survey = open_log(path)
+    ports = {str(sensor.channel): sensor.port for sensor in survey.header.sensors}
+    wanted = [number for number, port in ports.items() if channel in (None, number, port)]
+    if len(wanted) != 1:
+        sensors = ", ".join(f"{number} at {port}" for number, port in ports.items())
+        refused = "" if channel is None else f'channel "{channel}" is not in the log, '
+        need = MissingItem(Missing.CHANNEL, tuple(ports), next(iter(ports)))
+        raise NeedsAnswer(Question(str(path), (need,), reason=f"{refused}the log holds the sensors {sensors}"))
+    recording, provenance, number, count = read_longest_part(contents, survey, int(wanted[0]))
+    if count > 1:
+        LOG.info(f"{path}: the sensor came back; this is its longest part, number {number}")
+    return Loaded(recording, "wire", survey.header.scene, provenance, recording.originals[0].sha256)
