@@ -17,6 +17,7 @@ from acquisition.block import Block, SourceInfo, concatenate
 from acquisition.clock import Clock, SystemClock, VirtualClock
 from acquisition.decoders.registry import get_family
 from acquisition.live.serial_port import SerialPort
+from acquisition.recordings.recording import Recording
 from acquisition.replay import Replay
 from pipeline.bench.scene import Scene
 from springmass.api.analysing import AnyScene, ReadKeywords
@@ -26,7 +27,6 @@ from springmass.loading.loaded import Loaded
 from springmass.loading.options import ReadOptions
 from springmass.loading.save import made_now, save_run
 from springmass.loading.scenes import scene_from
-from springmass.loading.track import to_track
 from springmass.session.detect import name_sensors
 from springmass.session.file_names import demand_new
 from springmass.session.sensors import OpenSensor
@@ -116,7 +116,7 @@ def source(
         loaded = loaded if given_scene is None else replace(loaded, scene=given_scene.to_mapping())
         pace = speed if math.isfinite(speed) else None
         replay = Replay(loaded.samples_in_blocks(), _clock(speed), info=loaded.info, speed=pace)
-        return _Played(replace(loaded, info=replay.info), replay)
+        return _Played(replace(loaded, recording=replace(loaded.recording, info=replay.info)), replay)
     address = os.fspath(what)
     if not re.fullmatch(r"/dev/.*|.*://.*|COM\d+", address, re.IGNORECASE | re.DOTALL):
         ports = 'a port is named like "/dev/ttyUSB0", "COM3" or "socket://HOST:PORT"'
@@ -139,8 +139,7 @@ def _bench(scene: Scene, speed: float) -> _Played:
     """Return a simulated bench, whose samples are made as they are wanted."""
     sigma_m = SIGMA_M if scene.sensor_sigma_m is None else scene.sensor_sigma_m.value
     info, nothing = SourceInfo("simulated", "scene", SIMULATED_RATE_HZ, sigma_m), concatenate(())
-    track, tables = to_track(nothing, info), scene.to_mapping()
-    loaded = Loaded(Path("scene"), "memory", info, "distance", "", nothing, track, scene=tables)
+    loaded = Loaded(Recording("", "scene", info, "distance", nothing), "memory", scene=scene.to_mapping())
     return _Played(loaded, _swing(scene, sigma_m, _clock(speed), speed))
 
 

@@ -108,7 +108,7 @@ def _facts(loaded: Loaded) -> dict[str, Any]:
         "quantity": f"{loaded.samples.quantity} in {loaded.samples.unit}",
         "samples": len(loaded.samples),
         "missing": int(np.count_nonzero(~np.isfinite(loaded.samples.distance))),
-        "malformed_rows": loaded.malformed_rows,
+        "malformed_rows": loaded.recording.malformed_rows,
         "from_s": low,
         "to_s": high,
         **picked(loaded.info, ("rate_hz", "clock", "quantum_m", "stated_error_m")),

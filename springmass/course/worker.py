@@ -41,7 +41,8 @@ def write_report_of(report: tuple[str, Task, Path], remedy: Remedy) -> str:
     if isinstance(run, Failed):
         return _line(task, run, remedy)
     try:
-        run = run.named(name, loaded=replace(run.loaded, path=Path(task.name)), time_utc=TIME)
+        recording = replace(run.loaded.recording, path=task.name)
+        run = run.named(name, loaded=replace(run.loaded, recording=recording), time_utc=TIME)
         write_report(folder, [run], script=f"../../{SHARED}")
     except WriteFailed as error:
         return str(error)
@@ -96,7 +97,7 @@ def row_of(run: Run, path: str) -> dict[str, Any]:
         **_numbers(analysis.estimates),
         **_numbers({name: x for name in PLACES if (x := getattr(scene, name)) is not None}),
         **analysis.quality,
-        "malformed_rows": loaded.malformed_rows,
+        "malformed_rows": loaded.recording.malformed_rows,
         "status": "ok" if run.ok else "no_oscillation",
         "error": "" if run.ok else f"{path}: no oscillation: {run.why}",
         "format": loaded.format,

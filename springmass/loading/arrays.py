@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition import units
 from acquisition.block import Block, SourceInfo
-from acquisition.recordings.recording import FormatIssue
+from acquisition.recordings.recording import FormatIssue, Recording
 from acquisition.recordings.tables.headings import heading_of, is_time
 from pipeline.errors import TrackError
 from pipeline.track import F8, Track
@@ -20,7 +20,6 @@ from springmass.loading.inputs import kind_of
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
 from springmass.loading.options import ReadOptions
-from springmass.loading.track import to_track
 
 EXPECTED = "a path, a run, a pair (t, y), or a dataset, frame or mapping with time and distance was expected"
 ABOUT = "springmass"
@@ -50,9 +49,9 @@ def loaded_of(source: Any, options: ReadOptions) -> Loaded:
     samples = Block(0, track.t, track.y, track.flags, None, velocity, track.quantity, track.unit)
     if (recorded := _stated(source, about, samples)) is not None:
         return recorded
-    track = replace(track, clock=getattr(t.values, "attrs", {}).get("clock", track.clock))
-    info: Any = (track.kind, "", track.rate_hz, track.sigma_m, track.quantum_m, track.clock)
-    return Loaded(Path(), "memory", SourceInfo(*info), "", "", samples, track)
+    clock = getattr(t.values, "attrs", {}).get("clock", track.clock)
+    info: Any = (track.kind, "", track.rate_hz, track.sigma_m, track.quantum_m, clock)
+    return Loaded(Recording("", "", SourceInfo(*info), "", samples), "memory")
 
 
 def refuse_reading(options: ReadOptions) -> None:
@@ -68,32 +67,46 @@ def _demand(options: ReadOptions, allowed: Collection[str], what: str) -> None:
 
 def _stated(source: Any, about: Mapping[str, Any], samples: Block) -> Loaded | None:
     """Return the recording of a dataset that says where its samples come from; None for any other."""
-    path = Path(getattr(source, "encoding", {}).get("source", ""))
     if ABOUT in about:
         content = json.loads(about[ABOUT])
-        info, traps = SourceInfo(**content.pop("info")), tuple(FormatIssue(**trap) for trap in content.pop("traps"))
-        path = Path(content.pop("path"))
-        return Loaded(path, info=info, traps=traps, samples=samples, track=_track(samples, info, content), **content)
+        recording = Recording(
+            content["recorded_format"],
+            content["path"],
+            SourceInfo(**content["info"]),
+            content["channel"],
+            samples,
+            tuple(FormatIssue(**trap) for trap in content["traps"]),
+            content["malformed_rows"],
+            title=content["title"],
+        )
+        return Loaded(recording, *(content[name] for name in ("format", "scene", "provenance", "sha256")))
+    path = Path(getattr(source, "encoding", {}).get("source", ""))
     if path.is_file() and kind_of(path) == "run":
         loaded = load(path)
         # Samples at the same times have the same velocities and times of arrival.
         if np.array_equal(samples.t, loaded.samples.t, equal_nan=True):
             samples = replace(samples, velocity=loaded.samples.velocity, host_ns=loaded.samples.host_ns)
-        return replace(loaded, samples=samples, track=_track(samples, loaded.info, vars(loaded)))
+        return replace(loaded, recording=replace(loaded.recording, samples=samples))
     return None
-
-
-def _track(samples: Block, info: SourceInfo, facts: Mapping[str, Any]) -> Track:
-    return to_track(samples, info, recorded_format=facts["recorded_format"], provenance=facts["provenance"])
 
 
 def about_json(loaded: Loaded, scene: Mapping[str, Any]) -> str:
     """Return everything about a recording but its samples and the bytes of its originals."""
-    names = ("format", "channel", "title", "malformed_rows", "provenance", "recorded_format", "sha256")
-    about = {name: getattr(loaded, name) for name in names}
-    info = {name: getattr(loaded.info, name) for name in SourceInfo.__slots__}
-    traps = [{name: getattr(trap, name) for name in FormatIssue.__slots__} for trap in loaded.traps]
-    return json.dumps({**about, "path": loaded.source, "info": info, "traps": traps, "scene": dict(scene)})
+    recording = loaded.recording
+    about = {
+        "format": loaded.format,
+        "channel": recording.channel,
+        "title": recording.title,
+        "malformed_rows": recording.malformed_rows,
+        "provenance": loaded.provenance,
+        "recorded_format": recording.format,
+        "sha256": loaded.sha256,
+        "path": loaded.source,
+        "info": asdict(recording.info),
+        "traps": [asdict(trap) for trap in recording.traps],
+        "scene": dict(scene),
+    }
+    return json.dumps(about)
 
 
 class _ArrayColumn(NamedTuple):

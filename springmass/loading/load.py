@@ -12,17 +12,15 @@ from pathlib import Path
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing, MissingItem, Question
-from acquisition.recordings.recording import FormatIssue, Recording
+from acquisition.recordings.recording import FormatIssue
 from springmass.errors import LOG, UNREADABLE, ProgramError
 from springmass.layout import STDIN, part
 from springmass.loading.inputs import kind_of
 from springmass.loading.loaded import UNVERIFIED, Loaded, sha256_of
 from springmass.loading.notes import about_of
 from springmass.loading.options import READ_DEFAULTS, ReadOptions
-from springmass.loading.time_range import within
-from springmass.loading.track import to_track
 from storage.errors import RunDamaged
-from storage.recovery.recover import recover
+from storage.recovery.recover import open_log, read_longest_part
 from storage.run_file.layout import CHECKED
 from storage.run_file.reading import open_run
 
@@ -48,7 +46,11 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
         loaded = _load_wire(where, options.channel)
     else:
         answers = {name: getattr(options, name) for name in _OF_FILES - {"velocity"}}
-        loaded = _from_recording(where, open_recording(where, velocity_path=options.velocity, **answers))
+        recording = open_recording(where, velocity_path=options.velocity, **answers)
+        origin = {"start_time": recording.start_time, "recorded_run": recording.run}
+        provenance = {name: value for name, value in origin.items() if value}
+        sha256 = recording.originals[0].sha256
+        loaded = Loaded(recording, recording.format, provenance=provenance, sha256=sha256)
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             LOG.warning(f"{where}: {trap.message}")
@@ -64,7 +66,7 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
         loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
     summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
     LOG.debug(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
-    return within(loaded, options)
+    return loaded.within(options)
 
 
 def _load_stdin(options: ReadOptions) -> Loaded:
@@ -81,8 +83,9 @@ def _load_stdin(options: ReadOptions) -> Loaded:
             raise NeedsAnswer(replace(error.question, path=STDIN), line=error.line) from None
         except FormatError as error:
             raise type(error)(STDIN, error.problem, error.remedy, line=error.line) from None
-        kept = loaded.originals  # read while the file exists
-    return replace(loaded, path=Path(STDIN), kept=kept)
+        originals = loaded.originals  # read while the file exists
+    recording = replace(loaded.recording, path=STDIN, originals=originals)
+    return replace(loaded, recording=recording, originals_inside=False)
 
 
 def sample_data() -> Path:
@@ -100,32 +103,14 @@ def _refuse(path: Path, what: str, options: ReadOptions, allowed: Sequence[str])
         raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out")
 
 
-def _from_recording(path: Path, recording: Recording) -> Loaded:
-    origin = {"start_time": recording.start_time, "recorded_run": recording.run}
-    return Loaded(
-        path,
-        recording.format,
-        recording.info,
-        recording.channel,
-        recording.title,
-        recording.samples,
-        to_track(recording.samples, recording.info, recorded_format=recording.format),
-        recording.traps,
-        recording.malformed_rows,
-        provenance={name: value for name, value in origin.items() if value},
-        recorded_format=recording.format,
-        sha256=recording.originals[0].sha256,
-        kept=recording.originals,
-    )
-
-
 def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
     sha256 = sha256_of(path)
     with open_run(path, unverified=unverified) as run:
         try:
-            samples, traps = run.samples(), run.traps
+            recording = run.recording()
             if unverified:
-                traps += _unverified(path, run.differences())
+                issues = _unverified(path, run.differences())
+                recording = replace(recording, traps=(*recording.traps, *issues))
             else:
                 run.verify(but=CHECKED)
         except RunDamaged as error:
@@ -133,22 +118,7 @@ def _load_run(path: Path, *, unverified: bool = False) -> Loaded:
                 raise
             remedy = f"{error.remedy}, or look at it as it is with --unverified"
             raise RunDamaged(path, error.problem, remedy) from error
-        return Loaded(
-            path,
-            "run",
-            run.info,
-            run.header.channel,
-            run.header.title,
-            samples,
-            to_track(samples, run.info, recorded_format=run.header.format, provenance=run.provenance),
-            traps,
-            run.header.malformed_rows,
-            run.header.scene,
-            run.provenance,
-            run.header.format,
-            sha256,
-            kept=None,
-        )
+        return Loaded(recording, "run", run.header.scene, run.provenance, sha256, originals_inside=True)
 
 
 def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[FormatIssue, ...]:
@@ -162,27 +132,16 @@ def _unverified(path: Path, differing: Sequence[RunDamaged]) -> tuple[FormatIssu
 
 
 def _load_wire(path: Path, channel: str | None) -> Loaded:
-    """Recover a log into a temporary run file and load that; the log is not changed."""
-    with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
-        report = recover(path, Path(folder) / "run.h5", growing=True)
-        ports = {str(run.sensor.channel): run.sensor.port for run in report.runs}
-        wanted = [number for number, port in ports.items() if channel in (None, number, port)]
-        if len(wanted) != 1:
-            sensors = ", ".join(f"{number} at {port}" for number, port in ports.items())
-            refused = "" if channel is None else f'channel "{channel}" is not in the log, '
-            need = MissingItem(Missing.CHANNEL, tuple(ports), next(iter(ports)))
-            raise NeedsAnswer(Question(str(path), (need,), reason=f"{refused}the log holds the sensors {sensors}"))
-        parts = report.parts_of(int(wanted[0]))
-        longest = max(parts, key=lambda run: run.samples)
-        if len(parts) > 1:
-            LOG.info(f"{path}: the sensor came back; this is its longest part, number {longest.part}")
-        loaded = _load_run(longest.path)
-        originals = loaded.originals  # read while the run file exists
-    return replace(
-        loaded,
-        path=path,
-        format="wire",
-        recorded_format="wire",
-        sha256=originals[0].sha256 if originals else "",
-        kept=originals,
-    )
+    """Decode the longest part of a sensor's data; the log is not changed, and may still be written."""
+    contents, survey = open_log(path)
+    ports = {str(sensor.channel): sensor.port for sensor in survey.header.sensors}
+    wanted = [number for number, port in ports.items() if channel in (None, number, port)]
+    if len(wanted) != 1:
+        sensors = ", ".join(f"{number} at {port}" for number, port in ports.items())
+        refused = "" if channel is None else f'channel "{channel}" is not in the log, '
+        need = MissingItem(Missing.CHANNEL, tuple(ports), next(iter(ports)))
+        raise NeedsAnswer(Question(str(path), (need,), reason=f"{refused}the log holds the sensors {sensors}"))
+    recording, provenance, number, count = read_longest_part(contents, survey, int(wanted[0]))
+    if count > 1:
+        LOG.info(f"{path}: the sensor came back; this is its longest part, number {number}")
+    return Loaded(recording, "wire", survey.header.scene, provenance, recording.originals[0].sha256)

@@ -42,8 +42,8 @@ def save_run(
         title=loaded.title,
         channel=loaded.channel,
         traps=loaded.traps,
-        malformed_rows=loaded.malformed_rows,
-        format=loaded.recorded_format,
+        malformed_rows=loaded.recording.malformed_rows,
+        format=loaded.recording.format,
         provenance={**loaded.provenance, **made_now()},
         overwrite=overwrite,
     )

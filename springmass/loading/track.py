@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from acquisition.block import Block, SourceInfo
@@ -83,3 +85,12 @@ def _scale(recorded_format: str, sensor: Mapping[str, Any]) -> dict[str, Any]:
     if sensor.get("family") == LINE_PROTOCOL or sensor.get("options", {}).get("unit") == "us":
         scale["speed_of_sound_m_per_s"] = calibration.speed_of_sound_m_per_s
     return scale
+
+
+def between(track: Track, low_s: float, high_s: float) -> Track:
+    """Return the samples between two times, both included; all samples if neither time is finite."""
+    if math.isinf(low_s) and math.isinf(high_s):
+        return track
+    keep = (track.t >= low_s) & (track.t <= high_s)
+    velocity = None if track.velocity is None else track.velocity[keep]
+    return replace(track, t=track.t[keep], y=track.y[keep], flags=track.flags[keep], velocity=velocity)

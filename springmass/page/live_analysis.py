@@ -21,7 +21,7 @@ from springmass.charts.chart import to_json
 from springmass.charts.run import CHARTS
 from springmass.errors import Error
 from springmass.loading.options import Accuracy, AnalysisOptions
-from springmass.loading.time_range import between
+from springmass.loading.track import between
 from springmass.page.view import View, json_of
 from springmass.result.run_json import picked
 from springmass.runs.run import Run, analyse_track

@@ -47,7 +47,7 @@ def result_of(
         "schema": RESULT_SCHEMA,
         "input": input_of(loaded),
         "recorded": _recorded(loaded),
-        "quality": {**analysis.quality, "malformed_rows": loaded.malformed_rows},
+        "quality": {**analysis.quality, "malformed_rows": loaded.recording.malformed_rows},
         "estimates": estimates,
         "budget": _budgets(analysis) if classic is None else {},
         "correlations": _correlations(analysis, wanted=classic is None),

@@ -23,7 +23,6 @@ from springmass.loading.loaded import Loaded
 from springmass.loading.options import ANALYSIS_DEFAULTS, AnalysisOptions
 from springmass.loading.save import now_utc, save_run
 from springmass.loading.scenes import scene_from, stated_keys
-from springmass.loading.time_range import within
 from springmass.result.frames import estimates_frame, run_dataset, samples_dataset
 from springmass.result.run_json import result_of, with_traps
 from springmass.result.summary import html_summary, text_summary
@@ -84,11 +83,11 @@ class Run(Mapping[str, Value]):
             loaded = load(Path(source), how, scene_given=scene is not None)
         elif isinstance(source, Run):
             refuse_reading(how)
-            loaded = within(source.loaded, how)
+            loaded = source.loaded.within(how)
             scene, name = source.stated if scene is None else scene, name or source.name
             how = replace(source.how, **how.given())
         else:
-            loaded = within(loaded_of(source, how), how)
+            loaded = loaded_of(source, how).within(how)
         return cls(loaded, scene_from(scene), how, name or loaded.path.name)
 
     def named(self, name: str, **changes: Any) -> Run:

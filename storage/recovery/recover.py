@@ -10,77 +10,73 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
 
-from acquisition.block import Block
+from acquisition.block import Block, concatenate
 from acquisition.errors import AcquisitionError
 from acquisition.live.calibration import Calibration
 from acquisition.live.decoding import SensorChain
-from acquisition.recordings.recording import FormatIssue
+from acquisition.recordings.recording import FormatIssue, Original, Recording
 from storage.atomic import already_exists
 from storage.errors import LogGrowing, NotALog, RunDamaged, StorageError
 from storage.recovery.report import LossCount, Losses, RecoveredRun, RecoverReport
 from storage.run_file.reading import open_run
-from storage.run_file.writing import RunWriter, run_writer
-from storage.schema import plain
+from storage.run_file.writing import run_writer
+from storage.schema import json_text, parsed, plain
 from storage.wire_log.records import LogHeader, SensorEntry
 from storage.wire_log.scanning import FOREIGN, Damage, LogContents, read_log
 from storage.wire_log.survey import LogSurvey, Part
 from storage.wire_log.wire_samples import LogDecoder, Origin, chain_of
 
 
-class RunBuilder:
-    """Builds the run file of one part of a sensor's data."""
+class PartReader:
+    """Collects what a run file or a recording states of one part of a sensor's data, as its samples are decoded."""
 
-    def __init__(self, writer: RunWriter, part: Part, sensor: SensorEntry, chain: SensorChain) -> None:
-        self._writer, self._part, self._sensor, self._chain = writer, part, sensor, chain
+    def __init__(self, part: Part, sensor: SensorEntry, chain: SensorChain) -> None:
+        self.part, self.sensor, self.chain = part, sensor, chain
+        self.samples = 0
         self._origin = Origin()
-        self._samples = 0
         self._losses = LossCount(chain.timebase.rate_hz)
 
-    def append(self, block: Block) -> None:
-        """Append the next samples."""
+    def push(self, block: Block) -> None:
+        """Take the next samples."""
         self._origin.push(block)
-        self._samples += len(block)
+        self.samples += len(block)
         self._losses.push(block)
-        self._writer.append(block)
 
-    def finish(self, log: LogContents, survey: LogSurvey, reads: int, extra: Mapping[str, Any]) -> RecoveredRun:
-        """Write the log and the header; ``extra`` are further entries of the provenance."""
-        header, parts = survey.header, survey.parts_of(self._part.sensor)
-        decoding, damage = self._chain.report(), log.damage
-        begin_ns = survey.spans[self._part].begin_ns
-        last = self._part == parts[-1]
-        end_ns = survey.end_ns if last else survey.spans[parts[self._part.number]].begin_ns
-        losses = self._losses.losses(survey.events_of(self._part), begin_ns, end_ns, last=last)
+    def header(self, log: LogContents, survey: LogSurvey, reads: int) -> tuple[dict[str, Any], dict[str, Any], Losses]:
+        """Return the facts of a recording by name, the provenance, and the losses."""
+        header, parts = survey.header, survey.parts_of(self.part.sensor)
+        decoding, damage = self.chain.report(), log.damage
+        begin_ns = survey.spans[self.part].begin_ns
+        last = self.part == parts[-1]
+        end_ns = survey.end_ns if last else survey.spans[parts[self.part.number]].begin_ns
+        losses = self._losses.losses(survey.events_of(self.part), begin_ns, end_ns, last=last)
         origin = begin_ns if self._origin.ns is None else self._origin.ns
-        self._writer.keep([(log.path.name, log.size, log.pieces())])
-        self._writer.finish(
-            self._chain.info(self._sensor.port, header.kind),
-            scene=header.scene,
-            title=header.title,
-            traps=(*_traps(damage), *losses.traps()),
-            malformed_rows=sum(count for name, count in decoding["faults"].items() if not name.endswith("bytes")),
-            format="wire",
-            provenance={
-                "start_time": header.utc(origin),
-                "clock_map": {"mono_ns": header.mono_ns, "unix_ns": header.unix_ns, "t0_mono_ns": origin},
-                "recorded_with": header.version,
-                "sensor": plain(self._sensor),
-                "part": {"number": self._part.number, "of": len(parts)},
-                "reads": reads,
-                "log": {"name": log.path.name, **dataclasses.asdict(damage)},
-                **survey.provenance(origin),
-                "decoding": decoding,
-                "losses": dataclasses.asdict(losses),
-                **extra,
-            },
-        )
-        return RecoveredRun(self._sensor, self._part.number, self._writer.path, self._samples, decoding, losses)
+        facts = {
+            "info": self.chain.info(self.sensor.port, header.kind),
+            "title": header.title,
+            "traps": (*_traps(damage), *losses.traps()),
+            "malformed_rows": sum(n for name, n in decoding["faults"].items() if not name.endswith("bytes")),
+            "format": "wire",
+        }
+        provenance = {
+            "start_time": header.utc(origin),
+            "clock_map": {"mono_ns": header.mono_ns, "unix_ns": header.unix_ns, "t0_mono_ns": origin},
+            "recorded_with": header.version,
+            "sensor": plain(self.sensor),
+            "part": {"number": self.part.number, "of": len(parts)},
+            "reads": reads,
+            "log": {"name": log.path.name, **dataclasses.asdict(damage)},
+            **survey.provenance(origin),
+            "decoding": decoding,
+            "losses": dataclasses.asdict(losses),
+        }
+        return facts, provenance, losses
 
 
 def _traps(damage: Damage) -> Iterator[FormatIssue]:
@@ -105,14 +101,13 @@ def recover(
     header: LogHeader | None = None,
     speed_of_sound_m_per_s: float | None = None,
     provenance: Mapping[str, Any] | None = None,
-    growing: bool = False,
 ) -> RecoverReport:
     """Build the run files of a log, which may be finished, cut short or damaged.
 
     The run file has the log's name with the suffix ``.h5``, or the name ``out_path``. With several sensors the channel
     comes before the suffix: ``run.0.h5``, ``run.1.h5``. Later parts of a sensor are ``run.part2.h5`` or
     ``run.0.part2.h5``. ``header`` is used if every copy of the header in the log is lost, and ``provenance`` becomes
-    part of the provenance in the run files. With ``growing`` the log may still be written; its records so far are used.
+    part of the provenance in the run files.
 
     The log is removed with ``remove_log``, after every run file has been read back and contains the whole log.
 
@@ -123,10 +118,10 @@ def recover(
     if speed_of_sound_m_per_s is not None:
         Calibration(speed_of_sound_m_per_s=speed_of_sound_m_per_s)
     contents = log if isinstance(log, LogContents) else read_log(log)
-    if not growing and contents.being_written():
+    if contents.being_written():
         problem = f"a recording still writes this log ({contents.size} bytes so far)"
         raise LogGrowing(contents.path, problem, "recover it after the recording has ended")
-    survey = LogSurvey(contents, _header(contents, header))
+    survey = _survey_of(contents, header)
     sensors = [_calibrated(sensor, survey, speed_of_sound_m_per_s) for sensor in survey.header.sensors]
     out = contents.path if out_path is None else Path(out_path)
     paths = _paths(out, survey)
@@ -165,20 +160,24 @@ def run_paths(path: Path, channels: Sequence[int]) -> list[Path]:
 def _paths(out: Path, survey: LogSurvey) -> dict[Part, Path]:
     """Return the parts that get a run file, and its path: the first part of every sensor, and all long ones."""
     channels = [sensor.channel for sensor in survey.header.sensors]
-    paths: dict[Part, Path] = {}
-    for channel, path in zip(channels, run_paths(out, channels), strict=True):
-        for part in survey.parts_of(channel):
-            if part.number == 1:
-                paths[part] = path
-            elif survey.spans[part].seconds >= SHORTEST_PART_S:
-                paths[part] = path.with_name(f"{path.stem}.part{part.number}.h5")
-    return paths
+    return {
+        part: path if part.number == 1 else path.with_name(f"{path.stem}.part{part.number}.h5")
+        for channel, path in zip(channels, run_paths(out, channels), strict=True)
+        for part in _long_parts(survey, channel)
+    }
 
 
-def _header(contents: LogContents, stand_in: LogHeader | None) -> LogHeader:
+def _long_parts(survey: LogSurvey, channel: int) -> list[Part]:
+    """Return the first part of a sensor, and the further ones that are long."""
+    parts = survey.parts_of(channel)
+    return [part for part in parts if part.number == 1 or survey.spans[part].seconds >= SHORTEST_PART_S]
+
+
+def _survey_of(contents: LogContents, stand_in: LogHeader | None) -> LogSurvey:
+    """Return the survey of a log; ``stand_in`` is used if both copies of its header are lost."""
     header = contents.header or stand_in
     if header is not None:
-        return header
+        return LogSurvey(contents, header)
     if not contents.damage.records:
         problem = f"expected a wire log, got {contents.size} bytes without a record"
         raise NotALog(contents.path, problem, "name another file")
@@ -203,22 +202,70 @@ def _build(
     overwrite: bool,
 ) -> list[RecoveredRun]:
     """Write some run files in one pass over the log."""
+    readers, decoder = _readers(contents, sensors, targets)
+    runs = []
+    with contextlib.ExitStack() as stack:
+        writers = {part: stack.enter_context(run_writer(path, overwrite=overwrite)) for part, path in targets.items()}
+        for part, block in decoder.blocks(contents):
+            readers[part].push(block)
+            writers[part].append(block)
+        for part, writer in writers.items():
+            reader = readers[part]
+            facts, origin, losses = reader.header(contents, survey, decoder.reads[part])
+            writer.keep([(contents.path.name, contents.size, contents.pieces())])
+            writer.finish(**facts, scene=survey.header.scene, provenance={**origin, **provenance})
+            decoding = origin["decoding"]
+            runs.append(RecoveredRun(reader.sensor, part.number, writer.path, reader.samples, decoding, losses))
+    return runs
+
+
+def _readers(
+    contents: LogContents, sensors: Sequence[SensorEntry], targets: Collection[Part]
+) -> tuple[dict[Part, PartReader], LogDecoder]:
+    """Return what reads some parts of a log."""
     by_channel = {sensor.channel: sensor for sensor in sensors}
     try:
         chains = {part: chain_of(by_channel[part.sensor]) for part in targets}
     except AcquisitionError as error:
         raise NotALog(contents.path, f"header.sensors: {error}", FOREIGN) from error
-    decoder = LogDecoder(by_channel, chains.get)
-    with contextlib.ExitStack() as stack:
-        builders = {
-            part: RunBuilder(
-                stack.enter_context(run_writer(path, overwrite=overwrite)), part, by_channel[part.sensor], chains[part]
-            )
-            for part, path in targets.items()
-        }
-        for part, block in decoder.blocks(contents):
-            builders[part].append(block)
-        return [builder.finish(contents, survey, decoder.reads[part], provenance) for part, builder in builders.items()]
+    readers = {part: PartReader(part, by_channel[part.sensor], chain) for part, chain in chains.items()}
+    return readers, LogDecoder(by_channel, chains.get)
+
+
+def open_log(path: str | os.PathLike[str]) -> tuple[LogContents, LogSurvey]:
+    """Return a log, which may still be written, and its survey; NotALog says why a log cannot be decoded."""
+    contents = read_log(path)
+    survey = _survey_of(contents, None)
+    _readers(contents, survey.header.sensors, survey.spans)
+    return contents, survey
+
+
+def read_longest_part(
+    contents: LogContents, survey: LogSurvey, channel: int
+) -> tuple[Recording, dict[str, Any], int, int]:
+    """Decode the longest part of a sensor in memory: its recording and provenance, its number, and the count of parts.
+
+    Parts that would get no run file do not count.
+    """
+    sensors = [_calibrated(sensor, survey, None) for sensor in survey.header.sensors]
+    targets = _long_parts(survey, channel)
+    readers, decoder = _readers(contents, sensors, targets)
+    blocks: dict[Part, list[Block]] = {part: [] for part in targets}
+    for part, block in decoder.blocks(contents):
+        readers[part].push(block)
+        blocks[part].append(block)
+    longest = max(targets, key=lambda part: readers[part].samples)
+    facts, provenance, _ = readers[longest].header(contents, survey, decoder.reads[longest])
+    original = Original(contents.path.name, b"".join(contents.pieces()))
+    recording = Recording(
+        **facts,
+        path=str(contents.path),
+        channel="distance",
+        samples=concatenate(blocks[longest]),
+        originals=(original,),
+    )
+    # The provenance of a log is that of its run file, which has lists and plain numbers.
+    return recording, parsed(json_text(provenance).encode(), "provenance"), longest.number, len(targets)
 
 
 def _check_log_inside(path: Path, contents: LogContents, sha256: str) -> None:

@@ -18,7 +18,7 @@ from typing import Any, Self
 from numpy.typing import NDArray
 
 from acquisition.block import Block, SourceInfo
-from acquisition.recordings.recording import FormatIssue, Original
+from acquisition.recordings.recording import FormatIssue, Original, Recording
 from acquisition.regular_file import open_regular
 from storage.errors import NotARun, RunClosed, RunDamaged, one_line
 from storage.hdf5 import damaged, reading_h5
@@ -102,6 +102,20 @@ class RunFile:
         # Older files do not state the quantity; they contain lengths.
         quantity, unit = self.header.quantity or "length", self.header.unit or "m"
         return Block(self.header.first, **fields, quantity=quantity, unit=unit)
+
+    def recording(self) -> Recording:
+        """Return the recording, without the original files, which :meth:`originals` reads."""
+        header = self.header
+        return Recording(
+            header.format,
+            str(self.path),
+            self.info,
+            header.channel,
+            self.samples(),
+            self.traps,
+            header.malformed_rows,
+            title=header.title,
+        )
 
     def originals(self) -> tuple[Original, ...]:
         """Return the original files, bit for bit; an empty tuple if there are none."""

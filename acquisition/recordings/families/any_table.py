@@ -19,12 +19,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from acquisition.recordings.recording import FormatIssue
-from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import clock_s, parse_number
 from acquisition.recordings.tables.format import text_format
 from acquisition.recordings.tables.headings import Heading, headings_of, is_time, split_heading
 from acquisition.recordings.tables.layout import (
-    Layout,
     are_row_numbers,
     columns_of,
     find_table,
@@ -55,13 +53,10 @@ def header(lines: Sequence[str]) -> Header | None:
     table = find_table(tuple(lines))
     if table is None:
         return None
-    names = ", ".join(f'"{each.name}"' for each in table.headings if each.name)
-    why = f"numbers begin in line {table.at + 1}, below {names or 'no names'}"
     # The last row may be incomplete.
     columns = columns_of(table.rows[:-1] if len(table.rows) > _FEWEST else table.rows)
     headings, words = _units_beside(table)
-    times, formula = times_by_name(headings, columns), _formula(table)
-    traps = list(_preamble(table))
+    times, formula, traps = times_by_name(headings, columns), table.formula, list(table.traps)
     clocks = [at for at, cell in enumerate(table.rows[0]) if clock_s(cell) and parse_number(cell) is None]
     clock = None
     if not times and formula is None and clocks:
@@ -69,7 +64,7 @@ def header(lines: Sequence[str]) -> Header | None:
         headings[clock] = replace(headings[clock], unit="s")
         times = [clock]
         traps.append(FormatIssue("clock_times", f"the file gives times of day; here time 0 is {table.rows[0][clock]}"))
-    bare = not table.named and table.at == 0 and all(parse_number(cell) is not None for cell in table.rows[0])
+    bare = not table.named and table.lines == 0 and all(parse_number(cell) is not None for cell in table.rows[0])
     # A single column besides row numbers contains measured values, even if it rises.
     numbered = bare and len(columns) > 1 and are_row_numbers(columns[0])
     if not times and formula is None and not (bare and len(columns) <= 1 + numbered):
@@ -94,13 +89,9 @@ def header(lines: Sequence[str]) -> Header | None:
     count = sum(1 for each in table.headings if each.name)
     problem = f"rows have more cells than the {count} names above them, because the times have decimal commas"
     remedy = "export with semicolons between the cells, or with decimal points"
-    return Header(
-        why,
-        table.at,
-        table.mark,
-        [marked(at, each) for at, each in enumerate(headings)],
-        formula=formula,
-        title=table.preamble[0] if table.preamble else "",
+    return replace(
+        table,
+        headings=[marked(at, each) for at, each in enumerate(headings)],
         ragged=len(values) > 1,
         traps=tuple(traps),
         clock=clock,
@@ -121,7 +112,7 @@ def _headed(lines: Sequence[str]) -> Header | None:
     return Header(why, 1, mark, headings)
 
 
-def _units_beside(table: Layout) -> tuple[list[Heading], set[int]]:
+def _units_beside(table: Header) -> tuple[list[Heading], set[int]]:
     """Return the headings, with units taken from columns of units to the right of the numbers, and these columns."""
     headings, words = list(table.headings), set()
     for column, cells in enumerate(zip(*table.rows, strict=True)):
@@ -130,22 +121,6 @@ def _units_beside(table: Layout) -> tuple[list[Heading], set[int]]:
             headings[column - 1] = replace(headings[column - 1], unit=headings[column - 1].unit or cells[0])
             words.add(column)
     return headings, words
-
-
-def _preamble(table: Layout) -> tuple[FormatIssue, ...]:
-    if not table.preamble:
-        return ()
-    count = len(table.preamble)
-    lines = "1 line of text above the table was" if count == 1 else f"{count} lines of text above the table were"
-    message = f'{lines} skipped; the first is "{table.preamble[0][:40]}"'
-    return (FormatIssue("preamble", message, count),)
-
-
-def _formula(table: Layout) -> Formula | None:
-    """Return the times that an oscilloscope states by a start and an increment after the names; else None."""
-    settings = {name.lower(): parse_number(value) for name, value in table.spare}
-    start, step = settings.get("start"), settings.get("increment")
-    return None if start is None or not step or not step > 0 else Formula(start, step)
 
 
 def without_monitor(text: Text) -> Text:

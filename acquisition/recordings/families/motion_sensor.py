@@ -60,10 +60,10 @@ def header(lines: Sequence[str]) -> Header | None:
     shape = _shape(columns)
     if table is None or not shape:
         return None
-    at, quantity = title + table.at, "distance" if len(columns) == 3 else "velocity"
+    at, quantity = title + table.lines, "distance" if len(columns) == 3 else "velocity"
     trap = FormatIssue("unit_assumed", f"no column line: read as time (s) and {shape}, in cm")
     headings, why = _headings(quantity, "cm", len(columns) == 3), why or f"the rows have the shape of {shape}"
-    return Header(why, at, table.mark, headings, title=_above(lines[:at]), traps=(trap,))
+    return Header(why, at, table.delimiter, headings, title=_above(lines[:at]), traps=(trap,))
 
 
 def _shape(columns: Sequence[F8]) -> str:

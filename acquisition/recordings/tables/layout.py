@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.block import F8
+from acquisition.recordings.recording import FormatIssue
+from acquisition.recordings.sampling.timing import Formula
 from acquisition.recordings.tables.cells import CLOCK, parse_number
 from acquisition.recordings.tables.headings import Heading, heading_of, is_time, is_uncertainty, split_heading
+from acquisition.recordings.tables.table import Header
 from acquisition.units import measure_of, time_unit
 
 _MARKS = ("\t", ";", ",", "")
@@ -40,28 +43,8 @@ _SPARSE = 0.2  # minimum share of rows with a number in a column of samples
 _CAPITAL = re.compile(r"(?<![^\W\d_])T(?![^\W\d_])")
 
 
-class Layout(NamedTuple):
-    """The layout of a table: its first row is line ``at``, counted from 0.
-
-    ``headings`` has one heading for each column. ``spare`` are names beyond the last column, each with the cell below
-    it in the line of units. ``rows`` are the cells of the first rows, which all have the same number of cells.
-    """
-
-    preamble: tuple[str, ...]
-    headings: tuple[Heading, ...]
-    spare: tuple[tuple[str, str], ...]
-    at: int
-    mark: str
-    rows: tuple[tuple[str, ...], ...] = ()
-
-    @property
-    def named(self) -> bool:
-        """Whether a line names the columns."""
-        return any(each.name for each in self.headings)
-
-
 @lru_cache(maxsize=1)  # the same table is needed twice: to recognise a file, and to read it
-def find_table(lines: tuple[str, ...]) -> Layout | None:
+def find_table(lines: tuple[str, ...]) -> Header | None:
     """Find the first rows of numbers in a text, and the names of their columns; None if there are none.
 
     Rows are lines in which each column contains either only numbers or only words, apart from empty cells. The chosen
@@ -72,14 +55,14 @@ def find_table(lines: tuple[str, ...]) -> Layout | None:
     for order, mark in enumerate(separator_line[1] if separator_line else _MARKS):
         # Without its mark each line is a single cell, a case that the first separator has covered.
         if (not order or not mark or any(mark in each for each in lines)) and (table := _split_by(lines, mark)):
-            candidates.append(((table.at, not table.named, not _is_separator(table), order), table))
+            candidates.append(((table.lines, not table.named, not _is_separator(table), order), table))
     return min(candidates)[1] if candidates else None
 
 
-def _is_separator(table: Layout) -> bool:
+def _is_separator(table: Header) -> bool:
     """Return whether commas between integers are separators: there are as many names, or the first column counts."""
     names = [each.name for each in table.headings]
-    if table.mark != "," or len(names) < 2:
+    if table.delimiter != "," or len(names) < 2:
         return False
     if table.named:
         return all(names) and len(_with_units(names)) == len(names)
@@ -87,7 +70,7 @@ def _is_separator(table: Layout) -> bool:
     return runs_forward(first) and _is_even(first) and bool((first == np.rint(first)).all())
 
 
-def _split_by(lines: Sequence[str], mark: str) -> Layout | None:
+def _split_by(lines: Sequence[str], mark: str) -> Header | None:
     """Find the first rows of numbers in lines with a separator; None if there are none."""
     filled = [at for at, each in enumerate(lines) if each.strip(mark + " " if mark else "\t ")]
     cells = [_cells(lines[at], mark) for at in filled]
@@ -105,7 +88,7 @@ def _split_by(lines: Sequence[str], mark: str) -> Layout | None:
                 if _alike(row, first, width, mark)
             ]
             padded = tuple(tuple(row + [""] * (width - len(row))) for row in rows)
-            return _with_names(lines, filled[at], mark, width)._replace(rows=padded)
+            return replace(_with_names(lines, filled[at], mark, width), rows=padded)
     return None
 
 
@@ -146,8 +129,8 @@ def _alike(kinds: Sequence[str], first: Sequence[str], width: int, mark: str) ->
     return all(a == b or "" in (a, b) for a, b in zip(kinds, first, strict=False))
 
 
-def _with_names(lines: Sequence[str], start: int, mark: str, width: int) -> Layout:
-    """Return the layout of a table whose first row is known, without its rows."""
+def _with_names(lines: Sequence[str], start: int, mark: str, width: int) -> Header:
+    """Return the header of a table whose first row is known; its title is the first line of text above the table."""
     above = [at for at in range(start - 1, -1, -1) if lines[at].strip(_COMMENT)][:_ABOVE]
     names, units, at_names = [""] * width, [""] * width, start
     spare: tuple[tuple[str, str], ...] = ()
@@ -169,8 +152,29 @@ def _with_names(lines: Sequence[str], start: int, mark: str, width: int) -> Layo
     for name, unit in zip(names, units, strict=True):
         plain, of_heading = heading_of(name)
         headings.append(Heading(plain, of_heading or unit.strip(" ()[]")))
-    preamble = tuple(text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t;,")))
-    return Layout(preamble, tuple(headings), spare, start, mark)
+    preamble = [text for each in lines[:at_names] if (text := each.strip(_COMMENT + "\t;,"))]
+    shown = ", ".join(f'"{each.name}"' for each in headings if each.name)
+    why = f"numbers begin in line {start + 1}, below {shown or 'no names'}"
+    title, traps = preamble[0] if preamble else "", _skipped(preamble)
+    return Header(why, start, mark, headings, formula=_formula(spare), title=title, traps=traps)
+
+
+def _skipped(preamble: Sequence[str]) -> tuple[FormatIssue, ...]:
+    if not preamble:
+        return ()
+    count = len(preamble)
+    lines = "1 line of text above the table was" if count == 1 else f"{count} lines of text above the table were"
+    return (FormatIssue("preamble", f'{lines} skipped; the first is "{preamble[0][:40]}"', count),)
+
+
+def _formula(spare: Sequence[tuple[str, str]]) -> Formula | None:
+    """Return the times that an oscilloscope states by a start and an increment after the names; else None.
+
+    ``spare`` are the names beyond the last column, each with the cell below it in the line of units.
+    """
+    settings = {name.lower(): parse_number(value) for name, value in spare}
+    start, step = settings.get("start"), settings.get("increment")
+    return None if start is None or not step or not step > 0 else Formula(start, step)
 
 
 def _names(line: str, mark: str, width: int, *, numbered: bool = False) -> list[str]:
@@ -229,10 +233,10 @@ def _is_unit_of(unit: str, name: str) -> bool:
     return time_unit(unit) is not None if is_time(name) else measure_of(unit) is not None and len(name) > 1
 
 
-def wrong_commas(table: Layout) -> bool:
+def wrong_commas(table: Header) -> bool:
     """Return whether the times alone have decimal commas in rows that commas separate: more cells than names."""
     names, width = sum(1 for each in table.headings if each.name), len(table.headings)
-    if table.mark != "," or names < 2 or width not in (names + 1, 2 * names) or not table.headings[names - 1].name:
+    if table.delimiter != "," or names < 2 or width not in (names + 1, 2 * names) or not table.headings[names - 1].name:
         return False
     times = columns_of([[f"{row[0]}.{row[1]}" if row[-1] else row[0]] for row in table.rows])[0]
     return runs_forward(times) and _is_even(times)

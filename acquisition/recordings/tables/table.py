@@ -152,6 +152,8 @@ class Header(TableFacts):
         A column of times of day.
     refused : tuple of str or None
         Why the rows cannot be read, and what to do.
+    rows : tuple of tuple of str
+        The cells of the first rows, if the header was found by them; all have the same number of cells.
     """
 
     why: str
@@ -160,6 +162,12 @@ class Header(TableFacts):
     headings: Sequence[Heading]
     clock: int | None = None
     refused: tuple[str, str] | None = None
+    rows: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def named(self) -> bool:
+        """Whether a line names the columns."""
+        return any(each.name for each in self.headings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -46,7 +46,8 @@ def test_a_replay_is_kept_losslessly(tmp_path: Path) -> None:
 
 def test_an_empty_recording_has_no_samples(tmp_path: Path) -> None:
     """None are made up from its scene."""
-    nothing = sm.Run(replace(sm.load(DATA / "damped_simulated_position.txt").loaded, samples=concatenate(())))
+    loaded = sm.load(DATA / "damped_simulated_position.txt").loaded
+    nothing = sm.Run(replace(loaded, recording=replace(loaded.recording, samples=concatenate(()))))
     path = sm.Run(nothing.loaded, sm.Scene.from_mapping(BENCH)).save(tmp_path / "empty.h5")
     with sm.source(path, speed=math.inf) as bench:
         assert [len(block) for block in bench] == []
