@@ -70,17 +70,13 @@ class Record:
     text: bytes | None = None  # the file to be read instead of the arrays
 
 
-Make = Callable[[int], Record]
-"""Makes the record of a seed."""
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Kind:
     """A kind of trouble."""
 
     name: str
     cause: str
-    make: Make
+    make: Callable[[int], Record]  # of a seed
     cure: bool = False  # whether right numbers are asked for, and not only a warning
     spread: tuple[str, ...] = ()  # estimates whose u states how far something moves, by definition
     plain: bool = False  # whether it is a record without trouble, on which a warning is a false alarm
@@ -89,6 +85,20 @@ class Kind:
     def codes(self) -> frozenset[str]:
         """The findings that name it."""
         return CODES[self.cause] if self.plain else CODES[self.cause] | {"model_misfit"}
+
+
+def kind(
+    name: str,
+    cause: str,
+    make: Callable[..., Record],
+    *given: Any,
+    cure: bool = False,
+    spread: tuple[str, ...] = (),
+    plain: bool = False,
+    **named: Any,
+) -> Kind:
+    """Return a kind whose records a function makes of a seed and of what else it is given."""
+    return Kind(name, cause, lambda seed: make(seed, *given, **named), cure, spread, plain)
 
 
 class Bench:
