@@ -135,18 +135,6 @@ def test_two_processes_give_the_bytes_of_one(runs, cli, reports):
     assert any(name.endswith("report.html") for name in folders[0]) == (reports == "1")
 
 
-@pytest.mark.trials
-def test_dask_gives_the_bytes_of_one_process(runs, cli, cluster):
-    """The workers of a cluster make the same files."""
-    for place in ("here", "there"):
-        Path(place).mkdir()
-    cli("batch", runs, "-o", "here/out", "--jobs", "1", *QUICK)
-    command = [sys.executable, "-m", "springmass", "batch", str(runs), "-o", "there/out", "--dask", cluster[0], *QUICK]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
-    assert done.returncode == 0, done.stderr
-    assert contents(Path("here/out")) == contents(Path("there/out"))
-
-
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [

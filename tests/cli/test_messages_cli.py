@@ -30,15 +30,6 @@ def test_quiet_and_verbose_choose_what_is_printed(
     assert ("copy.h5" in done.err) == (lines > 0)
 
 
-def test_a_problem_is_one_line_that_begins_with_the_program(cli: Cli, tmp_path: Path) -> None:
-    """Even quiet, and even if the name of the file would clear the screen or begin a line of its own."""
-    path = tmp_path / "two\nlines\x1b[2J.txt"
-    path.write_text("hello\n")
-    (line,) = cli("-q", "analyse", path).err.splitlines()
-    assert line.startswith("springmass: ")
-    assert "two lines\\x1b[2J.txt" in line
-
-
 @pytest.mark.parametrize("options", [(), ("-q",)])
 def test_only_a_terminal_shows_the_next_command(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]

@@ -127,18 +127,6 @@ def test_h5py_finds_texts_dimensions_and_plain_filters(path: Path) -> None:
         assert flags == {str(flag.name).lower(): flag.value for flag in Flag}
 
 
-def test_netcdf_reads_it(path: Path) -> None:
-    """netCDF's own library sees variables on a dimension, with missing samples masked."""
-    netcdf = pytest.importorskip("netCDF4")
-    with open_run(path) as run:
-        distance = run.samples().distance
-    with netcdf.Dataset(path) as file:
-        result = file["entry/signal/distance"]
-        assert result.dimensions == ("time",)
-        np.testing.assert_array_equal(np.ma.filled(result[:], np.nan), distance)
-        assert file["entry/instrument/kind"][...] == file.kind
-
-
 @pytest.mark.parametrize("full", [True, False])
 def test_nexus_finds_the_default_plot(tmp_path: Path, full: bool) -> None:
     """A NeXus tool plots distance over time unasked, with error bars where sigma is known."""

@@ -106,13 +106,3 @@ def test_leaving_ends_the_iteration(name: str) -> None:
         next(blocks)
     assert list(blocks) == []
     source.__exit__(None, None, None)
-
-
-@every_source
-def test_consumers_cannot_change_what_others_get(name: str) -> None:
-    """The run handed in is as it was after it was delivered."""
-    with SOURCES[name](VirtualClock()) as source:
-        first = concatenate(source)
-    with source:
-        second = concatenate(source)
-    assert first.distance.tobytes() == second.distance.tobytes()

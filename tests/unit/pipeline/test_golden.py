@@ -59,12 +59,6 @@ def test_report_inputs_give_the_golden_values(
     assert found.u > 0
 
 
-def test_reports_spring_constants_are_28_sigma_apart() -> None:
-    """13.979 +- 0.053 against 16.31 +- 0.064 N/m is 28 standard uncertainties for one spring."""
-    bare, disc = estimates(5.27, BARE)["spring_constant"], estimates(5.08, DISC)["spring_constant"]
-    assert (disc.value - bare.value) / math.hypot(bare.u, disc.u) == pytest.approx(28.0, abs=0.5)
-
-
 def test_exchanged_periods_agree() -> None:
     """With the periods exchanged the two runs give 15.05 and 15.15 N/m to a digit in the last place, and agree."""
     bare, disc = estimates(5.08, BARE)["spring_constant"], estimates(5.27, DISC)["spring_constant"]

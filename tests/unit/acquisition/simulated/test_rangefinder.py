@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pytest
 
 from acquisition.simulated import Shot, VirtualRangefinder, VirtualSensor
 
@@ -36,16 +35,6 @@ def met(t: float, speed: float = 344.0) -> float:
     for _ in range(5):
         distance = bob(t + distance / speed)
     return distance
-
-
-@pytest.mark.parametrize("noise_m", [80e-6, 1e-3])
-def test_noise_has_the_level_asked_for(noise_m: float) -> None:
-    """The distances of a bob at rest scatter by the noise, normally and without memory."""
-    error = distances(lambda _: 0.3, 5000, noise_m=noise_m, tick_s=1e-9) - 0.3
-    assert np.std(error) == pytest.approx(noise_m, rel=0.05)
-    assert abs(np.mean(error)) < 4 * noise_m / math.sqrt(5000)
-    assert abs(np.corrcoef(error[1:], error[:-1])[0, 1]) < 0.06
-    assert np.mean(np.abs(error) < noise_m) == pytest.approx(0.683, abs=0.03)
 
 
 def test_false_echoes_come_in_clusters_where_the_bob_turns_near_the_sensor() -> None:
