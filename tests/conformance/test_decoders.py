@@ -14,7 +14,7 @@ import pytest
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import SensorError
 from springmass.testing import check
-from tests.encoders import ENCODERS
+from tests.encoders import ENCODERS, frames
 
 
 @dataclass(frozen=True)
@@ -114,11 +114,7 @@ def test_polled_temperatures_of_old_logs_are_no_distances(name: str) -> None:
 def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:
     """A surplus byte shifts every reply; two impossible distances in a row give it away."""
     sent = 0.300 + 0.001 * np.arange(20)
-    encode = ENCODERS["us100"]().encode
-    data = b"".join(
-        encode(sequence=0, device_us=0, echo_us=math.nan, distance_m=at, temperature_c=20.0) for at in sent.tolist()
-    )
     decoder = get_family("us100").decoder()
-    found = decoder.feed(0, b"\x99" + data).distance_m
+    found = decoder.feed(0, b"\x99" + b"".join(frames("us100", sent.tolist()))).distance_m
     assert decoder.faults["resynchronised"] == 1
     np.testing.assert_allclose(found, [math.nan, math.nan, *sent[1:]], atol=1e-9)

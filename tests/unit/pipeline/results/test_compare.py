@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
+from pipeline.results.course import agreement
 
 
 def massless(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> Comparison:
@@ -114,3 +115,15 @@ def test_three_runs_test_what_they_solve_for() -> None:
     wrong = replace(runs[1], mass_kg=Estimate(0.206, 2e-5))
     result = compare_springs([runs[0], wrong, runs[2]])
     assert not result.agree
+
+
+def test_scatter_within_and_between_is_what_was_put_in():
+    """Over 400 benches of 5 runs the moments come back within some percent, and the mean within its uncertainty."""
+    rng = np.random.default_rng(3)
+    benches = np.repeat(np.arange(400), 5)
+    values = 14.0 + 0.05 * rng.standard_normal(400)[benches] + 0.02 * rng.standard_normal(2000)
+    found = agreement("k", "", [Estimate(float(x), 0.01, "N/m") for x in values], [str(b) for b in benches])
+    assert found.within == pytest.approx(0.02, rel=0.05)
+    assert found.between == pytest.approx(0.05, rel=0.1)
+    assert abs(found.mean.value - 14.0) < 3.0 * found.mean.u
+    assert found.mean.u == pytest.approx(0.05 / 20.0, rel=0.15)
