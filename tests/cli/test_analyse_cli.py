@@ -76,9 +76,6 @@ def test_a_run_file_with_an_impossible_scene_fails_alone(cli: Cli, recording: Pa
     [
         ("[bob]\nmas_kg = 0.2\n", ("mas_kg",)),
         ("[bob]\nmass_kg = -0.2\n", ("mass_kg", "-0.2")),
-        ("[bob]\nmass_kg = {value = 0.2, u = -1.0}\n", ("mass_kg", "u", "-1")),
-        ("[weight]\nmass_kg = 0.2\n", ("weight",)),
-        ("[sensor]\nposition = 'left'\n", ("position", "left")),
         ("[bob\n", ("line 1",)),
         ("a = " + "[" * 20_000, ()),
         ("[bob]\nmass_kg = '" + "x" * 1_000_000 + "'\n", ()),

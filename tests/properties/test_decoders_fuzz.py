@@ -133,14 +133,8 @@ def test_bytes_give_no_distance_without_a_frame(name: str, data: bytes, cuts: li
     assert whole == content(check(name, data, range(1, len(data))))
 
 
-FAULTS = st.lists(
-    st.tuples(
-        st.sampled_from(["flip", "drop", "insert", "repeat", "cut"]),
-        st.floats(0, 1, exclude_max=True),
-        st.binary(min_size=1, max_size=9),
-    ),
-    max_size=8,
-)
+KIND = st.sampled_from(["flip", "drop", "insert", "repeat", "cut"])
+FAULTS = st.lists(st.tuples(KIND, st.floats(0, 1, exclude_max=True), st.binary(min_size=1, max_size=9)), max_size=8)
 """Faults of the line: what is done, where (as a share of the stream), and with what."""
 
 

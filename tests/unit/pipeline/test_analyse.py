@@ -45,20 +45,15 @@ def test_agrees_with_a_waveform_fit_by_lmfit(
     other = model.fit(y, x=t, c=truth.offset, a=truth.amplitude, g=truth.gamma, w=truth.omega, p=truth.phase)
     options = replace(options_for(accuracy), laws=("linear",))
     result = analyse(Track.from_arrays(t, y), options=options)
-    motion = motion_of(result)
-    period = other.params["w"]
+    motion, params = motion_of(result), other.params
+    omega, u_omega = params["w"].value, params["w"].stderr
     pairs = {
-        "period": (
-            motion.derived.statistical["period"],
-            2 * math.pi / period.value,
-            2 * math.pi / period.value**2 * period.stderr,
-        ),
-        "amplitude": (result.estimates["amplitude"], other.params["a"].value, other.params["a"].stderr),
-        "phase": (result.estimates["phase"], other.params["p"].value, other.params["p"].stderr),
-        "offset": (result.estimates["offset"], other.params["c"].value, other.params["c"].stderr),
-        "gamma": (motion.damping.fits["linear"].joint["gamma"], other.params["g"].value, other.params["g"].stderr),
+        name: (result.estimates[name], params[x]) for name, x in (("amplitude", "a"), ("phase", "p"), ("offset", "c"))
     }
-    for name, (found, value, u) in pairs.items():
+    pairs["gamma"] = motion.damping.fits["linear"].joint["gamma"], params["g"]
+    held = {name: (found, x.value, x.stderr) for name, (found, x) in pairs.items()}
+    held["period"] = motion.derived.statistical["period"], 2 * math.pi / omega, 2 * math.pi / omega**2 * u_omega
+    for name, (found, value, u) in held.items():
         assert abs(found.value - value) <= near * u, name
         assert found.u == pytest.approx(u, rel=alike), name
 

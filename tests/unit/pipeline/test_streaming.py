@@ -76,24 +76,23 @@ NOTHING = np.full(1000, np.nan)
 QUIET = 0.25 + 1e-4 * np.random.default_rng(5).standard_normal(1000)
 
 
-@pytest.mark.parametrize(
-    ("y", "flags"),
-    [
-        (NOTHING[:15], 0),
-        (NOTHING[:0], 0),
-        (NOTHING, int(Quality.MISSING)),
-        (QUIET, 0),
-        (np.full(1000, 0.25), 0),
-        (np.linspace(0.2, 0.4, 1000), 0),
-        (np.where(np.arange(1000) == 500, 0.3, np.nan), 0),
-        (np.where(np.arange(1000) < 990, 0.25, 0.3), 0),
-    ],
-    ids=["fifteen", "none", "all-missing", "still", "constant", "ramp", "one", "step"],
-)
-def test_it_says_why_there_is_no_value_yet(y: np.ndarray, flags: int) -> None:
+NOT_YET = {
+    "fifteen": NOTHING[:15],
+    "none": NOTHING[:0],
+    "all-missing": NOTHING,
+    "still": QUIET,
+    "constant": np.full(1000, 0.25),
+    "ramp": np.linspace(0.2, 0.4, 1000),
+    "one": np.where(np.arange(1000) == 500, 0.3, np.nan),
+    "step": np.where(np.arange(1000) < 990, 0.25, 0.3),
+}
+
+
+@pytest.mark.parametrize("name", NOT_YET)
+def test_it_says_why_there_is_no_value_yet(name: str) -> None:
     """Too few samples, no target or a bob at rest give one sentence, no exception and no number."""
-    held = MotionAccumulator(RATE_HZ)
-    held.push(np.arange(y.size) / RATE_HZ, y, np.full(y.size, flags, np.uint8))
+    held, y = MotionAccumulator(RATE_HZ), NOT_YET[name]
+    held.push(np.arange(y.size) / RATE_HZ, y, np.where(np.isnan(y), Quality.MISSING, 0).astype(np.uint8))
     answer = held.value()
     assert isinstance(answer, NotYet)
     assert answer.why

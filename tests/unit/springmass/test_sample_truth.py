@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import sys
-import sys
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
