@@ -117,13 +117,8 @@ def test_h5py_finds_texts_dimensions_and_plain_filters(path: Path) -> None:
             packed = (None, False) if name in ("distance", "velocity") else ("gzip", True)
             assert (array.compression, array.shuffle, array.fletcher32) == (*packed, True)
             assert "scale_factor" not in array.attrs
-        flags = dict(
-            zip(
-                signal["quality"].attrs["flag_meanings"].decode().split(),
-                signal["quality"].attrs["flag_masks"],
-                strict=True,
-            )
-        )
+        quality = signal["quality"].attrs
+        flags = dict(zip(quality["flag_meanings"].decode().split(), quality["flag_masks"], strict=True))
         assert flags == {str(flag.name).lower(): flag.value for flag in Flag}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -11,7 +10,6 @@ from .conftest import ROOT, Emulate
 
 pytestmark = pytest.mark.trials
 
-PAGE = ROOT / "docs" / "reference" / "line-protocol.md"
 SCRIPT = (
     (0.5, "?"),
     (4.0, "G2400,3000"),
@@ -24,14 +22,6 @@ SCRIPT = (
     (6.2, "R125"),
 )
 """Commands that bring out every line that the firmware knows, with the troubles of :func:`sent_lines`."""
-
-
-def vectors(page: Path = PAGE) -> list[str]:
-    """Return the lines of the page's vectors that the firmware sends: leading zeros, a refusal, identifications."""
-    found = re.findall(
-        r"^\| `(\$.*?)` \|", page.read_text(encoding="utf-8").partition("\n## Vectors\n")[2], re.MULTILINE
-    )
-    return [line for line in found if re.match(r"\$(R1,0[0-9]{9},|X1|I1)", line)]
 
 
 @pytest.fixture
@@ -54,7 +44,10 @@ def sent_lines(emulate: Emulate) -> list[str]:
 
 def test_the_firmware_sends_the_vectors_of_the_page(sent_lines: list[str]) -> None:
     """Each of them, and among them every status, a temperature, both identifications and the refusal."""
-    wanted = vectors()
+    page = (ROOT / "docs" / "reference" / "line-protocol.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\$.*?)` \|", page.partition("\n## Vectors\n")[2], re.MULTILINE)
+    # Those that the firmware sends: with leading zeros, a refusal, and identifications.
+    wanted = [line for line in rows if re.match(r"\$(R1,0[0-9]{9},|X1|I1)", line)]
     assert {line.partition("*")[0][-1] for line in wanted if line.startswith("$R1")} == set("ENBCFAS")
     assert sum(line.startswith("$I1") for line in wanted) == 2
     assert "$X1,command*392D" in wanted

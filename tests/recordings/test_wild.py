@@ -63,14 +63,6 @@ def test_a_workbook_of_results_is_no_recording(recordings: Path) -> None:
     assert caught.value.question.missing == (Missing.CHANNEL, Missing.UNIT)
 
 
-def analysed(path: Path, given: dict[str, Any]) -> tuple[Any, np.ndarray, np.ndarray]:
-    """Return the analysis, and the times and values that it used."""
-    recording = open_recording(path, **given)
-    found = analyse(to_track(recording.samples, recording.info))
-    used = (found.flags & UNUSABLE) == 0
-    return found, recording.samples.t[used], recording.samples.distance[used]
-
-
 def independent_period(t: np.ndarray, y: np.ndarray) -> float:
     """Return the period by scipy alone: a robust fit of a damped sinusoid on a straight line, from the spectrum's peak.
 
@@ -103,7 +95,10 @@ def independent_period(t: np.ndarray, y: np.ndarray) -> float:
 @pytest.mark.parametrize(("start", "given"), sampled(OSCILLATE, 9))
 def test_what_oscillates_has_the_period_of_an_independent_fit(recordings: Path, start: str, given: Given) -> None:
     """Of the same rows: within three standard uncertainties and, as pendulums follow their amplitude, 0.02 %."""
-    found, t, y = analysed(only(recordings, start), given)
-    period, expected = found.estimates["period"], independent_period(t, y)
+    recording = open_recording(only(recordings, start), **given)
+    found = analyse(to_track(recording.samples, recording.info))
+    used = (found.flags & UNUSABLE) == 0
+    period = found.estimates["period"]
+    expected = independent_period(recording.samples.t[used], recording.samples.distance[used])
     assert abs(period.value - expected) < 3.0 * period.u + 2e-4 * expected
     assert period.u < 5e-3 * period.value

@@ -64,9 +64,7 @@ def _touched(seed: int, kick: float, at_s: float = 11.0) -> Record:
     x, v = float(b.motion.position(here)[0]), float(b.motion.velocity(here)[0])
     v += kick * b.motion.amplitude(at) * b.bob.omega
     later = swing(
-        replace(b.bob, amplitude=math.hypot(x, v / b.bob.omega), phase=math.atan2(-v / b.bob.omega, x)),
-        25.0,
-        start=at,
+        replace(b.bob, amplitude=math.hypot(x, v / b.bob.omega), phase=math.atan2(-v / b.bob.omega, x)), 25.0, start=at
     )
 
     def amplitude_at(t: float) -> float:

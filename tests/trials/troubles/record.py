@@ -105,14 +105,7 @@ class Bench:
     """What a seed and a kind's name draw: a bob, where it hangs, a sensor's noise; ``bob`` says what is not drawn."""
 
     def __init__(
-        self,
-        seed: int,
-        key: str,
-        *,
-        seconds: float = 20.0,
-        rate_hz: float = 100.0,
-        sigma_m: float = 3e-4,
-        **bob: Any,
+        self, seed: int, key: str, *, seconds: float = 20.0, rate_hz: float = 100.0, sigma_m: float = 3e-4, **bob: Any
     ) -> None:
         self.rng = np.random.default_rng([seed, *key.encode()])
         drawn: dict[str, Any] = {

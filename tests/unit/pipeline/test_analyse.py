@@ -120,14 +120,7 @@ def test_any_times_are_analysed_or_refused(data: st.DataObject) -> None:
 @example(seed=0, seconds=2.0, omega=1.0, sigma_m=0.0, gamma=0.0, step_m=0.0, holes=0.875, echoes=0.25)
 @example(seed=0, seconds=8.0, omega=8.5, sigma_m=0.0, gamma=1.0, step_m=0.0, holes=0.0, echoes=0.25)
 def test_any_oscillation_is_analysed_or_refused(
-    seed: int,
-    seconds: float,
-    omega: float,
-    sigma_m: float,
-    gamma: float,
-    step_m: float,
-    holes: float,
-    echoes: float,
+    seed: int, seconds: float, omega: float, sigma_m: float, gamma: float, step_m: float, holes: float, echoes: float
 ) -> None:
     """Short, fast, growing, dying, coarse, thinned and riddled records: an analysis or a PipelineError."""
     rng = np.random.default_rng(seed)

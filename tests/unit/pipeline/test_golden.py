@@ -18,10 +18,7 @@ from pipeline.track import Track
 
 BARE = Scene.from_mapping({"bob": {"mass_kg": {"value": 0.2007, "u": 0.00005}}})
 DISC = Scene.from_mapping(
-    {
-        "bob": {"mass_kg": {"value": 0.2176, "u": 0.00005}},
-        "disc": {"diameter_m": {"value": 0.102, "u": 0.0005}},
-    }
+    {"bob": {"mass_kg": {"value": 0.2176, "u": 0.00005}}, "disc": {"diameter_m": {"value": 0.102, "u": 0.0005}}}
 )
 
 

@@ -39,15 +39,11 @@ WRONG: dict[str, Callable[[Path], Any]] = {
 }
 
 
-def write_plain(path: Path) -> None:
-    """Write a table that states no unit."""
-    path.write_text("time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True)))
-
-
 @pytest.mark.parametrize("name", WRONG)
 def test_every_error_has_one_root_and_a_remedy(name: str, tmp_path: Path) -> None:
     """One line, whose remedy stands in it."""
-    write_plain(tmp_path / "plain.csv")
+    rows = "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True))
+    (tmp_path / "plain.csv").write_text(f"time,height\n{rows}")
     content = bytearray(sm.load(RUN).save(tmp_path / "damaged.h5").read_bytes())
     content[len(content) // 2] ^= 0xFF
     (tmp_path / "damaged.h5").write_bytes(content)
