@@ -28,9 +28,8 @@ def run_of(
 ) -> SpringRun:
     """One record of a minute, analysed with the mass that was typed."""
     t = np.arange(6000) / 100.0
-    y = 0.3 + 0.04 * np.exp(-0.008 * t) * np.cos(
-        math.sqrt(k / oscillating(spring_kg, load_kg)) * t + rng.uniform(-3, 3)
-    )
+    omega = math.sqrt(k / oscillating(spring_kg, load_kg))
+    y = 0.3 + 0.04 * np.exp(-0.008 * t) * np.cos(omega * t + rng.uniform(-3, 3))
     scene = Scene(bob_mass_kg=Estimate(typed_kg, U_BOB_KG, "kg"))
     motion = analyse(Track.from_arrays(t, y + rng.normal(0, 3e-4, t.size)), scene, options_for("standard")).motion
     assert isinstance(motion, Oscillation)
