@@ -1,4 +1,4 @@
-"""The report's method is reproduced to the digit, bias and all, against plain loops and scipy."""
+"""The report's method is reproduced to the digit, bias and all, against plain numpy and scipy."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def record(seconds: float, sigma_m: float, seed: int, **truth: float) -> Track:
 
 @pytest.mark.parametrize(("sigma_m", "seed"), [(0.0, 1), (3e-4, 2), (2.39e-3, 3)])
 def test_period_and_amplitude_are_the_naive_ones(sigma_m: float, seed: int) -> None:
-    """Period, amplitude and sliding amplitude equal what plain loops give."""
+    """Period, amplitude and sliding amplitude equal what plain numpy gives."""
     track = record(10.0, sigma_m, seed, gamma=0.005)
     found = classic(track)
     t, y = track.t, track.y
