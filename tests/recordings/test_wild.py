@@ -11,7 +11,7 @@ import pytest
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
-from pipeline.analyse import analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.track import UNUSABLE
 from springmass.loading.track import to_track
 from tests.sampling import sampled
@@ -63,6 +63,14 @@ def test_a_workbook_of_results_is_no_recording(recordings: Path) -> None:
     assert caught.value.question.missing == (Missing.CHANNEL, Missing.UNIT)
 
 
+def analysed(path: Path, given: Given) -> tuple[Analysis, np.ndarray, np.ndarray]:
+    """Return the analysis, and the times and values that it used."""
+    recording = open_recording(path, **given)
+    found = analyse(to_track(recording.samples, recording.info))
+    used = (found.flags & UNUSABLE) == 0
+    return found, recording.samples.t[used], recording.samples.distance[used]
+
+
 def independent_period(t: np.ndarray, y: np.ndarray) -> float:
     """Return the period by scipy alone: a robust fit of a damped sinusoid on a straight line, from the spectrum's peak.
 
@@ -95,10 +103,18 @@ def independent_period(t: np.ndarray, y: np.ndarray) -> float:
 @pytest.mark.parametrize(("start", "given"), sampled(OSCILLATE, 9))
 def test_what_oscillates_has_the_period_of_an_independent_fit(recordings: Path, start: str, given: Given) -> None:
     """Of the same rows: within three standard uncertainties and, as pendulums follow their amplitude, 0.02 %."""
-    recording = open_recording(only(recordings, start), **given)
-    found = analyse(to_track(recording.samples, recording.info))
-    used = (found.flags & UNUSABLE) == 0
-    period = found.estimates["period"]
-    expected = independent_period(recording.samples.t[used], recording.samples.distance[used])
+    found, t, y = analysed(only(recordings, start), given)
+    period, expected = found.estimates["period"], independent_period(t, y)
     assert abs(period.value - expected) < 3.0 * period.u + 2e-4 * expected
     assert period.u < 5e-3 * period.value
+
+
+def test_of_two_strokes_the_last_gives_the_period(recordings: Path) -> None:
+    """A carriage is driven forth and back and swings after each; its crossings of the last rest say the period."""
+    found, t, y = analysed(only(recordings, "ecp"), {"channel": "Encoder 1 Pos", "unit": "mm"})
+    y = y - np.median(y[-100:])
+    last = np.flatnonzero((t[:-1] > 3.05) & (t[:-1] < 3.65) & (y[1:] * y[:-1] < 0.0))
+    crossed = t[last] - y[last] * (t[last + 1] - t[last]) / (y[last + 1] - y[last])
+    period = found.estimates["period"]
+    assert abs(period.value - 2.0 * float(np.mean(np.diff(crossed)))) < 2.0 * period.u
+    assert {"handled", "short_record"} <= {each.code for each in found.findings}
