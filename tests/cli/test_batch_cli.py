@@ -20,7 +20,6 @@ from tests.courses import bad_files, contents, short_course
 from tests.sampling import sampled
 
 ROOT = Path(__file__).parents[2]
-LIMIT_S = 300
 MANY = 2600 if os.environ.get("SPRINGMASS_TRIALS") else 26  # a hundred for each bad one
 QUICK = ("--reports", "0", "--accuracy", "fast")
 
