@@ -15,11 +15,7 @@ from hypothesis import HealthCheck, settings
 # A slow machine is no fault of the data: neither a deadline nor the check for slow generation holds here.
 for _profile, _examples in (("springmass", 20), ("nightly", 1000)):
     settings.register_profile(
-        _profile,
-        derandomize=True,
-        deadline=None,
-        max_examples=_examples,
-        suppress_health_check=[HealthCheck.too_slow],
+        _profile, derandomize=True, deadline=None, max_examples=_examples, suppress_health_check=[HealthCheck.too_slow]
     )
 settings.load_profile(os.environ.get("SPRINGMASS_EXAMPLES", "springmass"))
 

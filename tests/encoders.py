@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import binascii
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from acquisition.decoders.decoder import Encoder
@@ -102,3 +102,12 @@ ENCODERS: dict[str, Callable[..., Encoder]] = {
     "sen0149": binary(bytes([0x55, 0xAA, 0x11, 2, 2]), 1e-3, 1, 12_000, 0xFFFF),
     "text-lines": TextLines,
 }
+
+
+def frames(family: str, distances_m: Iterable[float]) -> list[bytes]:
+    """Return what a sensor sends of distances at 100 Hz, at 21 degrees and 343 m/s; NaN for no target."""
+    encode = ENCODERS[family]().encode
+    return [
+        encode(sequence=i, device_us=10_000 * i, echo_us=d / 171.5e-6, distance_m=d, temperature_c=21.0)
+        for i, d in enumerate(distances_m)
+    ]

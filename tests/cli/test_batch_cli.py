@@ -20,7 +20,6 @@ from tests.courses import bad_files, contents, short_course
 from tests.sampling import sampled
 
 ROOT = Path(__file__).parents[2]
-LIMIT_S = 300
 MANY = 2600 if os.environ.get("SPRINGMASS_TRIALS") else 26  # a hundred for each bad one
 QUICK = ("--reports", "0", "--accuracy", "fast")
 
@@ -133,18 +132,6 @@ def test_two_processes_give_the_bytes_of_one(runs, cli, reports):
         folders.append(contents(out))
     assert folders[0] == folders[1]
     assert any(name.endswith("report.html") for name in folders[0]) == (reports == "1")
-
-
-@pytest.mark.trials
-def test_dask_gives_the_bytes_of_one_process(runs, cli, cluster):
-    """The workers of a cluster make the same files."""
-    for place in ("here", "there"):
-        Path(place).mkdir()
-    cli("batch", runs, "-o", "here/out", "--jobs", "1", *QUICK)
-    command = [sys.executable, "-m", "springmass", "batch", str(runs), "-o", "there/out", "--dask", cluster[0], *QUICK]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
-    assert done.returncode == 0, done.stderr
-    assert contents(Path("here/out")) == contents(Path("there/out"))
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,20 @@
-"""Messages on stderr: problems always, what was done unless ``-q``, details with ``-v``, hints on a terminal alone."""
+"""Messages on stderr: problems always, what was done unless ``-q``, details with ``-v``, hints on a terminal alone.
+
+A defect is one line with exit code 70; what the system or the user does wrong is never called one.
+"""
 
 from __future__ import annotations
 
 import io
+import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from springmass.cli import main
+from springmass.errors import INTERNAL, USAGE
 from tests.cli.conftest import Cli
 
 
@@ -30,15 +36,6 @@ def test_quiet_and_verbose_choose_what_is_printed(
     assert ("copy.h5" in done.err) == (lines > 0)
 
 
-def test_a_problem_is_one_line_that_begins_with_the_program(cli: Cli, tmp_path: Path) -> None:
-    """Even quiet, and even if the name of the file would clear the screen or begin a line of its own."""
-    path = tmp_path / "two\nlines\x1b[2J.txt"
-    path.write_text("hello\n")
-    (line,) = cli("-q", "analyse", path).err.splitlines()
-    assert line.startswith("springmass: ")
-    assert "two lines\\x1b[2J.txt" in line
-
-
 @pytest.mark.parametrize("options", [(), ("-q",)])
 def test_only_a_terminal_shows_the_next_command(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
@@ -50,3 +47,62 @@ def test_only_a_terminal_shows_the_next_command(
         assert main(["convert", str(recording), str(tmp_path / f"{number}.h5"), *options]) == 0
         shown.append("springmass analyse" in stream.getvalue())
     assert shown == [False, not options]
+
+
+@pytest.fixture
+def defective(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Return a recording on which the program fails as no code foresees."""
+    path = tmp_path / "other.txt"
+    path.write_bytes(b"")
+    sound = open
+
+    def fails(file: Any, *args: Any, **how: Any) -> Any:
+        if str(file) == str(path):
+            raise KeyError("a name that nobody\nthought of")
+        return sound(file, *args, **how)
+
+    monkeypatch.setattr("builtins.open", fails)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    return path
+
+
+def test_a_defect_is_one_line_and_a_file(cli: Cli, defective: Path, tmp_path: Path) -> None:
+    """The line says what to do and names the file with the traceback."""
+    done = cli("analyse", defective, "--no-report")
+    assert done.code == INTERNAL
+    assert "internal error: KeyError" in done.complaint
+    (details,) = tmp_path.glob("springmass-error-*.txt")
+    assert str(details) in done.complaint
+    assert "Traceback" in details.read_text(encoding="utf-8")
+
+
+def test_a_defect_met_on_one_of_several_inputs_leaves_the_others(cli: Cli, recording: Path, defective: Path) -> None:
+    """The other input has its column of Table 1."""
+    done = cli("analyse", recording, defective, "--no-report")
+    assert done.code == 1
+    assert "internal error" in done.complaint
+    assert "period" in done.out
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_output_is_one_line(recording: Path) -> None:
+    """What cannot be written to is named, without a traceback, not even when Python ends."""
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "springmass", "analyse", "--json", str(recording)],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=Path(__file__).resolve().parents[2],
+        )
+    assert done.returncode == USAGE
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("springmass: standard output")
+
+
+def test_quiet_holds_for_one_command_alone(cli: Cli, recording: Path) -> None:
+    """The next command in the same process says again what it does."""
+    recording.with_name("run.about.toml").write_text('notes = ["by hand"]\n', encoding="utf-8")
+    for line in (("-q", "analyse", recording, "--no-report"), ("analyse", recording, "--no-report", "--quiet")):
+        assert cli(*line).err == ""
+    assert "run.about.toml" in cli("analyse", recording, "--no-report").complaint

@@ -5,7 +5,6 @@ The board here is none of the decoder's: its lines are the page's, written out.
 
 from __future__ import annotations
 
-import binascii
 import contextlib
 import os
 import pty
@@ -19,13 +18,9 @@ import pytest
 
 from acquisition.live.firmware import FIRMWARE_VERSION, HEX
 from tests.cli.conftest import Cli
+from tests.encoders import sealed
 
 PERIOD_S = 0.01
-
-
-def line(body: str) -> bytes:
-    """Return a body as docs/reference/line-protocol.md frames it."""
-    return f"${body}*{binascii.crc_hqx(body.encode('ascii'), 0xFFFF):04X}\n".encode("ascii")
 
 
 class Board:
@@ -65,17 +60,17 @@ class Board:
             began_s = began_s or time.monotonic()
             while self.heard and number < (time.monotonic() - began_s) / PERIOD_S:
                 echo = f"{2000 + number % 7:d}.25" if self._letter == "E" else ""
-                self._send(line(f"R1,{number:010d},{number * 10_000:010d},{echo},,{self._letter}"))
+                self._send(sealed(f"R1,{number:010d},{number * 10_000:010d},{echo},,{self._letter}"))
                 number += 1
 
     def _obey(self, command: str) -> None:
         if command == "R13":  # within the range that the command line allows, and refused by this one
-            self._send(line("X1,command"))
+            self._send(sealed("X1,command"))
             return
         if command != "?":
             self._settings[command[0]] = command[1:]
         rate, gate, spread, name = self._settings.values()
-        self._send(line(f"I1,springmass-rangefinder,{self._version},{name},{rate},{gate},{spread},0"))
+        self._send(sealed(f"I1,springmass-rangefinder,{self._version},{name},{rate},{gate},{spread},0"))
 
     def _send(self, data: bytes) -> None:
         with contextlib.suppress(BlockingIOError):  # nobody reads: lost, as on any line

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from storage.run_file.reading import open_run
+from tests.cli.conftest import BENCH
 from tests.screen import OnTerminal
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are POSIX's")
@@ -52,20 +53,10 @@ def test_a_poor_terminal_gets_ascii(data: Path, tmp_path: Path, environment: dic
     assert "51.01 +- 0.28 mm" in terminal.screen.text
 
 
-SCENE = """
-[bob]
-mass_kg = 0.05
-[spring]
-constant_n_per_m = 14.0
-[start]
-displacement_m = 0.05
-"""
-
-
 @pytest.mark.parametrize("columns", [80, pytest.param(50, marks=pytest.mark.trials)])
 def test_a_recording_stays_in_its_lines_and_takes_marks(tmp_path: Path, columns: int) -> None:
     """Progress and keys are rewritten in place; space marks immediately, a word with Enter, Ctrl-C stops."""
-    (tmp_path / "bench.toml").write_text(SCENE)
+    (tmp_path / "bench.toml").write_text(BENCH)
     with OnTerminal(["record", "--simulate", "--scene", "bench.toml", "-o", "run.h5"], tmp_path, columns) as terminal:
         terminal.until("space marks, Ctrl-C stops")
         terminal.type(" ")

@@ -14,7 +14,7 @@ import pytest
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import SensorError
 from springmass.testing import check
-from tests.encoders import ENCODERS
+from tests.encoders import ENCODERS, frames
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,9 @@ class Case:
 
 
 hexed = bytes.fromhex
+NO_FFHLS = (hexed("ff0000ff"), hexed("fffffdfb"), hexed("fffffefc"))
+COLUMNS = {"unit": "mm", "column": 2, "separator": ";", "sequence": 0, "time": 1, "temperature": 3}
+NAMES = {"unit": "in", "column": "d", "time": "t", "time_unit": "ms"}
 
 CASES = [
     Case("line-protocol", 343 * 0.25e-6 / 2, "detected", no_target=(b"$R1,2,1020001,,2130,N*AAE6\n",)),
@@ -39,13 +42,7 @@ CASES = [
     Case("maxbotix-xl-long", 0.01, "unseen", known={b"R0123\r": 1.23}, no_target=(b"R1068\r",)),
     Case("maxbotix-hr", 0.001, "unseen", known={b"R1234 \r": 1.234, b"R0300\r": 0.3}, no_target=(b"R5000\r",)),
     Case("maxbotix-wr", 0.001, "unseen", known={b"R1234\r": 1.234}, no_target=(b"R4999\r", b"R9999\r")),
-    Case(
-        "ffhls",
-        0.001,
-        "detected",
-        known={hexed("ff07a1a7"): 1.953},
-        no_target=(hexed("ff0000ff"), hexed("fffffdfb"), hexed("fffffefc")),
-    ),
+    Case("ffhls", 0.001, "detected", known={hexed("ff07a1a7"): 1.953}, no_target=NO_FFHLS),
     Case("us100", 0.001, "unseen", known={hexed("07a1"): 1.953}, no_target=(hexed("0000"), hexed("ffff"))),
     Case("urm37", 0.01, "detected", known={hexed("220123 46"): 2.91}, no_target=(hexed("22ffff20"),)),
     Case(
@@ -53,20 +50,8 @@ CASES = [
     ),
     Case("text-lines", 1e-6, "unseen", known={b"123.4\n": 1.234}, no_target=(b"0\r\n", b"-1\n")),
     Case("text-lines", 1e-6, "unseen", {"unit": "us"}, no_target=(b"0\n", b"38000\n")),
-    Case(
-        "text-lines",
-        1e-6,
-        "unseen",
-        {"unit": "mm", "column": 2, "separator": ";", "sequence": 0, "time": 1, "temperature": 3},
-        known={b"7;70000;253;21.5\r\n": 0.253},
-    ),
-    Case(
-        "text-lines",
-        1e-6,
-        "unseen",
-        {"unit": "in", "column": "d", "time": "t", "time_unit": "ms"},
-        known={b"t=70 d=10\n": 0.254, b"t: 70, d: 10 in\n": 0.254},
-    ),
+    Case("text-lines", 1e-6, "unseen", COLUMNS, known={b"7;70000;253;21.5\r\n": 0.253}),
+    Case("text-lines", 1e-6, "unseen", NAMES, known={b"t=70 d=10\n": 0.254, b"t: 70, d: 10 in\n": 0.254}),
 ]
 
 
@@ -114,11 +99,7 @@ def test_polled_temperatures_of_old_logs_are_no_distances(name: str) -> None:
 def test_out_of_step_the_us100_gives_no_distance_and_finds_back() -> None:
     """A surplus byte shifts every reply; two impossible distances in a row give it away."""
     sent = 0.300 + 0.001 * np.arange(20)
-    encode = ENCODERS["us100"]().encode
-    data = b"".join(
-        encode(sequence=0, device_us=0, echo_us=math.nan, distance_m=at, temperature_c=20.0) for at in sent.tolist()
-    )
     decoder = get_family("us100").decoder()
-    found = decoder.feed(0, b"\x99" + data).distance_m
+    found = decoder.feed(0, b"\x99" + b"".join(frames("us100", sent.tolist()))).distance_m
     assert decoder.faults["resynchronised"] == 1
     np.testing.assert_allclose(found, [math.nan, math.nan, *sent[1:]], atol=1e-9)

@@ -117,26 +117,9 @@ def test_h5py_finds_texts_dimensions_and_plain_filters(path: Path) -> None:
             packed = (None, False) if name in ("distance", "velocity") else ("gzip", True)
             assert (array.compression, array.shuffle, array.fletcher32) == (*packed, True)
             assert "scale_factor" not in array.attrs
-        flags = dict(
-            zip(
-                signal["quality"].attrs["flag_meanings"].decode().split(),
-                signal["quality"].attrs["flag_masks"],
-                strict=True,
-            )
-        )
+        quality = signal["quality"].attrs
+        flags = dict(zip(quality["flag_meanings"].decode().split(), quality["flag_masks"], strict=True))
         assert flags == {str(flag.name).lower(): flag.value for flag in Flag}
-
-
-def test_netcdf_reads_it(path: Path) -> None:
-    """netCDF's own library sees variables on a dimension, with missing samples masked."""
-    netcdf = pytest.importorskip("netCDF4")
-    with open_run(path) as run:
-        distance = run.samples().distance
-    with netcdf.Dataset(path) as file:
-        result = file["entry/signal/distance"]
-        assert result.dimensions == ("time",)
-        np.testing.assert_array_equal(np.ma.filled(result[:], np.nan), distance)
-        assert file["entry/instrument/kind"][...] == file.kind
 
 
 @pytest.mark.parametrize("full", [True, False])

@@ -79,18 +79,6 @@ def test_damaged_distances_cost_precision_not_truth(tier: str, y: F8) -> None:
 
 
 @pytest.mark.parametrize("tier", TIERS)
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_time_that_is_none_is_flagged(tier: str, value: float) -> None:
-    """One time that is no number or infinite leaves the estimates as they are and is counted."""
-    t = T.copy()
-    t[500] = value
-    found = outcome(t, swing(), tier)
-    assert isinstance(found, Analysis), found
-    assert is_right(found)
-    assert found.quality["used"] < T.size
-
-
-@pytest.mark.parametrize("tier", TIERS)
 def test_unsorted_times_are_refused(tier: str) -> None:
     """Rows in random order, backwards, all at one time."""
     order = np.random.default_rng(1).permutation(T.size)

@@ -14,7 +14,7 @@ from acquisition.block import Flag
 from acquisition.decoders.registry import families, get_family
 from acquisition.errors import SensorError
 from acquisition.live.decoding import SensorChain
-from tests.encoders import ENCODERS, sealed
+from tests.encoders import frames, sealed
 from tests.sampling import sampled
 
 LAST = 2**32 - 1
@@ -48,12 +48,7 @@ WIRES: dict[str, tuple[str, dict[str, Any], bytes]] = {
     f"{family.name} by its encoder": (
         family.name,
         {},
-        b"".join(
-            ENCODERS[family.name]().encode(
-                sequence=i, device_us=i * 10_000, echo_us=1000.0, distance_m=distance, temperature_c=20.0
-            )
-            for i, distance in enumerate((0.3, float("nan"), 0.0, 1e-9, 5.0, 9.0) * 30)
-        ),
+        b"".join(frames(family.name, (0.3, float("nan"), 0.0, 1e-9, 5.0, 9.0) * 30)),
     )
     for family in families()
 }

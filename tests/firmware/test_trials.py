@@ -29,6 +29,7 @@ def test_two_minutes_at_100_hz(emulate: Emulate) -> None:
     assert set(statuses(run)) == {"E"}
     demand_true_echoes(run)
     assert np.abs(np.diff(run.pings.up) - 160_000).max() <= 16
+    assert 10 * 16 <= (run.pings.down - run.pings.up).min() <= (run.pings.down - run.pings.up).max() <= 50 * 16
     _, block = run.through_host(1)
     estimates = analyse(Track.from_arrays(block.t, block.distance)).estimates
     assert abs(estimates["period"].value - PERIOD_S) <= 3.0 * estimates["period"].u

@@ -28,12 +28,6 @@ SEEN = "() => samples.length && samples[0].count > {count}"
 MOVES = "() => motion && motion.estimates && motion.estimates.period"
 FITTED = f"{MOVES} && motion.estimates.period.u"
 PHASE = "() => bench().phase === '{phase}'"
-# The page itself records what it shows only briefly, because a busy computer may look too late.
-STAGES = """() => {
-  const stage = document.getElementById('stage');
-  window.stages = [];
-  new MutationObserver(() => stages.push(stage.textContent)).observe(stage, { childList: true, characterData: true });
-}"""
 
 
 def opened(context: BrowserContext, address: str, until: str) -> Page:

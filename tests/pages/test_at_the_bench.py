@@ -18,7 +18,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from storage.run_file.reading import open_run
-from tests.pages.bench import LIMIT_S, MOVES, PHASE, SEEN, STAGES, Client, answer, opened, press
+from tests.pages.bench import LIMIT_S, MOVES, PHASE, SEEN, Client, answer, opened, press
 
 LOST_ONCE = """() => {
   const trouble = document.getElementById('trouble');
@@ -32,33 +32,6 @@ def bench(record: Callable[..., Any], context: BrowserContext) -> tuple[Any, Pag
     """Return a bench that is ready, and its page."""
     program = record("--ready")
     return program, opened(context, program.address, PHASE.format(phase="ready"))
-
-
-@pytest.mark.trials
-def test_the_trigger_keeps_what_came_before(bench: tuple[Any, Page]) -> None:
-    """Zeroed and armed on the page, the run begins by itself, with the seconds from before its moment."""
-    program, page = bench
-    press(page, "z")
-    page.wait_for_function("() => bench().phase === 'ready' && bench().rest_m")
-    page.evaluate(STAGES)
-    press(page, "t")
-    answer(page, "10", "1.5")
-    page.wait_for_function(PHASE.format(phase="recording"))
-    assert "ARMED: 10 mm, 1.5 s kept" in page.evaluate("stages")
-    page.wait_for_function(SEEN.format(count=300))
-    program.end()
-    with open_run(program.out) as run:
-        samples = run.samples()
-        (event,) = [event for event in run.provenance["events"] if event["kind"] == "trigger"]
-    assert event["facts"] == {"threshold_m": 0.01, "keep_s": 1.5}
-    moved = np.abs(samples.distance - np.median(samples.distance[:50])) > 0.01
-    # By the stamps of the samples, which decide what is kept: a busy computer reads samples late, several at a time,
-    # and gives them one stamp.
-    stamps_s = (samples.host_ns - event["mono_ns"]) * 1e-9
-    first = int(moved.argmax())
-    assert np.abs(stamps_s[first - 1 : first + 2]).min() < 1e-6
-    steps_s = np.diff(stamps_s[: moved.argmax()])
-    assert -1.5 <= stamps_s[0] <= -1.5 + 0.03 + steps_s.max()
 
 
 @pytest.mark.trials

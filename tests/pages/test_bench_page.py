@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from pathlib import Path
 from typing import Any
 
@@ -142,5 +141,3 @@ def test_everybody_can_read_it(replay: Page, width: int, scheme: Any) -> None:
     found = Axe().run(replay)
     assert found.violations_count == 0, found.generate_report()
     assert replay.evaluate("document.documentElement.scrollWidth") <= width
-    if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
-        replay.screenshot(path=Path(folder) / f"bench-page-{width}-{scheme}.png", full_page=True)

@@ -1,14 +1,9 @@
-"""A technician's session: zero, trigger, marks, reload, report, and the same run again.
-
-With ``SPRINGMASS_SCREENSHOTS`` naming a folder, every step leaves pictures there, in three widths, light and dark.
-"""
+"""A technician's session: zero, trigger, marks, reload, report, and the same run again."""
 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -47,8 +42,6 @@ def look_at(page: Page, step: str) -> None:
                 ".map((e, i) => i ? e.getBoundingClientRect().top : e.getBoundingClientRect().bottom)"
             )
             assert ends <= begins + 0.5
-            if folder := os.environ.get("SPRINGMASS_SCREENSHOTS"):
-                page.screenshot(path=Path(folder) / f"{step}-{width}-{scheme}.png")
     page.emulate_media(color_scheme="light")
     assert before is not None
     page.set_viewport_size(before)
@@ -112,6 +105,7 @@ def test_a_session_from_the_first_minute_to_the_report(
     assert {name: shown[name] for name in stated} == stated
     with open_run(program.out) as run:
         assert marks == [[mark["t_s"], mark["text"]] for mark in run.provenance["marks"]]
+        assert {"threshold_m": 0.01, "keep_s": 1.5} in [event["facts"] for event in run.provenance["events"]]
 
     again = start("page", str(program.out))
     page = opened(context, again.address, WHOLE)

@@ -20,7 +20,8 @@ from hypothesis import strategies as st
 from acquisition.decoders.registry import describe_bytes, families, probe
 from acquisition.decoders.sensor import Sensor
 from acquisition.readings import Reading
-from tests.encoders import ENCODERS, crc16
+from tests.encoders import crc16, frames
+from tests.properties.test_formats_fuzz import spoil
 
 FAMILIES = {family.name: family for family in families()}
 MOST_PENDING = 512
@@ -82,16 +83,7 @@ ORACLES: dict[str, Callable[[bytes], set[float]]] = {
 def own_stream(family: Sensor, seed: int, n: int = 12) -> list[bytes]:
     """Return frames as the simulated sensor sends them."""
     rng = random.Random(seed)
-    encoder = ENCODERS[family.name]()
-    frames = []
-    for i in range(n):
-        distance = math.nan if rng.random() < 0.2 else rng.uniform(0.3, 1.6)
-        frames.append(
-            encoder.encode(
-                sequence=i, device_us=i * 10_000, echo_us=distance / 171.5e-6, distance_m=distance, temperature_c=21.0
-            )
-        )
-    return frames
+    return frames(family.name, [math.nan if rng.random() < 0.2 else rng.uniform(0.3, 1.6) for _ in range(n)])
 
 
 def decode(family: Sensor, data: bytes, cuts: Iterable[int] = ()) -> list[Reading]:
@@ -141,35 +133,13 @@ def test_bytes_give_no_distance_without_a_frame(name: str, data: bytes, cuts: li
     assert whole == content(check(name, data, range(1, len(data))))
 
 
-@st.composite
-def spoils(draw: st.DrawFn) -> list[tuple[str, float, bytes]]:
-    """Draw faults of the line: what is done, where (as a share of the stream), and with what."""
-    kinds = st.sampled_from(["flip", "drop", "insert", "repeat", "cut"])
-    return draw(
-        st.lists(st.tuples(kinds, st.floats(0, 1, exclude_max=True), st.binary(min_size=1, max_size=9)), max_size=8)
-    )
-
-
-def spoil(stream: bytes, faults: Iterable[tuple[str, float, bytes]]) -> bytes:
-    """Do the faults to the stream."""
-    data = bytearray(stream)
-    for kind, where, what in faults:
-        at = int(where * len(data))
-        if kind == "insert" or not data:
-            data[at:at] = what
-        elif kind == "flip":
-            data[at] ^= 1 << what[0] % 8
-        elif kind == "drop":
-            del data[at]
-        elif kind == "repeat":
-            data[at:at] = data[at : at + len(what) * 3]
-        else:
-            del data[at : at + len(what) * 3]
-    return bytes(data)
+KIND = st.sampled_from(["flip", "drop", "insert", "repeat", "cut"])
+FAULTS = st.lists(st.tuples(KIND, st.floats(0, 1, exclude_max=True), st.binary(min_size=1, max_size=9)), max_size=8)
+"""Faults of the line: what is done, where (as a share of the stream), and with what."""
 
 
 @every_family
-@given(seed=st.integers(0, 99), faults=spoils(), cuts=st.lists(st.floats(0, 1), max_size=6))
+@given(seed=st.integers(0, 99), faults=FAULTS, cuts=st.lists(st.floats(0, 1), max_size=6))
 def test_its_own_stream_spoiled_is_back_in_step_within_two_frames(
     name: str, seed: int, faults: list[tuple[str, float, bytes]], cuts: list[float]
 ) -> None:

@@ -44,11 +44,6 @@ def switching(rng: np.random.Generator, t: F8) -> F8:
     return np.asarray(rng.uniform(1, 5) * (np.searchsorted(turns, t) % 2) + rng.normal(0, 0.01, t.size))
 
 
-def walk(rng: np.random.Generator, t: F8) -> F8:
-    """Return a random walk."""
-    return np.asarray(np.cumsum(rng.normal(0, 1, t.size)))
-
-
 def remembering(rng: np.random.Generator, t: F8) -> F8:
     """Return noise whose power falls with the frequency."""
     spectrum = rng.normal(size=t.size) + 1j * rng.normal(size=t.size)
@@ -69,7 +64,7 @@ def double_pendulum(rng: np.random.Generator, t: F8) -> F8:
     return np.asarray(turned + rng.normal(0, 0.005, t.size))
 
 
-KINDS = (ride, fall, switching, walk, remembering, double_pendulum)
+KINDS = (ride, fall, switching, remembering, double_pendulum)
 
 
 @pytest.mark.trials

@@ -133,17 +133,3 @@ def test_disc_drag_falls_with_amplitude() -> None:
     assert float(np.interp(0.015, curve.x, curve.y)) == pytest.approx(7.8, abs=1.5)
     law = np.interp(curve.x_points, curve.x, curve.y)
     assert np.mean(np.abs(curve.y_points - law) < 2 * curve.u_points) > 0.8
-
-
-def test_large_disc_rejects_constant_coefficients() -> None:
-    """At 71 mm every law is rejected, that of both drags by its misfit."""
-    damping = motion_of(analysed_capstone()).damping
-    assert damping.admissible == ()
-    mixed = damping.fits["linear+quadratic"]
-    assert 50.0 < mixed.reduced_chi2 < 200.0
-    assert 0.009 < mixed.joint["gamma"].value < 0.013
-    assert 0.44 < mixed.joint["beta"].value < 0.60
-    assert damping.fits["power"].joint["n"].value == pytest.approx(1.54, abs=0.05)
-    findings = {finding.code: finding.severity for finding in analysed_capstone().findings}
-    assert "error" not in findings.values()
-    assert "no_law_fits" in findings

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shlex
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +11,8 @@ import pytest
 from acquisition.errors import FormatError, NeedsAnswer
 from acquisition.recordings.identify import open_recording
 from acquisition.recordings.questions import Missing
-from pipeline.analyse import analyse
+from pipeline.analyse import Analysis, analyse
 from pipeline.track import UNUSABLE
-from springmass.cli import main
 from springmass.loading.track import to_track
 from tests.sampling import sampled
 
@@ -49,15 +46,6 @@ OSCILLATE = [
     ("trk__", {"channel": "x"}),
     ("xyerr", {"unit": "m"}),
 ]
-BEAT = [
-    ("anglelog", {"channel": "Angle1", "unit": "rad"}),
-    ("csvnames", {"unit": "V"}),
-    ("torsione", {"channel": "Pendolo", "unit": "rad"}),
-    ("waveforms", {}),
-    ("xy_", {"unit": "m"}),
-]
-"""Those whose one sinusoid of the whole record says little: set going, held or driven for a while."""
-MOVE = ("phyphoxfile", "ecp", *dict.fromkeys(start for start, _ in (*OSCILLATE, *BEAT)))
 
 
 def only(recordings: Path, start: str) -> Path:
@@ -75,7 +63,7 @@ def test_a_workbook_of_results_is_no_recording(recordings: Path) -> None:
     assert caught.value.question.missing == (Missing.CHANNEL, Missing.UNIT)
 
 
-def analysed(path: Path, given: dict[str, Any]) -> tuple[Any, np.ndarray, np.ndarray]:
+def analysed(path: Path, given: Given) -> tuple[Analysis, np.ndarray, np.ndarray]:
     """Return the analysis, and the times and values that it used."""
     recording = open_recording(path, **given)
     found = analyse(to_track(recording.samples, recording.info))
@@ -121,35 +109,6 @@ def test_what_oscillates_has_the_period_of_an_independent_fit(recordings: Path, 
     assert period.u < 5e-3 * period.value
 
 
-def crossing_period(t: np.ndarray, y: np.ndarray, near: float) -> float:
-    """Return the period by scipy's filter alone: the median slope of the times at which the signal rises through zero.
-
-    ``near`` says which band is passed, from half its frequency to 1.6 times, and how many turns lie between.
-    """
-    from scipy.signal import butter, detrend, sosfiltfilt
-    from scipy.stats import theilslopes
-
-    known = np.isfinite(t) & np.isfinite(y)
-    t, y = t[known], y[known]
-    step = float(np.median(np.diff(t)))
-    grid = np.arange(t[0], t[-1], step)
-    band = butter(2, np.array([0.5, 1.6]) * 2.0 * step / near, "band", output="sos")
-    passed = sosfiltfilt(band, detrend(np.interp(grid, t, y)))
-    at = np.flatnonzero((passed[:-1] < 0.0) & (passed[1:] >= 0.0))
-    crossed = grid[at] - passed[at] * step / (passed[at + 1] - passed[at])
-    return float(theilslopes(crossed, np.round((crossed - crossed[0]) / near))[0])
-
-
-@pytest.mark.parametrize(("start", "given"), sampled(BEAT, 3))
-def test_what_oscillates_unevenly_has_the_period_of_its_crossings(recordings: Path, start: str, given: Given) -> None:
-    """Within three standard uncertainties and 0.02 %; what was read in volts, as no bob oscillates at the mains'."""
-    found, t, y = analysed(only(recordings, start), given)
-    period = found.estimates["period"]
-    expected = crossing_period(t, y, period.value)
-    assert abs(period.value - expected) < 3.0 * period.u + 2e-4 * expected
-    assert period.u < 1.5e-2 * period.value
-
-
 def test_of_two_strokes_the_last_gives_the_period(recordings: Path) -> None:
     """A carriage is driven forth and back and swings after each; its crossings of the last rest say the period."""
     found, t, y = analysed(only(recordings, "ecp"), {"channel": "Encoder 1 Pos", "unit": "mm"})
@@ -159,18 +118,3 @@ def test_of_two_strokes_the_last_gives_the_period(recordings: Path) -> None:
     period = found.estimates["period"]
     assert abs(period.value - 2.0 * float(np.mean(np.diff(crossed)))) < 2.0 * period.u
     assert {"handled", "short_record"} <= {each.code for each in found.findings}
-
-
-@pytest.mark.parametrize("start", sampled(MOVE, 5))
-def test_who_types_what_the_message_says_gets_a_period(
-    recordings: Path, start: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Two commands at most: the plain one, and the one that its question ends in."""
-    code = main(["analyse", str(only(recordings, start)), "--json"])
-    said = capsys.readouterr()
-    if code == 3:
-        _, *words = shlex.split(said.err[said.err.index("? springmass ") + 2 :])
-        code = main(words)
-        said = capsys.readouterr()
-    assert code == 0
-    assert "period" in json.loads(said.out.splitlines()[0])["estimates"]

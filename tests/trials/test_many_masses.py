@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from pipeline.analyse import Oscillation, analyse
 from pipeline.bench.scene import Scene
@@ -18,15 +17,10 @@ from pipeline.options import options_for
 from pipeline.results.compare import SpringRun, compare_springs
 from pipeline.results.masses import mass_line
 from pipeline.track import Track
+from tests.unit.pipeline.results.test_compare import oscillating
 
 U_BOB_KG = 2e-5
 LOADS = np.array([0.6, 0.8, 1.0, 1.2, 1.4])  # of five, in masses of the middle one; the spring weighs a tenth of it
-
-
-def omega_of(k: float, spring_kg: float, load_kg: float) -> float:
-    """Angular frequency of a load on a uniform spring, from cot x = x m/m_s, rad/s."""
-    x = brentq(lambda x: math.cos(x) * spring_kg - x * load_kg * math.sin(x), 1e-9, math.pi / 2, xtol=1e-15)
-    return x * math.sqrt(k / spring_kg)
 
 
 def run_of(
@@ -34,7 +28,8 @@ def run_of(
 ) -> SpringRun:
     """One record of a minute, analysed with the mass that was typed."""
     t = np.arange(6000) / 100.0
-    y = 0.3 + 0.04 * np.exp(-0.008 * t) * np.cos(omega_of(k, spring_kg, load_kg) * t + rng.uniform(-3, 3))
+    omega = math.sqrt(k / oscillating(spring_kg, load_kg))
+    y = 0.3 + 0.04 * np.exp(-0.008 * t) * np.cos(omega * t + rng.uniform(-3, 3))
     scene = Scene(bob_mass_kg=Estimate(typed_kg, U_BOB_KG, "kg"))
     motion = analyse(Track.from_arrays(t, y + rng.normal(0, 3e-4, t.size)), scene, options_for("standard")).motion
     assert isinstance(motion, Oscillation)

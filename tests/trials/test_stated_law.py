@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -71,35 +70,6 @@ def bound(law: str, seconds: float, noise_m: float) -> float:
     return noise_m * math.sqrt(by / size @ np.linalg.solve(information, by / size))
 
 
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """What was found of one law, length and noise."""
-
-    law: str
-    stated: bool
-    seconds: float
-    noise_m: float
-    errors: F8  # of the damping rate at the start, 1/s
-    u: F8
-    contradicted: int  # recordings of which a warning said that they contradict the law
-
-    @property
-    def covered(self) -> float:
-        """The share of 95 % intervals that hold the truth."""
-        return float(np.mean(np.abs(self.errors) <= 1.959964 * self.u))
-
-    @property
-    def width(self) -> float:
-        """The median u over the bound of the law."""
-        return float(np.median(self.u)) / bound(self.law, self.seconds, self.noise_m)
-
-    def row(self) -> str:
-        """Return a line of the table."""
-        how = "stated" if self.stated else "not stated"
-        numbers = f"{self.covered:.1%} | {self.width:.2f} | {self.contradicted}"
-        return f"| {self.law}, {how} | {self.seconds:g} s, {self.noise_m * 1e3:g} mm | {numbers} |"
-
-
 def one_record(law: str, stated: bool, seconds: float, noise_m: float, seed: int) -> tuple[float, float, bool]:
     """Return error and u of the damping rate of one recording, and whether a warning contradicts the law."""
     analysis = analysed(law, seconds, noise_m, seed, stated=law if stated else None, salt=44)
@@ -111,26 +81,24 @@ def one_record(law: str, stated: bool, seconds: float, noise_m: float, seed: int
     return analysis.estimates["damping_rate"].value - rate_of(AMPLITUDE_M, DRAGS[law]), u, against
 
 
-def measured(law: str, stated: bool, seconds: float, noise_m: float) -> Cell:
-    """Return one cell, of recordings by which no constant of the program was chosen."""
-    found = [one_record(law, stated, seconds, noise_m, seed) for seed in range(5000, 5000 + TRIALS)]
-    errors, u, against = zip(*found, strict=True)
-    return Cell(law, stated, seconds, noise_m, np.array(errors), np.array(u), sum(against))
-
-
 @pytest.mark.parametrize("noise_m", NOISES_M)
 @pytest.mark.parametrize("seconds", SECONDS)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("stated", [True, False])
 def test_a_stated_law_gives_the_rate_to_its_bound(stated: bool, law: str, seconds: float, noise_m: float) -> None:
     """95 % intervals cover in 93 % and more; by a stated law u is at most 1.1 of the bound, and few are charged."""
-    cell = measured(law, stated, seconds, noise_m)
-    print(cell.row())
-    doubt = 3.3 * math.sqrt(LEAST_95 * (1.0 - LEAST_95) / TRIALS)
-    assert cell.covered >= LEAST_95 - doubt, cell.row()
+    # Of these recordings no constant of the program was chosen.
+    found = [one_record(law, stated, seconds, noise_m, seed) for seed in range(5000, 5000 + TRIALS)]
+    errors, u, contradicted = np.array(found).T
+    covered = np.mean(np.abs(errors) <= 1.959964 * u)
+    width = np.median(u) / bound(law, seconds, noise_m)
+    numbers = f"{covered:.1%} | {width:.2f} | {int(contradicted.sum())}"
+    row = f"| {law}, {'stated' if stated else 'not stated'} | {seconds:g} s, {noise_m * 1e3:g} mm | {numbers} |"
+    print(row)
+    assert covered >= LEAST_95 - 3.3 * math.sqrt(LEAST_95 * (1.0 - LEAST_95) / TRIALS), row
     # The median of u scatters by what the noise of so many recordings does; more recordings leave less room.
-    assert not stated or cell.width <= MOST_WIDTH * (1.0 + 0.3 / math.sqrt(TRIALS)), cell.row()
-    assert cell.contradicted <= 0.01 * TRIALS + 3.3 * math.sqrt(0.01 * TRIALS), cell.row()
+    assert not stated or width <= MOST_WIDTH * (1.0 + 0.3 / math.sqrt(TRIALS)), row
+    assert contradicted.sum() <= 0.01 * TRIALS + 3.3 * math.sqrt(0.01 * TRIALS), row
 
 
 def test_the_bound_of_an_exponential_is_its_textbook_one() -> None:

@@ -70,17 +70,13 @@ class Record:
     text: bytes | None = None  # the file to be read instead of the arrays
 
 
-Make = Callable[[int], Record]
-"""Makes the record of a seed."""
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Kind:
     """A kind of trouble."""
 
     name: str
     cause: str
-    make: Make
+    make: Callable[[int], Record]  # of a seed
     cure: bool = False  # whether right numbers are asked for, and not only a warning
     spread: tuple[str, ...] = ()  # estimates whose u states how far something moves, by definition
     plain: bool = False  # whether it is a record without trouble, on which a warning is a false alarm
@@ -91,18 +87,25 @@ class Kind:
         return CODES[self.cause] if self.plain else CODES[self.cause] | {"model_misfit"}
 
 
+def kind(
+    name: str,
+    cause: str,
+    make: Callable[..., Record],
+    *given: Any,
+    cure: bool = False,
+    spread: tuple[str, ...] = (),
+    plain: bool = False,
+    **named: Any,
+) -> Kind:
+    """Return a kind whose records a function makes of a seed and of what else it is given."""
+    return Kind(name, cause, lambda seed: make(seed, *given, **named), cure, spread, plain)
+
+
 class Bench:
     """What a seed and a kind's name draw: a bob, where it hangs, a sensor's noise; ``bob`` says what is not drawn."""
 
     def __init__(
-        self,
-        seed: int,
-        key: str,
-        *,
-        seconds: float = 20.0,
-        rate_hz: float = 100.0,
-        sigma_m: float = 3e-4,
-        **bob: Any,
+        self, seed: int, key: str, *, seconds: float = 20.0, rate_hz: float = 100.0, sigma_m: float = 3e-4, **bob: Any
     ) -> None:
         self.rng = np.random.default_rng([seed, *key.encode()])
         drawn: dict[str, Any] = {

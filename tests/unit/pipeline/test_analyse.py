@@ -45,20 +45,15 @@ def test_agrees_with_a_waveform_fit_by_lmfit(
     other = model.fit(y, x=t, c=truth.offset, a=truth.amplitude, g=truth.gamma, w=truth.omega, p=truth.phase)
     options = replace(options_for(accuracy), laws=("linear",))
     result = analyse(Track.from_arrays(t, y), options=options)
-    motion = motion_of(result)
-    period = other.params["w"]
+    motion, params = motion_of(result), other.params
+    omega, u_omega = params["w"].value, params["w"].stderr
     pairs = {
-        "period": (
-            motion.derived.statistical["period"],
-            2 * math.pi / period.value,
-            2 * math.pi / period.value**2 * period.stderr,
-        ),
-        "amplitude": (result.estimates["amplitude"], other.params["a"].value, other.params["a"].stderr),
-        "phase": (result.estimates["phase"], other.params["p"].value, other.params["p"].stderr),
-        "offset": (result.estimates["offset"], other.params["c"].value, other.params["c"].stderr),
-        "gamma": (motion.damping.fits["linear"].joint["gamma"], other.params["g"].value, other.params["g"].stderr),
+        name: (result.estimates[name], params[x]) for name, x in (("amplitude", "a"), ("phase", "p"), ("offset", "c"))
     }
-    for name, (found, value, u) in pairs.items():
+    pairs["gamma"] = motion.damping.fits["linear"].joint["gamma"], params["g"]
+    held = {name: (found, x.value, x.stderr) for name, (found, x) in pairs.items()}
+    held["period"] = motion.derived.statistical["period"], 2 * math.pi / omega, 2 * math.pi / omega**2 * u_omega
+    for name, (found, value, u) in held.items():
         assert abs(found.value - value) <= near * u, name
         assert found.u == pytest.approx(u, rel=alike), name
 
@@ -125,14 +120,7 @@ def test_any_times_are_analysed_or_refused(data: st.DataObject) -> None:
 @example(seed=0, seconds=2.0, omega=1.0, sigma_m=0.0, gamma=0.0, step_m=0.0, holes=0.875, echoes=0.25)
 @example(seed=0, seconds=8.0, omega=8.5, sigma_m=0.0, gamma=1.0, step_m=0.0, holes=0.0, echoes=0.25)
 def test_any_oscillation_is_analysed_or_refused(
-    seed: int,
-    seconds: float,
-    omega: float,
-    sigma_m: float,
-    gamma: float,
-    step_m: float,
-    holes: float,
-    echoes: float,
+    seed: int, seconds: float, omega: float, sigma_m: float, gamma: float, step_m: float, holes: float, echoes: float
 ) -> None:
     """Short, fast, growing, dying, coarse, thinned and riddled records: an analysis or a PipelineError."""
     rng = np.random.default_rng(seed)

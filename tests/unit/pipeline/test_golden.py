@@ -18,10 +18,7 @@ from pipeline.track import Track
 
 BARE = Scene.from_mapping({"bob": {"mass_kg": {"value": 0.2007, "u": 0.00005}}})
 DISC = Scene.from_mapping(
-    {
-        "bob": {"mass_kg": {"value": 0.2176, "u": 0.00005}},
-        "disc": {"diameter_m": {"value": 0.102, "u": 0.0005}},
-    }
+    {"bob": {"mass_kg": {"value": 0.2176, "u": 0.00005}}, "disc": {"diameter_m": {"value": 0.102, "u": 0.0005}}}
 )
 
 
@@ -57,12 +54,6 @@ def test_report_inputs_give_the_golden_values(
     assert found.value == pytest.approx(value, abs=digits_value)
     assert found.u == pytest.approx(u, abs=digits_u)
     assert found.u > 0
-
-
-def test_reports_spring_constants_are_28_sigma_apart() -> None:
-    """13.979 +- 0.053 against 16.31 +- 0.064 N/m is 28 standard uncertainties for one spring."""
-    bare, disc = estimates(5.27, BARE)["spring_constant"], estimates(5.08, DISC)["spring_constant"]
-    assert (disc.value - bare.value) / math.hypot(bare.u, disc.u) == pytest.approx(28.0, abs=0.5)
 
 
 def test_exchanged_periods_agree() -> None:

@@ -40,12 +40,20 @@ def batch(t: np.ndarray, y: np.ndarray, flags: np.ndarray) -> LiveMotion:
 
 @pytest.mark.parametrize("size", [1, 999, 1001, 2500])
 def test_value_is_the_batch_analysis_of_the_same_samples(size: int) -> None:
-    """However the samples were cut into pushes, the value is the batch result of the last ten seconds, bit for bit."""
-    columns = motion(25.0)
+    """However they were cut into pushes, with samples missing, rows that never came, and false echoes: bit for bit."""
+    t, y, flags = motion(25.6)
+    missing = np.random.default_rng(4).random(t.size) < 0.05
+    y[missing], flags[missing] = np.nan, Quality.MISSING
+    y[2100:2106] += 0.005
+    flags[2060] |= Quality.GAP_BEFORE
+    columns = [np.delete(column, np.s_[2000:2060]) for column in (t, y, flags)]
     held = MotionAccumulator(RATE_HZ, 10.0)
     push(held, columns, [size] * (2500 // size))
     assert len(held) == 1000
-    assert held.value() == batch(*(column[-1000:] for column in columns))
+    live = held.value()
+    assert live == batch(*(column[-1000:] for column in columns))
+    assert isinstance(live, LiveMotion)
+    assert live.period.value == pytest.approx(2 * np.pi / 8.3, rel=1e-3)
 
 
 def test_memory_is_flat_over_an_hour() -> None:
@@ -64,46 +72,27 @@ def test_memory_is_flat_over_an_hour() -> None:
     np.testing.assert_array_equal(held.track().y, y[-1000:])
 
 
-def test_drop_outs_are_left_out_as_in_the_batch() -> None:
-    """Missing samples, rows that never came and false echoes do not keep the value from agreeing with the batch."""
-    t, y, flags = motion(14.0)
-    missing = np.random.default_rng(4).random(t.size) < 0.05
-    y[missing], flags[missing] = np.nan, Quality.MISSING
-    y[1000:1006] += 0.005
-    came = np.ones(t.size, bool)
-    came[900:960] = False
-    flags[960] |= Quality.GAP_BEFORE
-    columns = t[came], y[came], flags[came]
-    held = MotionAccumulator(RATE_HZ, 10.0)
-    push(held, columns, [11] * 100)
-    live = held.value()
-    assert live == batch(*(column[-1000:] for column in columns))
-    assert isinstance(live, LiveMotion)
-    assert live.period.value == pytest.approx(2 * np.pi / 8.3, rel=1e-3)
-
-
 NOTHING = np.full(1000, np.nan)
 QUIET = 0.25 + 1e-4 * np.random.default_rng(5).standard_normal(1000)
 
 
-@pytest.mark.parametrize(
-    ("y", "flags"),
-    [
-        (NOTHING[:15], 0),
-        (NOTHING[:0], 0),
-        (NOTHING, int(Quality.MISSING)),
-        (QUIET, 0),
-        (np.full(1000, 0.25), 0),
-        (np.linspace(0.2, 0.4, 1000), 0),
-        (np.where(np.arange(1000) == 500, 0.3, np.nan), 0),
-        (np.where(np.arange(1000) < 990, 0.25, 0.3), 0),
-    ],
-    ids=["fifteen", "none", "all-missing", "still", "constant", "ramp", "one", "step"],
-)
-def test_it_says_why_there_is_no_value_yet(y: np.ndarray, flags: int) -> None:
+NOT_YET = {
+    "fifteen": NOTHING[:15],
+    "none": NOTHING[:0],
+    "all-missing": NOTHING,
+    "still": QUIET,
+    "constant": np.full(1000, 0.25),
+    "ramp": np.linspace(0.2, 0.4, 1000),
+    "one": np.where(np.arange(1000) == 500, 0.3, np.nan),
+    "step": np.where(np.arange(1000) < 990, 0.25, 0.3),
+}
+
+
+@pytest.mark.parametrize("name", NOT_YET)
+def test_it_says_why_there_is_no_value_yet(name: str) -> None:
     """Too few samples, no target or a bob at rest give one sentence, no exception and no number."""
-    held = MotionAccumulator(RATE_HZ)
-    held.push(np.arange(y.size) / RATE_HZ, y, np.full(y.size, flags, np.uint8))
+    held, y = MotionAccumulator(RATE_HZ), NOT_YET[name]
+    held.push(np.arange(y.size) / RATE_HZ, y, np.where(np.isnan(y), Quality.MISSING, 0).astype(np.uint8))
     answer = held.value()
     assert isinstance(answer, NotYet)
     assert answer.why

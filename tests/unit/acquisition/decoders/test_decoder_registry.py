@@ -12,16 +12,11 @@ from acquisition.decoders.registry import describe_bytes, families, get_family, 
 from acquisition.decoders.sensor import Sensor
 from acquisition.errors import SensorError
 from acquisition.live.decoding import SensorChain
-from tests.encoders import ENCODERS
+from tests.encoders import frames
 
-LOOK_ALIKE = {
-    "maxbotix-lv": {"maxbotix-lv", "maxbotix-lv-p", "maxbotix-xl"},
-    "maxbotix-lv-p": {"maxbotix-lv", "maxbotix-lv-p", "maxbotix-xl"},
-    "maxbotix-xl": {"maxbotix-lv", "maxbotix-lv-p", "maxbotix-xl"},
-    "maxbotix-xl-long": {"maxbotix-xl-long", "maxbotix-hr", "maxbotix-wr"},
-    "maxbotix-hr": {"maxbotix-xl-long", "maxbotix-hr", "maxbotix-wr"},
-    "maxbotix-wr": {"maxbotix-xl-long", "maxbotix-hr", "maxbotix-wr"},
-}
+THREE_DIGITS = {"maxbotix-lv", "maxbotix-lv-p", "maxbotix-xl"}
+FOUR_DIGITS = {"maxbotix-xl-long", "maxbotix-hr", "maxbotix-wr"}
+LOOK_ALIKE = {name: names for names in (THREE_DIGITS, FOUR_DIGITS) for name in names}
 """Families that differ in the unit alone, which no byte shows."""
 
 every_family = pytest.mark.parametrize("family", families(), ids=lambda family: family.name)
@@ -29,12 +24,7 @@ every_family = pytest.mark.parametrize("family", families(), ids=lambda family: 
 
 def stream(family: Sensor, n: int = 20) -> bytes:
     """Return frames of a bob that swings."""
-    encoder = ENCODERS[family.name]()
-    distances = [0.7 + 0.2 * math.sin(0.3 * i) for i in range(n)]
-    return b"".join(
-        encoder.encode(sequence=i, device_us=i * 10_000, echo_us=d / 171.5e-6, distance_m=d, temperature_c=21.0)
-        for i, d in enumerate(distances)
-    )
+    return b"".join(frames(family.name, [0.7 + 0.2 * math.sin(0.3 * i) for i in range(n)]))
 
 
 @every_family
@@ -93,10 +83,7 @@ def test_a_line_without_a_number_where_one_belongs_is_a_fault(options: dict[str,
 def test_a_steady_distance_full_of_headers_does_not_hold_ffhls_out_of_step(mm: int, start: int) -> None:
     """FF 01 FF FF for ever has the right sum one byte early too, as 65 m."""
     decoder = get_family("ffhls").decoder()
-    frame = ENCODERS["ffhls"]().encode(
-        sequence=0, device_us=0, echo_us=math.nan, distance_m=mm / 1000, temperature_c=20.0
-    )
-    readings = decoder.feed(0, (frame * 20)[start:])
+    readings = decoder.feed(0, b"".join(frames("ffhls", [mm / 1000] * 20))[start:])
     assert len(readings) >= 18
     np.testing.assert_allclose(readings.distance_m[-18:], mm / 1000)
 

@@ -95,21 +95,11 @@ def test_what_the_device_says_of_readings_without_an_echo_is_counted() -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [
-        {"sequence": "4294967296"},
-        {"sequence": "-1"},
-        {"echo": "2040"},
-        {"echo": "-2040.75"},
-        {"celsius": "21.3"},
-        {"status": "e"},
-        {"status": "E,1"},
-        {"tag": "R2"},
-    ],
-    ids=str,
+    ["sequence=4294967296", "sequence=-1", "echo=20", "echo=-1.00", "celsius=2.1", "status=e", "status=E,1", "tag=R2"],
 )
-def test_a_sound_checksum_over_a_wrong_field_is_no_reading(change: dict[str, str]) -> None:
+def test_a_sound_checksum_over_a_wrong_field_is_no_reading(change: str) -> None:
     """It may be a later version's; it is counted and not guessed at."""
-    rows, faults = decode(frame(body_of(**change)))
+    rows, faults = decode(frame(body_of(**dict([change.split("=")]))))
     assert rows == []
     assert faults.pop("unknown_record") == 1
     assert set(faults) == {"garbage_bytes"}

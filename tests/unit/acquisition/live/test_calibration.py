@@ -17,14 +17,6 @@ def still(rest_m: float, noise_m: float = 1e-4, seed: int = 1, n: int = 300) -> 
     return from_still(rest_m + noise_m * np.random.default_rng(seed).standard_normal(n))
 
 
-def one_line(error: pytest.ExceptionInfo[CalibrationError]) -> str:
-    """Return the text of an error, which is one line."""
-    text = str(error.value)
-    assert text
-    assert "\n" not in text
-    return text
-
-
 def test_a_still_bob_gives_rest_and_noise_with_an_honest_uncertainty() -> None:
     """Over 200 seeds the rest's error has the size that u states, and the noise is right."""
     points = [still(0.3, 2e-4, seed) for seed in range(200)]
@@ -50,9 +42,8 @@ def test_a_moving_bob_is_refused(amplitude_m: float) -> None:
     """A swing of 3 mm is seen beside noise of 0.1 mm."""
     t = np.arange(300) / 100
     moving = 0.3 + amplitude_m * np.sin(7.9 * t) + 1e-4 * np.random.default_rng(3).standard_normal(300)
-    with pytest.raises(CalibrationError, match="the bob moves") as error:
+    with pytest.raises(CalibrationError, match=r"^[^\n]*the bob moves[^\n]*hangs still[^\n]*$"):
         from_still(moving)
-    assert "hangs still" in one_line(error)
 
 
 def test_the_rulers_uncertainty_covers() -> None:
@@ -88,9 +79,8 @@ def test_distances_close_together_give_no_scale() -> None:
 def test_a_wrong_unit_is_refused() -> None:
     """A ruler read in inches asks for a scale that no sensor has."""
     points = (StillPoint(0.2, 1e-4, 1e-3, 300), StillPoint(0.6, 1e-4, 1e-3, 300))
-    with pytest.raises(CalibrationError, match="check the unit") as error:
+    with pytest.raises(CalibrationError, match=r"^[^\n]*check the unit[^\n]*$"):
         against_ruler(points, (0.2 / 0.0254, 0.6 / 0.0254), 1e-3)
-    one_line(error)
 
 
 @pytest.mark.parametrize(
@@ -108,6 +98,5 @@ def test_a_wrong_unit_is_refused() -> None:
 )
 def test_numbers_that_calibrate_nothing_are_refused_in_one_line(numbers: dict[str, Any]) -> None:
     """Values out of range, of no number and unknown names are a CalibrationError."""
-    with pytest.raises(CalibrationError) as error:
+    with pytest.raises(CalibrationError, match=r"^[^\n]+$"):
         Calibration.from_mapping(numbers)
-    one_line(error)

@@ -66,15 +66,6 @@ def test_two_wraps_within_one_silence_are_counted() -> None:
     assert base.restarts == 0
 
 
-def test_a_counter_alone_is_time_over_the_rate() -> None:
-    """Without a device clock the counter over the nominal rate is the time, however late the host's stamps."""
-    late = 5 * SECOND_NS + np.arange(50) * SECOND_NS // 100 + np.random.default_rng(1).integers(0, 10**8, 50)
-    t, flags, base = pushed(readings(sequence=1000 + np.arange(50), host_ns=late))
-    np.testing.assert_allclose(t, np.arange(50) / RATE_HZ, atol=1e-15)
-    assert not flags.any()
-    assert base.clock == "device"
-
-
 def test_host_stamps_alone_are_the_time() -> None:
     """With neither clock nor counter the stamps count; a late one is no gap, a quarter second of silence is."""
     host = 7 * SECOND_NS + np.arange(20) * SECOND_NS // 100

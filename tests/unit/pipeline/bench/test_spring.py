@@ -16,11 +16,6 @@ def test_mass_fulfils_the_wave_equations_condition(ratio: float) -> None:
     assert math.atan2(ratio, x) == pytest.approx(x, rel=1e-12)
 
 
-def test_heavy_spring_alone_swings_as_a_quarter_wave() -> None:
-    """Without a load to speak of, M is 4/pi^2 of the spring."""
-    assert oscillating_mass_kg(1.0, 1e-12) == pytest.approx(4.0 / math.pi**2, rel=1e-9)
-
-
 def test_an_unweighed_spring_is_uncertain_by_a_share_of_the_bob() -> None:
     """0 to 0.3 of the bob, uncorrected: its root mean square."""
     assert unstated_spring_kg(0.2).u == pytest.approx(0.06 / math.sqrt(3.0))

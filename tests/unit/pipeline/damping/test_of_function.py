@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -16,24 +15,14 @@ from pipeline.damping.laws.of_function import FunctionLaw, make_law
 from pipeline.errors import AnalysisError
 from pipeline.options import Options, options_for
 from pipeline.track import Track
+from tests.plugin.bench_extras import falling, first_guess
 
 T = np.arange(6000) / 100
 
 
-def fall(t: Any, A0: float, d: float) -> Any:
-    """Return an amplitude that falls as dA/dt = -d A^(3/2)."""
-    return A0 / (1.0 + 0.5 * d * np.sqrt(A0) * t) ** 2
-
-
-def guess(t: Any, amplitude: Any) -> tuple[float, float]:
-    """Return the start of a straight line through the reciprocal roots."""
-    slope, level = np.polyfit(t, 1.0 / np.sqrt(amplitude), 1)
-    return level**-2, 2.0 * slope
-
-
 def three_halves(**options: Any) -> FunctionLaw:
     """Return the law of these functions."""
-    return make_law("three-halves", fall, {"d": (-1 / 2, -1)}, guess, **options)
+    return make_law("three-halves", falling, {"d": (-1 / 2, -1)}, first_guess, **options)
 
 
 def analysed(amplitude: Any, *laws: Any, accuracy: str = "standard", seed: int = 1) -> tuple[Analysis, Oscillation]:
@@ -48,7 +37,7 @@ def analysed(amplitude: Any, *laws: Any, accuracy: str = "standard", seed: int =
 @pytest.mark.parametrize("accuracy", ["standard", "best"])
 def test_a_law_of_a_function_is_found_where_it_holds(accuracy: str) -> None:
     """It is selected, and its coefficient is the true one, with the clock in its uncertainty and a budget."""
-    _, motion = analysed(fall(T, 0.05, 0.2), three_halves(words="a law of mine"), accuracy=accuracy)
+    _, motion = analysed(falling(T, 0.05, 0.2), three_halves(words="a law of mine"), accuracy=accuracy)
     assert motion.damping.selected == "three-halves"
     d = motion.derived.coefficients["d"]
     assert d.unit == "1/(m^1/2 s)"
@@ -60,14 +49,8 @@ def test_a_law_of_a_function_is_found_where_it_holds(accuracy: str) -> None:
 def test_a_coefficient_means_nothing_by_its_name(name: str) -> None:
     """A coefficient with the name of one of ours is neither a power nor a drag coefficient nor friction."""
     t = np.arange(3000) / 100.0
-    amplitude = 0.05 / (1.0 + 0.3 * math.sqrt(0.05) * t / 2.0) ** 2
-    y = 0.3 + amplitude * np.cos(8.3 * t) + 3e-4 * np.random.default_rng(1).standard_normal(t.size)
-    law = make_law(
-        "own",
-        lambda t, a, d: a / (1.0 + d * np.sqrt(a) * t / 2.0) ** 2,
-        {name: (-1 / 2, -1)},
-        lambda t, a: (lambda line: (line[1] ** -2, 2.0 * line[0]))(np.polyfit(t, a**-0.5, 1)),
-    )
+    y = 0.3 + falling(t, 0.05, 0.3) * np.cos(8.3 * t) + 3e-4 * np.random.default_rng(1).standard_normal(t.size)
+    law = make_law("own", falling, {name: (-1 / 2, -1)}, first_guess)
     bench = Scene.from_mapping({"bob": {"mass_kg": 0.2}, "disc": {"diameter_m": 0.1}, "air": {"temperature_c": 20.0}})
     options = Options(laws=(law,))
     found = analyse(Track.from_arrays(t, y), bench, options)

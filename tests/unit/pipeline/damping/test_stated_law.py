@@ -78,17 +78,3 @@ def test_an_upper_limit_covers_in_at_least_95_percent(ratio: float) -> None:
     values = ratio + np.random.default_rng(7).standard_normal(4000)
     covered = [UpperLimit(value, 1.0).limit >= ratio for value in values.tolist()]
     assert np.mean(covered) >= 0.95 - 3.3 * np.sqrt(0.05 * 0.95 / len(covered))
-
-
-def test_the_quality_factor_is_that_of_the_undamped_frequency() -> None:
-    """Of linear drag with a damping ratio of 1/2 and 0.7 it is 1 and 0.71, whatever way the motion was fitted."""
-    for ratio in (0.5, 0.7):
-        natural = 8.3
-        t = np.arange(400) / 100.0
-        omega = natural * np.sqrt(1.0 - ratio**2)
-        y = 0.2 + 0.05 * np.exp(-ratio * natural * t) * (
-            np.cos(omega * t) + ratio * natural / omega * np.sin(omega * t)
-        )
-        found = analyse(Track.from_arrays(t, y + 2e-5 * np.random.default_rng(2).standard_normal(t.size)))
-        q = found.estimates["quality_factor"]
-        assert q.value == pytest.approx(0.5 / ratio, rel=0.02)

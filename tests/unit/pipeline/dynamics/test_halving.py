@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,16 +10,10 @@ import pytest
 from pipeline.dynamics import Equation, Problem, get_integrator
 from pipeline.dynamics.halving import auto, halved, solved_once
 from pipeline.errors import DynamicsError
+from tests.conformance.test_integrators import STEP, STORED, problem_of
 from tests.sampling import sampled
 
-STORED = json.loads((Path(__file__).resolve().parents[3] / "reference" / "dynamics.json").read_text())
-STEP = STORED["step_s"]
 MIXED = Problem(Equation.from_laws(8.66, gamma_per_s=0.0073, beta_per_m_s=0.235), 0.05)
-
-
-def problem_of(case: dict[str, Any]) -> Problem:
-    """Return the problem of a stored case."""
-    return Problem(Equation(**case["equation"]), case["displacement_m"], case["velocity_m_per_s"])
 
 
 @pytest.mark.parametrize("tolerance", sampled([1e-9, 1e-3], 1))

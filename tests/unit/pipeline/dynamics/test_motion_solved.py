@@ -13,6 +13,7 @@ from pipeline.bench.spring import oscillating_mass_kg
 from pipeline.dynamics import Equation, Problem, effective_mass_kg, get_integrator
 from pipeline.errors import SceneError
 from springmass.simulations.bench import REST_M, bench_position
+from springmass.simulations.simulation import prepare
 
 BENCH = {
     "bob": {"mass_kg": 0.2176},
@@ -68,3 +69,14 @@ def test_the_bench_moves_by_the_equation() -> None:
     np.testing.assert_allclose(found - REST_M, run.y[rows], rtol=0, atol=0.05 * 2e-6)
     assert position(1e3) == position(2e3) != REST_M
     assert position(-1.0) == pytest.approx(REST_M + 0.05)
+
+
+def test_drag_that_disc_and_air_imply_damps_the_simulated_bench() -> None:
+    """Without a stated damping the bench decays as the prediction for the same time does."""
+    disc = {"disc": {"diameter_m": 0.16}, "air": {"temperature_c": 20.0}}
+    scene = Scene.from_mapping({**BENCH, **disc})
+    position = bench_position(scene, 20.0)
+    predicted = get_integrator("strang").run(prepare(scene, 20.0).problem, 0.001, 20_000, every=100)
+    recorded = np.array([position(t) for t in predicted.t]) - REST_M
+    np.testing.assert_allclose(recorded, predicted.y, rtol=0.0, atol=1e-7)
+    assert np.abs(recorded[-50:]).max() < 0.6 * np.abs(recorded[:50]).max()

@@ -112,15 +112,11 @@ def test_false_echoes_leave_the_fit() -> None:
 
 def test_a_motion_of_another_equation_is_not_forced_into_this_one() -> None:
     """A record whose drag grows with the cube of speed keeps the averaged law, and says that no solution follows it."""
-    run = solve_ivp(
-        lambda _, s: [s[1], -(OMEGA**2) * s[0] - 4.0 * s[1] ** 3],
-        (0.0, T[-1]),
-        [START, 0.0],
-        "DOP853",
-        t_eval=T,
-        rtol=1e-10,
-        atol=1e-13,
-    )
+
+    def moves(_: float, s: np.ndarray) -> list[float]:
+        return [s[1], -(OMEGA**2) * s[0] - 4.0 * s[1] ** 3]
+
+    run = solve_ivp(moves, (0.0, T[-1]), [START, 0.0], "DOP853", T, rtol=1e-10, atol=1e-13)
     y = 0.3 + run.y[0] + 2e-5 * np.random.default_rng(2).standard_normal(T.size)
     codes = {finding.code for finding in analyse(Track.from_arrays(T, y), SPRING).findings}
     assert "strongly_damped" not in codes

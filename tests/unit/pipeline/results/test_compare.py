@@ -12,12 +12,7 @@ from scipy.optimize import least_squares
 
 from pipeline.numerics.estimate import Estimate
 from pipeline.results.compare import Comparison, SpringRun, compare_springs
-
-BARE_OMEGA = Estimate(2 * math.pi * 7 / 5.27, 2 * math.pi * 7 / 5.27**2 * 0.01, "rad/s")
-DISC_OMEGA = Estimate(2 * math.pi * 7 / 5.08, 2 * math.pi * 7 / 5.08**2 * 0.01, "rad/s")
-BARE_KG, DISC_KG = Estimate(0.2007, 0.00005, "kg"), Estimate(0.2176, 0.00005, "kg")
-# The report's own numbers: periods of 5.27 s and 5.08 s over seven, masses of 200.7 g and 217.6 g.
-REPORT = [SpringRun("undamped", BARE_OMEGA, BARE_KG), SpringRun("damped", DISC_OMEGA, DISC_KG)]
+from pipeline.results.course import agreement
 
 
 def massless(runs: Sequence[SpringRun], mass_correlation: float = 0.0) -> Comparison:
@@ -38,17 +33,6 @@ def spring(name: str, k: float, mass_kg: float, relative: float = 1e-4) -> Sprin
     """Return a run of a spring with a mass."""
     omega = math.sqrt(k / mass_kg)
     return SpringRun(name, Estimate(omega, relative * omega), Estimate(mass_kg, 2e-5))
-
-
-def test_the_reports_exchange_is_named() -> None:
-    """With the masses exchanged the two come to 15.16 and 15.04 N/m, and the message names both runs."""
-    result = massless(REPORT)
-    assert result.exchanged == ("undamped", "damped")
-    swapped = [SpringRun(run.name, run.angular_frequency, m) for run, m in zip(REPORT, (DISC_KG, BARE_KG), strict=True)]
-    assert [k.value for k in massless(swapped).each] == [
-        pytest.approx(15.16, abs=0.01),
-        pytest.approx(15.04, abs=0.01),
-    ]
 
 
 def test_common_clock_widens_the_mean_and_not_the_test() -> None:
@@ -131,3 +115,15 @@ def test_three_runs_test_what_they_solve_for() -> None:
     wrong = replace(runs[1], mass_kg=Estimate(0.206, 2e-5))
     result = compare_springs([runs[0], wrong, runs[2]])
     assert not result.agree
+
+
+def test_scatter_within_and_between_is_what_was_put_in():
+    """Over 400 benches of 5 runs the moments come back within some percent, and the mean within its uncertainty."""
+    rng = np.random.default_rng(3)
+    benches = np.repeat(np.arange(400), 5)
+    values = 14.0 + 0.05 * rng.standard_normal(400)[benches] + 0.02 * rng.standard_normal(2000)
+    found = agreement("k", "", [Estimate(float(x), 0.01, "N/m") for x in values], [str(b) for b in benches])
+    assert found.within == pytest.approx(0.02, rel=0.05)
+    assert found.between == pytest.approx(0.05, rel=0.1)
+    assert abs(found.mean.value - 14.0) < 3.0 * found.mean.u
+    assert found.mean.u == pytest.approx(0.05 / 20.0, rel=0.15)

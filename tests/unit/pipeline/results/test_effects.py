@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import pytest
@@ -26,26 +26,16 @@ BENCH: dict[str, Any] = {
 }
 
 
-def table(tables: dict[str, Any], **track: Any) -> dict[str, Effect]:
-    """Return the effects of a run of 8 rad/s with mixed drag, by name."""
-    recorded = replace(Track.from_arrays(T, Y), **track)
-    return {effect.name: effect for effect in analyse(recorded, Scene.from_mapping(tables)).effects}
+@cache
+def effects(*, known: bool) -> dict[str, Effect]:
+    """Return the effects of a run of 8 rad/s with mixed drag, by name, on the whole bench or if nothing is known."""
+    scene = Scene.from_mapping(BENCH if known else {})
+    return {effect.name: effect for effect in analyse(Track.from_arrays(T, Y), scene).effects}
 
 
-@pytest.fixture(scope="module")
-def bench() -> dict[str, Effect]:
-    """Return the effects on the whole bench."""
-    return table(BENCH)
-
-
-@pytest.fixture(scope="module")
-def bare() -> dict[str, Effect]:
-    """Return the effects where nothing is known of the bench."""
-    return table({})
-
-
-def test_masses_by_hand(bench: dict[str, Effect], bare: dict[str, Effect]) -> None:
+def test_masses_by_hand() -> None:
     """A third of 10 g and a little is 1.54 % of the bob, 0.43 g of air 0.196 %; without a bob nothing is predicted."""
+    bench, bare = effects(known=True), effects(known=False)
     assert bench["spring_mass"].predicted == pytest.approx(0.01 / 3 / 0.2176 + (0.01 / 0.2176) ** 2 / 45, rel=1e-4)
     assert bench["added_mass"].predicted == pytest.approx(8 / 3 * 1.2041 * 0.051**3 / 0.2176, rel=1e-3)
     assert added_mass_kg(Scene.from_mapping(BENCH)) == pytest.approx(8 / 3 * 1.2041 * 0.051**3, rel=5e-4)
@@ -54,8 +44,9 @@ def test_masses_by_hand(bench: dict[str, Effect], bare: dict[str, Effect]) -> No
         assert (bare[name].predicted, bare[name].included) == (None, False)
 
 
-def test_drag_by_hand(bench: dict[str, Effect], bare: dict[str, Effect]) -> None:
+def test_drag_by_hand() -> None:
     """The disc's drag by one formula, C = 4.8 KC^(-1/3), stands next to all damping that was measured at the start."""
+    bench, bare = effects(known=True), effects(known=False)
     mass = 0.2176 + 0.0100 / 3 + 8 / 3 * 1.2041 * 0.051**3
     coefficient = 16 * (2 / math.pi) ** (8 / 3) * (2 * math.pi * 0.05 / 0.102) ** (-1 / 3)
     drag_per_m = 0.5 * coefficient * 1.2041 * math.pi * 0.051**2 / mass
@@ -64,6 +55,6 @@ def test_drag_by_hand(bench: dict[str, Effect], bare: dict[str, Effect]) -> None
     assert bare["disc_drag"].predicted is None
 
 
-def test_buoyancy_by_hand(bench: dict[str, Effect]) -> None:
+def test_buoyancy_by_hand() -> None:
     """A steel bob is lifted by rho / rho_steel g / omega^2 = 23 um."""
-    assert bench["buoyancy"].predicted == pytest.approx(1.2041 / 7850 * 9.81 / 64, rel=1e-2)
+    assert effects(known=True)["buoyancy"].predicted == pytest.approx(1.2041 / 7850 * 9.81 / 64, rel=1e-2)

@@ -86,17 +86,6 @@ def test_what_holds_no_run_is_refused(source: Any) -> None:
         sm.analyse(source)
 
 
-def test_a_path_brings_what_its_reader_saw() -> None:
-    """Findings of reading stand among the analysis's, also where the file was loaded before."""
-    data = sm.sample_data()
-    path = data / "damped_simulated_position.txt"
-    found = sm.analyse(path, scene=data / "damped.scene.toml")
-    assert "stated_error_is_not_noise" in {finding.code for finding in found.findings}
-    assert found.name == path.name
-    again = sm.analyse(sm.load(path), data / "damped.scene.toml")
-    assert again.analysis.estimates == found.analysis.estimates
-
-
 def test_the_scene_is_given_or_beside_the_file_or_in_it(damped_run: Path, tmp_path: Path) -> None:
     """In this order; a mapping is a scene too."""
     inside = sm.analyse(damped_run)

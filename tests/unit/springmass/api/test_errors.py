@@ -47,15 +47,11 @@ WRONG: dict[str, Callable[[Path], Any]] = {
 }
 
 
-def write_plain(path: Path) -> None:
-    """Write a table that states no unit."""
-    path.write_text("time,height\n" + "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True)))
-
-
 @pytest.mark.parametrize("name", WRONG)
 def test_every_error_has_one_root_and_a_remedy(name: str, tmp_path: Path) -> None:
     """One line, whose remedy stands in it."""
-    write_plain(tmp_path / "plain.csv")
+    rows = "".join(f"{t:.2f},{y:.5f}\n" for t, y in zip(*RUN, strict=True))
+    (tmp_path / "plain.csv").write_text(f"time,height\n{rows}")
     content = bytearray(sm.load(RUN).save(tmp_path / "damaged.h5").read_bytes())
     content[len(content) // 2] ^= 0xFF
     (tmp_path / "damaged.h5").write_bytes(content)
@@ -65,23 +61,6 @@ def test_every_error_has_one_root_and_a_remedy(name: str, tmp_path: Path) -> Non
     assert caught.value.remedy
     assert str(caught.value).endswith(caught.value.remedy)
     assert "\n" not in str(caught.value)
-
-
-def test_a_question_is_answered_by_its_remedy(tmp_path: Path) -> None:
-    """It is the call to make."""
-    path = tmp_path / "plain.csv"
-    write_plain(path)
-    with pytest.raises(sm.Error) as caught:
-        sm.analyse(path)
-    run = eval(caught.value.remedy, {"springmass": sm})
-    assert run["T"].value == pytest.approx(2.0 * np.pi / 8.3, rel=1e-4)
-
-
-def test_the_remedy_for_times_that_run_backwards_helps() -> None:
-    """In the order of their times, the samples are analysed."""
-    order = np.argsort(T[::-1])
-    run = sm.analyse((T[::-1][order], RUN[1][::-1][order]))
-    assert run["T"].value == pytest.approx(2.0 * np.pi / 8.3, rel=1e-4)
 
 
 def test_an_unknown_option_names_the_known_ones() -> None:

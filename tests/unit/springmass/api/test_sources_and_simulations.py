@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 
 import springmass as sm
 from acquisition.block import concatenate
@@ -87,11 +88,7 @@ def test_a_port_is_a_source_like_any_other(tmp_path: Path) -> None:
 def test_a_simulation_is_that_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same motion, error, method and band."""
     scene = tmp_path / "bench.toml"
-    scene.write_text(
-        "bob.mass_kg = { value = 0.2, u = 5e-5 }\nspring.mass_kg = 0.01\n"
-        "spring.constant_n_per_m = { value = 14.0, u = 0.01 }\n"
-        "start.displacement_m = 0.05\ndamping.gamma_per_s = 0.01\n"
-    )
+    scene.write_text(tomli_w.dumps(BENCH))
     assert main(["simulate", "--scene", str(scene), "--seconds", "20", "--json"]) == 0
     command = json.loads(capsys.readouterr().out)
     motion = sm.simulate(scene, np.arange(2001) * 0.01)
