@@ -84,6 +84,7 @@ def test_a_second_pass_analyses_nothing_and_a_change_only_what_changed(runs, cli
     assert rows("out")[3]["bob_mass_kg"] == "0.2"
 
 
+@pytest.mark.trials
 @pytest.mark.skipif(shutil.which("git") is None, reason="a change of a checkout is noticed by git")
 def test_a_changed_program_analyses_all_runs(runs, tmp_path):
     """In a checkout the table names the commit and an uncommitted change, and either makes the rows old."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
 
+from springmass.loading.load import sample_data
 from tests.cli.conftest import Cli
 from tests.courses import contents
 
@@ -49,20 +51,20 @@ def test_several_inputs_share_one_table_and_one_report(cli: Cli, bench: Path, tm
 
 
 def test_a_report_of_other_runs_keeps_no_file_of_the_earlier_runs(cli: Cli, bench: Path, tmp_path: Path) -> None:
-    """The folder has what it has when it is new, and the files that a person put there."""
-    undamped, damped = (bench / f"{name}_simulated_position.txt" for name in ("undamped", "damped"))
-    runs = [bench / f"{name}.txt" for name in "abc"]
-    for run in runs:
-        run.write_bytes(undamped.read_bytes())
-    options = ("--accuracy", "fast", "--figures", "svg", "--output")
-    assert cli("analyse", undamped, damped, *options, tmp_path / "out").code == 0
-    own = tmp_path / "out" / "together.results" / "my_motion.csv"
-    own.write_text("t,y\n")
-    for out in ("out", "new"):
-        assert cli("analyse", *runs, *options, tmp_path / out).code == 0
-    files = [set(contents(tmp_path / out / "together.results")) for out in ("out", "new")]
-    assert files[0] - files[1] == {own.name}
-    assert not files[1] - files[0]
+    """Tables and figures of the earlier runs go; the files that a person put there stay."""
+    a, b, c, d = (bench / f"{name}.txt" for name in "abcd")
+    for run in (a, b, c, d):
+        shutil.copy(sample_data() / "cropped_simulated_position.txt", run)
+    options = ("--accuracy", "fast", "--output", tmp_path)
+    assert cli("analyse", a, b, *options, "--figures", "svg").code == 0
+    folder = tmp_path / "together.results"
+    earlier = set(contents(folder))
+    assert {"a_motion.csv", "figures/a_position.svg"} <= earlier
+    (folder / "my_motion.csv").write_text("t,y\n")
+    assert cli("analyse", c, d, *options).code == 0
+    left = set(contents(folder))
+    assert {"c_motion.csv", "my_motion.csv"} <= left
+    assert not [name for name in left & earlier if "a_" in name or "b_" in name or name.startswith("figures/")]
 
 
 def test_a_folder_gives_its_recordings_and_names_what_is_none(cli: Cli, bench: Path) -> None:

@@ -162,6 +162,7 @@ def test_messages_are_the_samples(record: Callable[..., Any]) -> None:
     program.end()
 
 
+@pytest.mark.trials
 def test_the_amplitude_is_newer_than_the_analysis(record: Callable[..., Any]) -> None:
     """Between two analyses the motion is sent again: with the amplitude of the last seconds, and without charts."""
     program = record()
