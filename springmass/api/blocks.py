@@ -22,7 +22,7 @@ from springmass.api.analysing import AnyScene, ReadKeywords
 from springmass.errors import UNREADABLE, ProgramError
 from springmass.loading.load import load
 from springmass.loading.loaded import Loaded
-from springmass.loading.options import ReadOptions
+from springmass.loading.options import LoadOptions
 from springmass.loading.save import made_now, save_run
 from springmass.loading.scenes import scene_from
 from springmass.loading.track import to_track
@@ -102,7 +102,7 @@ def source(
         return _bench(what if isinstance(what, Scene) else Scene.from_mapping(what), speed)
     if os.path.isfile(what):
         given_scene = scene_from(scene)
-        loaded = load(Path(what), ReadOptions.of(how))
+        loaded = load(Path(what), LoadOptions.of(how))
         loaded = loaded if given_scene is None else replace(loaded, scene=given_scene.to_mapping())
         pace = speed if math.isfinite(speed) else None
         replay = Replay(loaded.samples_in_blocks(), _clock(speed), info=loaded.info, speed=pace)

@@ -23,6 +23,7 @@ from springmass.commands.options import (
     FiguresOption,
     FileArgument,
     Json,
+    ReadArguments,
     Scenes,
     Strict,
 )
@@ -71,11 +72,12 @@ def analyse(
         argument("INPUT", "recordings, run files or folders of these; - for standard input", required=True),
     ],
     options: AnalyseOptions = AnalyseOptions(),
-    how: AnalysisArguments = AnalysisArguments(),
+    read: ReadArguments = ReadArguments(),
+    analysis: AnalysisArguments = AnalysisArguments(),
     bench: BenchOptions = BenchOptions(),
 ) -> int:
     """Analyse every input; if one fails, the others still give results."""
-    inputs = [str(each) for each in recordings]
+    inputs, how = [str(each) for each in recordings], analysis.of(read, options.method)
     if how.velocity is not None and (len(inputs) > 1 or Path(inputs[0]).is_dir()):
         got = f"{len(inputs)} inputs" if len(inputs) > 1 else "a folder"
         raise ProgramError(f"--velocity completes one position file, got {got}; analyse the pair by itself")
@@ -85,7 +87,6 @@ def analyse(
         LOG.info(line)
     alone = len(files) == 1
     names = [""] if alone else distinct_names(["stdin" if file.path == STDIN else file.path for file in files])
-    how = replace(how, method=options.method)
     of_files = [how if file.velocity is None else replace(how, velocity=file.velocity) for file in files]
     tasks = [
         Task(file.path, name, scenes[file.of], of_file, values)

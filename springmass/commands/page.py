@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from springmass.commands.options import PART, PageOptions, ReadArguments, RecordingArgument, refuse
+from springmass.commands.options import PageOptions, ReadArguments, RecordingArgument
 from springmass.commands.parameters import flag
 from springmass.errors import LOG, OK, ProgramError
 from springmass.loading.inputs import kind_of
@@ -31,7 +31,6 @@ def page(
     recorder: Annotated[bool, flag("used internally by `record --page`")] = False,
 ) -> int:
     """Serve the page until Ctrl-C; for a recording, until the recorder has ended and no browser shows the page."""
-    refuse("page", read, *PART)
     path = Path(recording)
     over = threading.Event()
     network = address_in_network() if page.lan else ""

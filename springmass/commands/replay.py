@@ -12,7 +12,7 @@ from cyclopts import Parameter, Token
 
 from acquisition.clock import SystemClock, VirtualClock
 from acquisition.replay import Replay
-from springmass.commands.options import PART, ReadArguments, RecordingArgument, refuse
+from springmass.commands.options import ReadArguments, RecordingArgument
 from springmass.commands.parameters import Finite, flag, option
 from springmass.errors import OK
 from springmass.loading.load import load
@@ -41,7 +41,6 @@ def replay(
     read: ReadArguments = ReadArguments(),
 ) -> int:
     """Play the input to stdout, one line per sample."""
-    refuse("replay", read, *PART)
     loaded = load(recording, read)
     fast = math.isinf(speed)
     clock, pace = (VirtualClock(), None) if fast else (SystemClock(), speed)

@@ -81,7 +81,7 @@ def simulate(
     if against is not None:
         from springmass.simulations.against import duration_s
 
-        run = Run.of(against, stated, AnalysisOptions.of(read.given()))
+        run = Run.of(against, stated, AnalysisOptions(**read.given()))
         stated, analysis = run.scene, run.analysis
         longest_s = max(seconds or 0.0, duration_s(analysis))
         seconds = seconds or longest_s

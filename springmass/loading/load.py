@@ -18,8 +18,7 @@ from springmass.layout import STDIN, part
 from springmass.loading.inputs import kind_of
 from springmass.loading.loaded import UNVERIFIED, Loaded, sha256_of
 from springmass.loading.notes import about_of
-from springmass.loading.options import READ_DEFAULTS, ReadOptions
-from springmass.loading.time_range import within
+from springmass.loading.options import LOAD_DEFAULTS, LoadOptions
 from springmass.loading.track import to_track
 from storage.errors import RunDamaged
 from storage.recovery.recover import recover
@@ -27,10 +26,9 @@ from storage.run_file.layout import CHECKED
 from storage.run_file.reading import open_run
 
 DIFFERENCES_NAMED = 5  # maximum number of differences that a message names
-_OF_FILES = frozenset({"velocity", "channel", "rate_hz", "unit", "run", "time", "time_unit", "delimiter", "decimal"})
 
 
-def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given: bool = False) -> Loaded:
+def load(path: str | Path, options: LoadOptions = LOAD_DEFAULTS, *, scene_given: bool = False) -> Loaded:
     """Read a recording, a run file or a wire log, or standard input.
 
     All digests of a run file are checked before any sample is used. With ``scene_given`` the caller uses another scene,
@@ -47,8 +45,7 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
         _refuse(where, "a wire log", options, ("channel",))
         loaded = _load_wire(where, options.channel)
     else:
-        answers = {name: getattr(options, name) for name in _OF_FILES - {"velocity"}}
-        loaded = _from_recording(where, open_recording(where, velocity_path=options.velocity, **answers))
+        loaded = _from_recording(where, open_recording(where, options.about_the_file()))
     for trap in loaded.traps:
         if trap.code == UNVERIFIED:
             LOG.warning(f"{where}: {trap.message}")
@@ -64,10 +61,10 @@ def load(path: str | Path, options: ReadOptions = READ_DEFAULTS, *, scene_given:
         loaded = replace(loaded, scene=scene, provenance={**loaded.provenance, **noted})
     summary = f"{loaded.format}, {len(loaded.samples)} samples of {loaded.samples.quantity}"
     LOG.debug(f"read: {where}: {summary} at {loaded.info.rate_hz:g} Hz, clock: {loaded.info.clock}")
-    return within(loaded, options)
+    return loaded
 
 
-def _load_stdin(options: ReadOptions) -> Loaded:
+def _load_stdin(options: LoadOptions) -> Loaded:
     """Load from standard input by way of a temporary file, because the formats need a seekable file."""
     with tempfile.TemporaryDirectory(prefix="springmass-") as folder:
         spooled = Path(folder) / "stdin"
@@ -93,9 +90,9 @@ def sample_data() -> Path:
     raise ProgramError(f"{folder}: the bundled recordings are missing; install springmass again", UNREADABLE)
 
 
-def _refuse(path: Path, what: str, options: ReadOptions, allowed: Sequence[str]) -> None:
+def _refuse(path: Path, what: str, options: LoadOptions, allowed: Sequence[str]) -> None:
     """Refuse options that describe a file which already states everything itself."""
-    given = [name for name in options.given() if name in _OF_FILES and name not in allowed]
+    given = [name for name in options.about_the_file().given() if name not in allowed]
     if given:
         raise ProgramError(f"{path}: {what} states everything, got {', '.join(given)} too; leave that out")
 

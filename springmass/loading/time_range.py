@@ -10,10 +10,10 @@ import numpy as np
 from pipeline.track import Track
 from springmass.errors import ProgramError
 from springmass.loading.loaded import Loaded
-from springmass.loading.options import ReadOptions
+from springmass.loading.options import AnalysisOptions
 
 
-def within(loaded: Loaded, options: ReadOptions) -> Loaded:
+def within(loaded: Loaded, options: AnalysisOptions) -> Loaded:
     """Return an input with its track cut to the chosen seconds, and with the stated error of its clock."""
     track = cut(loaded.track, options.from_s, options.to_s, where=loaded.path)
     if options.clock_ppm is not None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition.recordings.identify import open_recording
+from acquisition.recordings.reading import ReadOptions
 
 PANDHI = "AyushPandhi__Pandhi_Ayush_PHY224"
 
@@ -23,7 +24,7 @@ PANDHI = "AyushPandhi__Pandhi_Ayush_PHY224"
 def test_a_pair(recordings: Path, position: str, velocity: str, second: float) -> None:
     """Both files of a run join without a hole; alone, summed up, velocity is the position but for the offset."""
     there, alone = open_recording(recordings / position), open_recording(recordings / velocity)
-    pair = open_recording(recordings / position, velocity_path=recordings / velocity)
+    pair = open_recording(recordings / position, ReadOptions(velocity=recordings / velocity))
     assert alone.channel == "velocity"
     for each in (alone.samples.velocity, pair.samples.velocity):
         assert each is not None
